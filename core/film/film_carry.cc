@@ -155,13 +155,13 @@ double MeanOf(const Image& image) {
 }
 
 // Takes the tracks that features find, where they are more confident than flow.
-void TakeFoundAgain(const FoundAgain& again,
-                    const Image& frame,
-                    const Image& contrast,
-                    const Image& key_contrast,
-                    const FilmCarryOptions& options,
-                    const CancellationToken& cancel,
-                    FilmTrack* track) {
+void TakeReappearing(const ReappearingRegions& again,
+                     const Image& frame,
+                     const Image& contrast,
+                     const Image& key_contrast,
+                     const FilmCarryOptions& options,
+                     const CancellationToken& cancel,
+                     FilmTrack* track) {
   const auto in_key = [&](const FilmTrack& t) {
     return Places{t.in_key, ConfidenceOf(t.in_key, t.in_frame, contrast, key_contrast, options)};
   };
@@ -292,7 +292,7 @@ class Walker {
     cancel_.ThrowIfCancelled();
     Register(*key_, key_contrast_, next, contrast, &track->in_frame);
     cancel_.ThrowIfCancelled();
-    TakeFoundAgain(*again_, next, contrast, key_contrast_, options_, cancel_, track);
+    TakeReappearing(*again_, next, contrast, key_contrast_, options_, cancel_, track);
   }
 
   const Walk& walk_;
@@ -301,7 +301,7 @@ class Walker {
   const CancellationToken& cancel_;
   const std::shared_ptr<const Image> key_;
   const Image key_contrast_;
-  std::optional<FoundAgain> again_;
+  std::optional<ReappearingRegions> again_;
   int frame_;
   std::shared_ptr<const Image> luminance_;  // of the frame
   double moved_;
@@ -376,16 +376,16 @@ std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames,
   return near;
 }
 
-CarriedColor CarryFoundAgain(const FilmKey& key,
-                             const FoundAgain& again,
-                             const Image& frame,
-                             const FilmCarryOptions& options,
-                             const CancellationToken& cancel) {
+CarriedColor CarryIntoReappearing(const FilmKey& key,
+                                  const ReappearingRegions& again,
+                                  const Image& frame,
+                                  const FilmCarryOptions& options,
+                                  const CancellationToken& cancel) {
   constexpr float kNowhere = -1e4f;
   const Image contrast = LocalContrast(frame), key_contrast = LocalContrast(again.key());
   const Image nowhere(frame.width, frame.height, 2, kNowhere);
   FilmTrack track{nowhere, nowhere};
-  TakeFoundAgain(again, frame, contrast, key_contrast, options, cancel, &track);
+  TakeReappearing(again, frame, contrast, key_contrast, options, cancel, &track);
   return ColorOf(key, key_contrast, contrast, track, options);
 }
 

@@ -14,7 +14,7 @@ FilmKey AnchorAsKey(int frame, const FusedColor& color);
 
 // Blends the colours propagated from the anchors before and after a frame; either may be empty. The
 // nearer anchor weighs more. `place`: 0..1 of the way from the one before to the one after.
-CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, double place);
+CarriedColor BlendAnchors(CarriedColor before, const CarriedColor& behind, double place);
 
 // Open share of a frame above which its colours are inferred.
 inline constexpr double kWorthInferring = 0.02;
@@ -24,7 +24,7 @@ double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors
 size_t FillOpen(const CarriedColor& others, CarriedColor* color);
 // Takes the colours inferred for a neighbouring frame where `color` is not sure. They are
 // propagated with less confidence than seen colours, since inferring them anew would be no surer.
-void TakeAnswer(const CarriedColor& answer, CarriedColor* color);
+void TakeNeighborsColor(const CarriedColor& answer, CarriedColor* color);
 
 // Fuses the colour of a frame: carried colours; those of the anchors, where they are propagated
 // surely, in place of inferred ones; and inferred ones where neither is sure, if that is more than

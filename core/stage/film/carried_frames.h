@@ -12,10 +12,10 @@
 namespace color3d {
 
 // Keeps the frames in the scratch folder to bound memory. Thread-safe after construction.
-class FramesInColor {
+class CarriedFrames {
  public:
   // `keys`: coloured key views. The references must outlive the object.
-  FramesInColor(const Scene& scene,
+  CarriedFrames(const Scene& scene,
                 const ViewImages& images,
                 const std::vector<ColoredKeyView>& keys,
                 const FilmCarryOptions& options,

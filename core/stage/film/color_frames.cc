@@ -173,7 +173,7 @@ class ShotColorer {
       const int from = shot_.AnchorUpTo(stretch[i]), to = shot_.AnchorBehind(stretch[i]);
       const double place =
           from >= 0 && to >= 0 ? static_cast<double>(stretch[i] - from) / (to - from) : 0.0;
-      of_anchors[i] = OfBothAnchors(std::move(before[i]), behind[i], place);
+      of_anchors[i] = BlendAnchors(std::move(before[i]), behind[i], place);
     });
     std::vector<Gap> gaps = GapsOf(stretch);
     // The longest gaps first, so that threads end together.
@@ -264,7 +264,7 @@ class ShotColorer {
                 [&](int frame, const CarriedColor& color) {
                   const auto i = std::find(frames.begin(), frames.end(), frame) - frames.begin();
                   if (open[i] == 0.0) return;
-                  TakeAnswer(color, &(*of_anchors)[gap.begin + i]);
+                  TakeNeighborsColor(color, &(*of_anchors)[gap.begin + i]);
                   measure(i);
                 });
     }
