@@ -166,7 +166,7 @@ class ColorizeStream final
 
   void Answer(const std::shared_ptr<Picture>& picture, const grpc::Status& answered) {
     v1::ColorizeImagesResponse& response = picture->response;
-    const grpc::Status status = answered.ok() ? TakeNeighborsColor(picture) : answered;
+    const grpc::Status status = answered.ok() ? TakeAnswer(picture) : answered;
     response.set_request_id(picture->request.request_id().substr(0, 128));
     if (status.ok()) {
       response.clear_error();
@@ -188,7 +188,7 @@ class ColorizeStream final
   }
 
   // What is too large for a message is the project's blob from now on.
-  grpc::Status TakeNeighborsColor(const std::shared_ptr<Picture>& picture) {
+  grpc::Status TakeAnswer(const std::shared_ptr<Picture>& picture) {
     v1::ColorizeImagesResponse& response = picture->response;
     internal::v1::ColorizeImageResponse& answer = picture->call->response;
     response.mutable_image()->swap(*answer.mutable_image());
