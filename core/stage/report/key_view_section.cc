@@ -87,9 +87,7 @@ std::vector<ReportKeyView> ReportOfAdditionalKeyViews(const Scene& scene,
     report.pictures = {
         view.name,
         {SmallPicture("as captured", ReadImage(context.scene_folder() / view.image_file), side_px),
-         SmallPicture("coloured: gives the colours that the key views before it do not give",
-                      DecodeImage(context.ReadInput(colored), colored),
-                      side_px)}};
+         SmallPicture("coloured", DecodeImage(context.ReadInput(colored), colored), side_px)}};
     AddColor(facts, &report);
     AddRegions(folder, context, &report);
     reports.push_back(std::move(report));
