@@ -40,10 +40,10 @@ void RunImportScene(const ImportOptions& options,
 // photos that were seen before come from the context's cache folder.
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
 
-// The key view in colour, and what its source tells of that.
+// Colours a key view. Writes its colours, a picture for people and facts about the source.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
-// The key views' own colours in every view, as far as it shows the same, and how much that is.
+// Carries the colours of the key views into every view, and measures how much of each they cover.
 void RunCarryColor(const CarryColorOptions& options, StageContext& context);
 
 // Training pictures beside the key view: the files below augment/ of the scene's folder if they are
@@ -64,8 +64,9 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
 ColorSources SourcesOf(const Colorizer& colorizer,
                        std::function<Image(const Image& luminance)> position = {});
 
-// The colours of every view, corrected: where the user says so, and in whatever is like that and
-// near it (METHOD.md "Corrections"). `encoder`: as RunColorizeViews'.
+// Corrects the colours of every view where the user painted and in similar places near that
+// (METHOD.md "Corrections"), or recolours ranges of time of a film. `encoder`: as in
+// RunColorizeViews.
 void RunCorrectColors(const CorrectColorsOptions& options,
                       StageContext& context,
                       const std::string& encoder = "");
