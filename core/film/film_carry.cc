@@ -64,7 +64,7 @@ Image LocalContrast(const Image& luminance) {
 }
 
 // Mean difference of two pictures of local contrast around each pixel, 0..2.
-Image Unlike(const Image& one, const Image& other) {
+Image LocalDifference(const Image& one, const Image& other) {
   Image difference(one.width, one.height, 1);
   for (size_t i = 0; i < difference.data.size(); ++i) {
     difference.data[i] = std::min(2.0f, std::abs(one.data[i] - other.data[i]));
@@ -88,8 +88,8 @@ void Register(const Image& picture,
     if (x * x + y * y > kMostPx * kMostPx) x = y = 0.0f;
   }
   const Image registered = SampledAt(*place, Moved(rest));
-  const Image before = Unlike(contrast, SampledAt(other_contrast, *place));
-  const Image after = Unlike(contrast, SampledAt(other_contrast, registered));
+  const Image before = LocalDifference(contrast, SampledAt(other_contrast, *place));
+  const Image after = LocalDifference(contrast, SampledAt(other_contrast, registered));
   for (size_t i = 0; i < before.data.size(); ++i) {
     if (after.data[i] >= before.data[i] - kLeastGain) continue;
     for (int c = 0; c < 2; ++c) place->Plane(c)[i] = registered.Plane(c)[i];
@@ -108,7 +108,7 @@ Image ConfidenceOf(const Image& place,
                    const Image& contrast,
                    const Image& other_contrast,
                    const FilmCarryOptions& options) {
-  const Image unlike = Unlike(contrast, SampledAt(other_contrast, place));
+  const Image unlike = LocalDifference(contrast, SampledAt(other_contrast, place));
   const Image returned = SampledAt(back, place);
   const int width = contrast.width, height = contrast.height;
   const double inverse_square_tolerance =
@@ -310,7 +310,7 @@ class Walker {
 };
 
 // Drops the frames that are done.
-void TakeUp(const std::vector<FilmWalk>& walks, Walk* walk) {
+void DropFinished(const std::vector<FilmWalk>& walks, Walk* walk) {
   for (const FilmWalk& done : walks) {
     if (done.key != walk->key->frame || done.direction != walk->direction) continue;
     const auto last = std::find(walk->frames.begin(), walk->frames.end(), done.frame);
@@ -340,7 +340,7 @@ std::vector<Walk> WalksOf(const FilmFrames& frames,
         walk.frames.push_back(i);
         if (is_nearest) walk.nearest = walk.frames.size();
       }
-      TakeUp(done, &walk);
+      DropFinished(done, &walk);
       if (!walk.frames.empty()) walks.push_back(std::move(walk));
     }
   }

@@ -83,11 +83,11 @@ CarryCheckpoint::CarryCheckpoint(const Scene& scene, StageContext& context)
       is_done_(scene.views.size(), 0),
       coverage_(scene.views.size(), 0.0),
       records_(kind::kCarryColor, kMagic, context) {
-  records_.TakeUp([&](const json& record) { CheckRecord(record, scene_); },
-                  [&](const json& record) { TakeUp(record); });
+  records_.Restore([&](const json& record) { CheckRecord(record, scene_); },
+                   [&](const json& record) { Restore(record); });
 }
 
-void CarryCheckpoint::TakeUp(const json& record) {
+void CarryCheckpoint::Restore(const json& record) {
   if (record.contains("key")) {
     const FilmWalk walk = WalkFrom(record, scene_);
     walks_[{walk.key, walk.direction}] = walk;
@@ -124,7 +124,7 @@ void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
   SaveWhenDue();
 }
 
-void CarryCheckpoint::Tell(const std::string& message) const {
+void CarryCheckpoint::ReportProgress(const std::string& message) const {
   const std::lock_guard lock(mutex_);
   context_.progress().OnProgress(done_, static_cast<int64_t>(scene_.views.size()), message);
 }

@@ -28,7 +28,7 @@ class CarryCheckpoint {
   // Writes the output, reports progress, and saves a checkpoint when one is due. `coverage`: 0..1.
   void Add(int view, double coverage, const std::string& png);
   // Reports other work as progress.
-  void Tell(const std::string& message) const;
+  void ReportProgress(const std::string& message) const;
   // Returns the output of a view that was added.
   std::string Png(int view) const;
   // Replaces that output, and saves a checkpoint when one is due.
@@ -42,7 +42,7 @@ class CarryCheckpoint {
   void SetWalk(const FilmWalk& walk);
 
  private:
-  void TakeUp(const nlohmann::json& record);
+  void Restore(const nlohmann::json& record);
   void Keep(size_t view, double coverage, const std::string& png);
   void SaveWhenDue();
 
