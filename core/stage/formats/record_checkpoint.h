@@ -23,7 +23,7 @@ class RecordCheckpoint {
   // Hands over the records of the last checkpoint, all of them or none: `check` throws
   // nlohmann::json::exception or Error{kNotFound, kDataLoss} for what is no record, which is
   // reported as a warning.
-  void TakeUp(const OnRecord& check, const OnRecord& take);
+  void Restore(const OnRecord& check, const OnRecord& take);
   // Keeps a record for this checkpoint and all later ones.
   void Append(const nlohmann::json& record);
   // Saves a checkpoint when it is time: what was appended, and `latest`, which is asked for then.

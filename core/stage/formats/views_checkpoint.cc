@@ -34,7 +34,7 @@ ViewsCheckpoint::ViewsCheckpoint(const Scene& scene, StageContext& context)
   const auto view_of = [&](const json& record) {
     return scene.FindView(record.at("view").get<std::string>());
   };
-  records_.TakeUp(
+  records_.Restore(
       [&](const json& record) {
         view_of(record);
         record.at("ab").get_binary();
