@@ -73,7 +73,7 @@ void GraphBuilder::Provide(const std::string& artifact, const std::string& for_k
   const std::string provider = ProviderOf(artifact);
   const auto planned = planned_.find(provider);
   if (planned != planned_.end()) {
-    // What this scene does not need is left out; nothing is to be waited for.
+    // A skipped job gives nothing to wait for.
     if (graph_.jobs[static_cast<size_t>(planned->second)].skip_reason.empty()) {
       job->inputs.push_back(planned->second);
     }

@@ -108,7 +108,7 @@ class ColorFramesTest : public StageTest {
   Scene scene_;
   std::vector<int> asked_;
   size_t guesses_ = 0;
-  float distance_ = 0.0f;  // of what is asked, as features go
+  float distance_ = 0.0f;  // feature distance of the inferred pixels
   bool flicker_ = false;
   std::vector<int> key_views_;
   std::set<int> done_;
@@ -173,7 +173,7 @@ TEST_F(ColorFramesTest, SteadiesFlicker) {
   ASSERT_GT(asked_.size(), 2u);
   double jump = 0.0;
   for (int view = 1; view < kFrames; ++view) {
-    if (view == 12 || view == 13) continue;  // a key frame is nobody else's to change
+    if (view == 12 || view == 13) continue;  // key frames keep their colours
     jump = std::max(
         jump,
         std::abs(double{colors.at(view).ab.At(1, 30, 50)} - colors.at(view - 1).ab.At(1, 30, 50)));
