@@ -60,7 +60,7 @@ allow core/scene/sfm "core/($scene|scene(/(formats|sfm))?)"
 allow core/scene/import "core/($scene|scene(/(masks|formats|sfm|import))?)"
 allow core/encoder 'core/(base|color|image|weights|encoder(/[a-z]+)?)'
 for folder in keyview augment metrics; do
-  allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
+  allow "core/$folder" "core/(base|catalogue|color|image|weights|scene|encoder|$folder)"
 done
 allow core/matching 'core/(base|encoder(/[a-z]+)?|matching)'
 allow core/keycolor \

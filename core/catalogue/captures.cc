@@ -19,7 +19,8 @@ struct IdleStage {
   const char* reason;
 };
 
-constexpr char kNotReconstructed[] = "frames of a film without poses are coloured, not reconstructed";
+constexpr char kNotReconstructed[] =
+    "frames of a film without poses are coloured, not reconstructed";
 constexpr IdleStage kIdleStages[] = {
     {CaptureKind::kFilm, kind::kReconstructGeometry, kNotReconstructed},
     {CaptureKind::kFilm, kind::kSolveChroma, kNotReconstructed},
@@ -101,11 +102,10 @@ CaptureLayout DetectCapture(const std::vector<std::string>& files) {
 }
 
 const std::vector<CaptureKindInfo>& CaptureKinds() {
-  static const std::vector<CaptureKindInfo> kinds = {
-      {CaptureKind::kStatic, "static", false, true},
-      {CaptureKind::kFilm, "film", true, false},
-      {CaptureKind::kDynamic, "dynamic", true, true},
-      {CaptureKind::kRelief, "relief", true, true}};
+  static const std::vector<CaptureKindInfo> kinds = {{CaptureKind::kStatic, "static", false, true},
+                                                     {CaptureKind::kFilm, "film", true, false},
+                                                     {CaptureKind::kDynamic, "dynamic", true, true},
+                                                     {CaptureKind::kRelief, "relief", true, true}};
   return kinds;
 }
 

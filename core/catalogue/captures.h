@@ -12,14 +12,14 @@ namespace color3d {
 // The values are those of the API's Scene.Layout, and are kept in stores.
 enum class CaptureLayout {
   kUnknown = 0,
-  kPhotos = 1,      // photos without poses
-  kColmap = 2,      // photos with COLMAP models
-  kTransforms = 3,  // photos, or films of several cameras, with a transforms.json
-  kSplat = 4,       // one splat
-  kFilm = 5,        // one film: a video file, or pictures in frames/
-  kNerfies = 6,     // photos with the cameras of Nerfies or HyperNeRF
-  kPosesBounds = 7, // films of several cameras, or photos, with a poses_bounds.npy
-  kFilms = 8,       // films of several cameras without poses
+  kPhotos = 1,       // photos without poses
+  kColmap = 2,       // photos with COLMAP models
+  kTransforms = 3,   // photos, or films of several cameras, with a transforms.json
+  kSplat = 4,        // one splat
+  kFilm = 5,         // one film: a video file, or pictures in frames/
+  kNerfies = 6,      // photos with the cameras of Nerfies or HyperNeRF
+  kPosesBounds = 7,  // films of several cameras, or photos, with a poses_bounds.npy
+  kFilms = 8,        // films of several cameras without poses
   // Found by import alone: films of several cameras with poses in a file.
   kPosedFilms = 9,
 };
@@ -54,9 +54,9 @@ enum class CaptureKind {
 
 struct CaptureKindInfo {
   CaptureKind kind;
-  const char* name;         // in scene.json
-  bool has_times;           // each view has one
-  bool is_reconstructed;    // Gaussians are made of it
+  const char* name;       // in scene.json
+  bool has_times;         // each view has one
+  bool is_reconstructed;  // Gaussians are made of it
 };
 
 const std::vector<CaptureKindInfo>& CaptureKinds();

@@ -40,10 +40,10 @@ void RunImportScene(const ImportOptions& options,
 // photos are cached in the cache folder of the context.
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
 
-// Colours the key view from its source.
+// Colours a key view. Writes its colours, a picture for people and facts about the source.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
-// Carries the colours of the key views to every view that shows the same surfaces.
+// Carries the colours of the key views into every view, and measures how much of each they cover.
 void RunCarryColor(const CarryColorOptions& options, StageContext& context);
 
 // Makes training pictures beside the key view: the files in augment/ if requested, pictures of a
@@ -65,8 +65,9 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
 ColorSources SourcesOf(const Colorizer& colorizer,
                        std::function<Image(const Image& luminance)> position = {});
 
-// Corrects the colours of every view at the given places and at similar surfaces nearby (METHOD.md
-// "Corrections"). `encoder`: as for RunColorizeViews.
+// Corrects the colours of every view where the user painted and in similar places near that
+// (METHOD.md "Corrections"), or recolours ranges of time of a film. `encoder`: as in
+// RunColorizeViews.
 void RunCorrectColors(const CorrectColorsOptions& options,
                       StageContext& context,
                       const std::string& encoder = "");

@@ -464,5 +464,22 @@ TEST(PlanColorizeScene, TakesAnAcceptedKeyView) {
   EXPECT_THAT(PlanError(spec, {Done("personalize")}).message, HasSubstr("personalize"));
 }
 
+TEST(PlanColorizeScene, ColorsAdditionalKeyViewsBesideAnAcceptedOne) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  AddKeyView("b", spec.mutable_colorize_scene()->mutable_carry_color());
+  spec.add_inputs("jobs/colorize_key_view");
+  const std::vector<JobRecord> inputs{
+      Done("import_scene"), Done("select_key_view"), Done("colorize_key_view")};
+  const NewGraph graph = PlanJob(spec, inputs, kTwentyPhotos);
+  const auto keys = KeyViewsRead(graph, kind::kCarryColor);
+  ASSERT_EQ(keys.size(), 1u);
+  EXPECT_EQ(keys[0].view(), "b");
+  EXPECT_THAT(graph.jobs[IndexOf(graph, kind::kColorizeKeyView)].input_jobs,
+              ElementsAre("jobs/import_scene"));
+  EXPECT_THAT(graph.jobs[IndexOf(graph, kind::kCarryColor)].input_jobs,
+              ElementsAre("jobs/import_scene", "jobs/select_key_view", "jobs/colorize_key_view"));
+}
+
 }  // namespace
 }  // namespace color3d

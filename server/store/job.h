@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "core/base/digest.h"
-#include "core/catalogue/captures.h"
 #include "core/base/error.h"
+#include "core/catalogue/captures.h"
 #include "core/catalogue/error_reasons.h"
 
 namespace color3d {

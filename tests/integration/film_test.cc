@@ -295,7 +295,9 @@ TEST_F(FilmTest, ARangeOfTimeIsRecoloredAndNothingElseIsMadeAnew) {
     EXPECT_THAT(artifact.name(), testing::ContainsRegex("n11[0-4].png"));
   }
   EXPECT_EQ(frames, 5);
-  EXPECT_THAT(ReadFile(Path("out") / "report.html"), HasSubstr("n112.png=COLOURED_1.png@0.4-0.56"));
+  const std::string report = ReadFile(Path("out") / "report.html");
+  EXPECT_THAT(report, HasSubstr("n112.png=COLOURED_1.png@0.4-0.56"));
+  EXPECT_THAT(report, HasSubstr("<h2>Additional key view</h2>"));
   FilmReader movie(Path("out") / "scene.mp4");
   for (int frame = 0; frame < kFrames; ++frame) {
     const Image image = movie.Read(frame);

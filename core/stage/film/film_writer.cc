@@ -22,7 +22,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Of the size that MovieSize says.
+// Fits the picture into a movie frame, cropped to MovieSize.
 Image MovieFrame(const Image& picture) {
   Image image = FitWithin(picture, kMaxMovieSidePx);
   const auto [width, height] = MovieSize(picture.width, picture.height);
@@ -48,7 +48,7 @@ FilmClock ClockOfFilm(const Scene& scene,
   return ClockOf(times);
 }
 
-// A file name that tells the camera, unlike those that are taken.
+// A file name for the camera that is not among `taken`.
 std::string FileNameOf(const std::string& camera, std::set<std::string>* taken) {
   std::string name = camera.empty() ? "camera" : camera;
   for (char& c : name) {
@@ -70,7 +70,7 @@ std::map<int, std::vector<int>> FramesByShot(const Scene& scene) {
   return frames;
 }
 
-// The file in the scratch folder under one name or more.
+// Publishes the file of the scratch folder under each of the names.
 void LeaveAs(const std::vector<std::string>& artifacts,
              const fs::path& file,
              StageContext& context) {

@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int64_t kScoredFramesCacheBytes = int64_t{16} << 20;  // each frame is read twice, at once
+constexpr int64_t kScoredFramesCacheBytes = int64_t{16} << 20;  // each frame is read twice in a row
 
 std::vector<std::vector<int>> ShotsInOrderOfTime(const Scene& scene) {
   std::map<int, std::vector<int>> shots;

@@ -16,7 +16,7 @@ namespace {
 //   {"view": name, "coverage": 0..1, "png": bytes}       a finished view; the last one counts
 //   {"key": name, "direction": 1 or -1, "frame": name, "moved": longer sides,
 //    "wanted": 0..1, "width": px, "height": px, "in_key": bytes, "in_frame": bytes}
-//                                                        a walk of a film; no maps at its end
+//                                                        a walk of a film; without maps at its end
 constexpr char kMagic[] = "carry 3\n";
 
 json::binary_t BytesOf(const Image& map) {

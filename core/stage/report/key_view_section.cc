@@ -87,9 +87,7 @@ std::vector<ReportKeyView> AdditionalKeyViewChapters(const Scene& scene,
     report.pictures = {
         view.name,
         {SmallPicture("as captured", ReadImage(context.scene_folder() / view.image_file), side_px),
-         SmallPicture("coloured: for the parts that the key views before it do not show",
-                      DecodeImage(context.ReadInput(colored), colored),
-                      side_px)}};
+         SmallPicture("coloured", DecodeImage(context.ReadInput(colored), colored), side_px)}};
     AddColor(facts, &report);
     AddRegions(folder, context, &report);
     reports.push_back(std::move(report));
