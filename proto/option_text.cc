@@ -29,7 +29,7 @@ std::string ValuesText(const FieldDescriptor* field) {
   return text;
 }
 
-std::string WhyRefused(const FieldDescriptor* field, double value) {
+std::string RangeError(const FieldDescriptor* field, double value) {
   if (!std::isfinite(value)) return " is not a finite number";
   const v1::OptionInfo& info = InfoOf(field);
   const bool too_small = info.has_min() && value < info.min();

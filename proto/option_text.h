@@ -22,6 +22,6 @@ std::string ValuesText(const google::protobuf::FieldDescriptor* field);
 
 // Returns why the field refuses the number: " is -5; the range is 64 to 4096"; empty if it accepts
 // it.
-std::string WhyRefused(const google::protobuf::FieldDescriptor* field, double value);
+std::string RangeError(const google::protobuf::FieldDescriptor* field, double value);
 
 }  // namespace color3d

@@ -45,7 +45,7 @@ constexpr OptionFlag kOptionFlags[] = {
 };
 
 // Returns why a setting is refused, or an empty string.
-std::string Complaint(const std::string& setting) {
+std::string SettingError(const std::string& setting) {
   v1::ColorizeSceneSpec spec;
   try {
     SetOption(setting, &spec);
@@ -62,7 +62,7 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
            flag.flag,
            [o, name](const std::string& value) { o->settings.push_back(name + "=" + value); },
            fmt::format("{} ({})", flag.help, DescribeOption(name)))
-        ->check([name](const std::string& value) { return Complaint(name + "=" + value); });
+        ->check([name](const std::string& value) { return SettingError(name + "=" + value); });
   }
   app.add_flag_callback(
       "--augment-files",
@@ -81,7 +81,7 @@ void DeclareOptionFlags(CLI::App& app, ColorizeOptions* o) {
          "STAGE.OPTION=VALUE: set an option of a stage, e.g. carry_color.depth_tolerance=0.05; "
          "`--set STAGE` lists its options. May be repeated")
       ->allow_extra_args(false)
-      ->check(Complaint);
+      ->check(SettingError);
 }
 
 // Flags of the import.
@@ -96,17 +96,17 @@ void DeclareImportFlags(CLI::App& app, ColorizeOptions* o) {
       "always estimated");
 }
 
-std::string ComplaintOfImport(const std::string& setting) {
+std::string ImportSettingError(const std::string& setting) {
   if (!setting.starts_with(kind::kImportScene)) {
     return "'" + setting +
            "' is not an option of the import (import_scene.OPTION=VALUE); options of other stages "
            "belong to `color3d colorize`";
   }
-  return Complaint(setting);
+  return SettingError(setting);
 }
 
 // Options from preset, file, settings and --poses, without the other flags of this command.
-v1::ColorizeSceneSpec Chosen(const ColorizeOptions& options) {
+v1::ColorizeSceneSpec RequestedOptions(const ColorizeOptions& options) {
   v1::ColorizeSceneSpec spec = ReadPreset(options.preset);
   for (const std::string& setting : options.settings) SetOption(setting, &spec);
   if (options.poses) {
@@ -148,7 +148,7 @@ void ColorizeOptions::Check() const {
   if (bound && !benchmark) {
     throw InvalidArgument("--bound needs --benchmark");
   }
-  Chosen(*this);  // throws if the file of the preset cannot be read
+  RequestedOptions(*this);  // throws if the file of the preset cannot be read
   color.Check();
   if (keys > 1 && !benchmark) {
     throw InvalidArgument(
@@ -260,7 +260,7 @@ void AddKeyViews(Connection& connection,
 }
 
 bool WantsAugmentFiles(const ColorizeOptions& options) {
-  return Chosen(options).generate_augmentations().files();
+  return RequestedOptions(options).generate_augmentations().files();
 }
 
 void RequireAugmentFiles(const ColorizeOptions& options, const PhotoFolder& folder) {
@@ -351,7 +351,7 @@ void DeclareImportOptions(CLI::App& app, ColorizeOptions* o) {
                  "import_scene.OPTION=VALUE: set an option of the import, e.g. "
                  "import_scene.film_stride=2; `--set import_scene` lists them. May be repeated")
       ->allow_extra_args(false)
-      ->check(ComplaintOfImport);
+      ->check(ImportSettingError);
 }
 
 v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene) {
@@ -364,14 +364,14 @@ v1::JobSpec CommonSpec(const ColorizeOptions& options, const std::string& scene)
 v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene) {
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::ImportSceneSpec* import_scene = spec.mutable_import_scene();
-  *import_scene = Chosen(options).import_scene();
+  *import_scene = RequestedOptions(options).import_scene();
   if (options.hold_out || options.benchmark) import_scene->set_hold_out_every_eighth(true);
   if (options.deflicker) import_scene->set_film_deflicker(true);
   return spec;
 }
 
-v1::ColorizeSceneSpec OverItsPreset(Connection& connection, const ColorizeOptions& options) {
-  const v1::ColorizeSceneSpec chosen = Chosen(options);
+v1::ColorizeSceneSpec MergeWithPreset(Connection& connection, const ColorizeOptions& options) {
+  const v1::ColorizeSceneSpec chosen = RequestedOptions(options);
   v1::ColorizeSceneSpec spec;
   const auto info = connection.Call(
       &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
@@ -387,7 +387,7 @@ v1::ColorizeSceneSpec OverItsPreset(Connection& connection, const ColorizeOption
 v1::JobSpec GeometrySpec(Connection& connection,
                          const ColorizeOptions& options,
                          const std::string& scene) {
-  const v1::ColorizeSceneSpec chosen = OverItsPreset(connection, options);
+  const v1::ColorizeSceneSpec chosen = MergeWithPreset(connection, options);
   v1::JobSpec spec = CommonSpec(options, scene);
   *spec.mutable_reconstruct_geometry() = chosen.reconstruct_geometry();
   if (!chosen.reconstruct_geometry().has_max_side_px()) {
@@ -399,12 +399,13 @@ v1::JobSpec GeometrySpec(Connection& connection,
 v1::JobSpec SelectSpec(Connection& connection,
                        const ColorizeOptions& options,
                        const std::string& scene) {
-  const v1::ColorizeSceneSpec chosen = Chosen(options);
+  const v1::ColorizeSceneSpec chosen = RequestedOptions(options);
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::SelectKeyViewSpec* select = spec.mutable_select_key_view();
   // A job of one stage uses the default preset anyway.
-  *select = chosen.preset() > v1::PRESET_FAST ? OverItsPreset(connection, options).select_key_view()
-                                              : chosen.select_key_view();
+  *select = chosen.preset() > v1::PRESET_FAST
+                ? MergeWithPreset(connection, options).select_key_view()
+                : chosen.select_key_view();
   if (!options.encoder.empty()) select->set_encoder(options.encoder);
   if (options.keys > 1) select->set_count(options.keys);
   if (!options.key_view.empty()) {
@@ -417,7 +418,7 @@ v1::JobSpec SelectSpec(Connection& connection,
 v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene) {
   v1::JobSpec spec = CommonSpec(options, scene);
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
-  *colorize = Chosen(options);
+  *colorize = RequestedOptions(options);
   if (!options.encoder.empty()) {
     colorize->mutable_select_key_view()->set_encoder(options.encoder);
     colorize->mutable_personalize()->set_encoder(options.encoder);

@@ -31,7 +31,7 @@ bool IsMessage(const FieldDescriptor* field) {
 // Numeric options of the whole scene. Its other fields have flags of their own.
 bool IsOptionOfScene(const FieldDescriptor* field) { return InfoOf(field).has_min(); }
 
-std::string NameOf(const Option& option) {
+std::string OptionName(const Option& option) {
   return (option.stage == nullptr ? "" : option.stage->name() + ".") + option.field->name();
 }
 
@@ -73,7 +73,7 @@ int EditDistance(const std::string& a, const std::string& b) {
 Option FindOption(const std::string& name) {
   std::vector<std::string> names, same_field, of_stage;
   for (const Option& option : AllOptions()) {
-    const std::string known = NameOf(option);
+    const std::string known = OptionName(option);
     if (known == name) return option;
     names.push_back(known);
     if (option.field->name() == name) same_field.push_back(known);
@@ -120,7 +120,7 @@ bool Parse(const std::string& text, T* value) {
 }
 
 // Accepted values of the field, for messages and --help.
-std::string Takes(const FieldDescriptor* field) {
+std::string AcceptedValues(const FieldDescriptor* field) {
   const std::string range = RangeText(field);
   const std::string& unit = InfoOf(field).unit();
   switch (field->cpp_type()) {
@@ -147,7 +147,8 @@ std::string Takes(const FieldDescriptor* field) {
 }
 
 [[noreturn]] void Refuse(const Option& option, const std::string& value) {
-  throw InvalidArgument("{} is '{}'; it must be {}", NameOf(option), value, Takes(option.field));
+  throw InvalidArgument(
+      "{} is '{}'; it must be {}", OptionName(option), value, AcceptedValues(option.field));
 }
 
 void SetNumber(const Option& option, const std::string& text, Message* message) {
@@ -156,7 +157,7 @@ void SetNumber(const Option& option, const std::string& text, Message* message) 
   double number = 0.0;
   const bool is_integer = option.field->cpp_type() == FieldDescriptor::CPPTYPE_INT32;
   const bool is_number = is_integer ? Parse(text, &whole) : Parse(text, &number);
-  if (!is_number || !WhyRefused(option.field, is_integer ? whole : number).empty()) {
+  if (!is_number || !RangeError(option.field, is_integer ? whole : number).empty()) {
     Refuse(option, text);
   }
   if (is_integer) {
@@ -186,7 +187,7 @@ void SetOption(const std::string& setting, v1::ColorizeSceneSpec* spec) {
   const Option option = FindOption(setting.substr(0, equals));
   if (equals == std::string::npos) {
     throw InvalidArgument(
-        "{} has no value; write {}=VALUE, with {}", setting, setting, Takes(option.field));
+        "{} has no value; write {}=VALUE, with {}", setting, setting, AcceptedValues(option.field));
   }
   const std::string value = setting.substr(equals + 1);
   Message* message = spec;
@@ -211,8 +212,8 @@ void SetOption(const std::string& setting, v1::ColorizeSceneSpec* spec) {
 std::string DescribeOption(const std::string& name) {
   const FieldDescriptor* field = FindOption(name).field;
   const std::string& value = InfoOf(field).default_value();
-  if (field->cpp_type() == FieldDescriptor::CPPTYPE_STRING) return Takes(field);
-  return Takes(field) + ", default " + (value.empty() ? "by preset" : value);
+  if (field->cpp_type() == FieldDescriptor::CPPTYPE_STRING) return AcceptedValues(field);
+  return AcceptedValues(field) + ", default " + (value.empty() ? "by preset" : value);
 }
 
 }  // namespace color3d::client

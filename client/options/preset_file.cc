@@ -94,7 +94,7 @@ void CheckValues(const Message& message,
       default:
         continue;
     }
-    const std::string why = WhyRefused(field, value);
+    const std::string why = RangeError(field, value);
     if (!why.empty()) Complain(file, lines.GetLocation(field, -1).line, field->name() + why);
   }
 }

@@ -29,7 +29,7 @@ std::vector<CertificateRecord> ParseCertificateRoles(std::string_view text,
           file,
           number);
     }
-    record.role = RoleOfLine(role, record.project, file, number);
+    record.role = ParseRole(role, record.project, file, number);
     records.push_back(record);
   }
   return records;

@@ -16,7 +16,7 @@ namespace {
 constexpr auto kLook = std::chrono::seconds(1);
 
 // Identity of the file's contents and permissions, from its metadata.
-std::string IdentityOf(const fs::path& file) {
+std::string FileIdentity(const fs::path& file) {
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) return "";
   return fmt::format("{} {} {} {} {}",
@@ -32,7 +32,7 @@ std::string IdentityOf(const fs::path& file) {
 GuardedFile::GuardedFile(const fs::path& file,
                          const char* what,
                          std::function<void(const std::string&)> take)
-    : file_(file), what_(what), take_(std::move(take)), identity_(IdentityOf(file)) {
+    : file_(file), what_(what), take_(std::move(take)), identity_(FileIdentity(file)) {
   take_(Read());
 }
 
@@ -49,11 +49,11 @@ std::string GuardedFile::Read() const {
   return ReadFile(file_);
 }
 
-void GuardedFile::ReadAgain() {
+void GuardedFile::Reload() {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_look_) return;
   next_look_ = now + kLook;
-  const std::string identity = IdentityOf(file_);
+  const std::string identity = FileIdentity(file_);
   if (identity == identity_) return;
   identity_ = identity;
   try {
@@ -66,7 +66,7 @@ void GuardedFile::ReadAgain() {
 
 void GuardedFile::WithLatest(const std::function<void()>& use) {
   const MutexLock lock(mutex_);
-  ReadAgain();
+  Reload();
   use();
 }
 

@@ -26,7 +26,7 @@ class GuardedFile {
 
  private:
   std::string Read() const;
-  void ReadAgain() COLOR3D_REQUIRES(mutex_);
+  void Reload() COLOR3D_REQUIRES(mutex_);
 
   const std::filesystem::path file_;
   const char* const what_;

@@ -64,10 +64,10 @@ void CheckProject(const std::string& project) {
   }
 }
 
-Role RoleOfLine(const std::string& role,
-                const std::string& project,
-                const std::string& file,
-                int line) {
+Role ParseRole(const std::string& role,
+               const std::string& project,
+               const std::string& file,
+               int line) {
   try {
     const Role named = RoleFromName(role);
     CheckProject(project);
@@ -94,7 +94,7 @@ std::vector<TokenRecord> ParseTokens(std::string_view text, const std::string& f
           file,
           number);
     }
-    record.role = RoleOfLine(role, record.project, file, number);
+    record.role = ParseRole(role, record.project, file, number);
     records.push_back(record);
   }
   return records;

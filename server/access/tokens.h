@@ -34,10 +34,10 @@ struct TokenRecord {
 void CheckProject(const std::string& project);
 // Returns the role in line `line` of `file`. Throws as RoleFromName and CheckProject, with file and
 // line before the message.
-Role RoleOfLine(const std::string& role,
-                const std::string& project,
-                const std::string& file,
-                int line);
+Role ParseRole(const std::string& role,
+               const std::string& project,
+               const std::string& file,
+               int line);
 
 // Parses lines "NAME ROLE SHA256 [PROJECT]"; empty lines and lines that begin with '#' are skipped.
 // Throws Error{kInvalidArgument} with file and line.

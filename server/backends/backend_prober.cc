@@ -24,7 +24,7 @@ struct Question {
   std::unique_ptr<grpc::ClientAsyncResponseReader<backend::v1::BackendInfo>> reader;
 };
 
-ProbeAnswer AnswerOf(const Question& question) {
+ProbeAnswer ToProbeAnswer(const Question& question) {
   ProbeAnswer answer;
   if (!question.status.ok()) {
     answer.problem = question.status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED
@@ -74,7 +74,7 @@ std::map<std::string, ProbeAnswer> BackendProber::Probe() {
     bool ok = false;
     if (!queue.Next(&tag, &ok)) break;
     const auto* question = static_cast<const Question*>(tag);
-    answers_[question->name] = AnswerOf(*question);
+    answers_[question->name] = ToProbeAnswer(*question);
   }
   queue.Shutdown();
   asked_ = std::chrono::steady_clock::now();

@@ -20,7 +20,7 @@ constexpr int64_t kProgressSteps = 1000;
 constexpr size_t kMaxTextBytes = 200;
 
 // Text of a backend, made safe for a line of the log.
-std::string Plain(const std::string& text) {
+std::string PrintableText(const std::string& text) {
   std::string plain = text.substr(0, kMaxTextBytes);
   std::replace_if(
       plain.begin(), plain.end(), [](unsigned char c) { return c < 32 || c > 126; }, '?');
@@ -274,9 +274,9 @@ std::vector<std::string> GrpcColorizer::Generate(const RemoteGenerateRequest& re
 
 RemoteInfo InfoFromProto(const backend::v1::BackendInfo& info) {
   RemoteInfo result;
-  result.description = Plain(info.name()) + (info.version().empty() ? "" : " ") +
-                       Plain(info.version()) +
-                       (info.license().empty() ? "" : " (" + Plain(info.license()) + ")");
+  result.description = PrintableText(info.name()) + (info.version().empty() ? "" : " ") +
+                       PrintableText(info.version()) +
+                       (info.license().empty() ? "" : " (" + PrintableText(info.license()) + ")");
   for (const int value : info.capabilities()) {
     if (const char* name = CapabilityName(value)) result.capabilities.insert(name);
   }

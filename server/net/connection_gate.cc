@@ -28,7 +28,7 @@ constexpr int kAtOnce = 64;      // connections accepted before others are serve
 constexpr int kCloseShare = 16;  // 1/kCloseShare of all connections are closed at once
 
 // Returns 0 if the descriptor is not in use.
-ino_t InodeOf(int fd) {
+ino_t SocketInode(int fd) {
   struct stat status {};
   return ::fstat(fd, &status) == 0 && S_ISSOCK(status.st_mode) ? status.st_ino : 0;
 }
@@ -38,11 +38,11 @@ ino_t InodeOf(int fd) {
 void EndSocket(int fd, ino_t inode) {
   const int own = ::fcntl(fd, F_DUPFD_CLOEXEC, 0);
   if (own < 0) return;
-  if (InodeOf(own) == inode) ::shutdown(own, SHUT_RDWR);
+  if (SocketInode(own) == inode) ::shutdown(own, SHUT_RDWR);
   ::close(own);
 }
 
-std::string PeerOf(int fd) {
+std::string SocketPeerName(int fd) {
   sockaddr_storage address{};
   socklen_t size = sizeof(address);
   if (::getpeername(fd, reinterpret_cast<sockaddr*>(&address), &size) != 0) return "";
@@ -171,7 +171,7 @@ bool ConnectionGate::Accept(int listener) {
     if (fd < 0 && (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM)) {
       // A pause only, whereas gRPC would stop listening for good.
       LogRefusal(std::strerror(errno));
-      CloseSomething();
+      CloseOneOrMore();
       return false;
     }
     if (fd < 0) return true;  // EAGAIN: no pending connection
@@ -217,7 +217,8 @@ void ConnectionGate::OnBytes(int fd) {
 }
 
 void ConnectionGate::HandOn(const Silent& silent) {
-  open_.push_back({silent.fd, InodeOf(silent.fd), PeerOf(silent.fd), SteadyClock::now()});
+  open_.push_back(
+      {silent.fd, SocketInode(silent.fd), SocketPeerName(silent.fd), SteadyClock::now()});
   sink_(silent.listener, silent.fd);
 }
 
@@ -234,7 +235,7 @@ void ConnectionGate::CloseLongSilent() {
 }
 
 void ConnectionGate::ForgetClosed() {
-  std::erase_if(open_, [](const Connection& one) { return InodeOf(one.fd) != one.inode; });
+  std::erase_if(open_, [](const Connection& one) { return SocketInode(one.fd) != one.inode; });
   std::unordered_set<std::string> peers;
   for (const Connection& one : open_) peers.insert(one.peer);
   const MutexLock lock(mutex_);
@@ -250,10 +251,10 @@ bool ConnectionGate::MakeRoom(int fd) {
   };
   if (!is_full()) return true;
   if (silent_.empty()) ForgetClosed();
-  return !is_full() || CloseSomething();
+  return !is_full() || CloseOneOrMore();
 }
 
-bool ConnectionGate::CloseSomething() {
+bool ConnectionGate::CloseOneOrMore() {
   if (silent_.empty()) return CloseIdle();
   CloseSilent(silent_.begin());
   const MutexLock lock(mutex_);

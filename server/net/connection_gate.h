@@ -104,7 +104,7 @@ class ConnectionGate {
   bool MakeRoom(int fd);
   // Closes the connection that has been silent for longest, or else idle ones. Returns false if
   // there is none.
-  bool CloseSomething();
+  bool CloseOneOrMore();
   bool CloseIdle();
   void LogRefusal(const char* why);
   void Publish();

@@ -20,7 +20,7 @@ struct CurlDeleter {
 size_t Discard(char*, size_t size, size_t count, void*) { return size * count; }
 
 // Host under which a socket that listens on all interfaces is reached.
-std::string HostOf(const std::string& address) {
+std::string ReachableAddress(const std::string& address) {
   const HostPort parts = SplitHostPort(address);
   const bool everywhere = parts.host == "0.0.0.0" || parts.host == "::";
   const std::string host = everywhere ? "127.0.0.1" : parts.host;
@@ -38,7 +38,7 @@ std::string ProbePort(const ProbeTarget& target, std::chrono::milliseconds limit
   const bool is_unix = target.address.starts_with(kUnix);
   const std::string url = fmt::format("{}://{}/grpc.health.v1.Health/Check",
                                       target.tls ? "https" : "http",
-                                      is_unix ? "localhost" : HostOf(target.address));
+                                      is_unix ? "localhost" : ReachableAddress(target.address));
   std::string path = is_unix ? target.address.substr(kUnix.size()) : "";
   if (path.starts_with("//")) path.erase(0, 2);
   std::unique_ptr<curl_slist, CurlDeleter> headers;

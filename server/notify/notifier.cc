@@ -25,12 +25,14 @@ std::string TimeText(int64_t ms) {
 }
 
 // Returns scheme, host and port.
-std::string ReceiverOf(const std::string& url) { return url.substr(0, url.find('/', 8)); }
+std::string ReceiverAddress(const std::string& url) { return url.substr(0, url.find('/', 8)); }
 
-std::pair<int64_t, int64_t> KeyOf(const Notification& due) { return {due.job_id, due.first_ms}; }
+std::pair<int64_t, int64_t> NotificationKey(const Notification& due) {
+  return {due.job_id, due.first_ms};
+}
 
 // A query may hold a secret.
-std::string ForLog(const std::string& url) { return url.substr(0, url.find('?')); }
+std::string WithoutQuery(const std::string& url) { return url.substr(0, url.find('?')); }
 
 }  // namespace
 
@@ -72,10 +74,10 @@ void Notifier::Loop() {
   while (true) {
     std::optional<Notification> due;
     try {
-      WriteRemembered();
+      StoreOutcomes();
       {
         const MutexLock lock(mutex_);
-        due = TakeDue();
+        due = NextDue();
       }
       if (due) Deliver(*due);
     } catch (const std::exception& e) {
@@ -83,8 +85,8 @@ void Notifier::Loop() {
     }
     MutexLock lock(mutex_);
     if (due) {
-      under_way_.erase(KeyOf(*due));
-      --receivers_[ReceiverOf(due->url)].sending;
+      under_way_.erase(NotificationKey(*due));
+      --receivers_[ReceiverAddress(due->url)].sending;
     }
     if (stopping_) return;
     if (due) continue;
@@ -96,14 +98,14 @@ void Notifier::Loop() {
 
 // Returns a notification that may be sent now. Reads the store when its last list is used up, at
 // each poll.
-std::optional<Notification> Notifier::TakeDue() {
-  if (auto next = NextOf(due_)) return next;
+std::optional<Notification> Notifier::NextDue() {
+  if (auto next = FindDue(due_)) return next;
   const auto now = Steady::now();
   if (now < next_poll_) return std::nullopt;
   next_poll_ = now + options_.poll;
   due_ = store_.DueNotifications(kOfEachReceiver);
   std::set<Key> owed;
-  for (const Notification& due : due_) owed.insert(KeyOf(due));
+  for (const Notification& due : due_) owed.insert(NotificationKey(due));
   // Forgets notifications that the store no longer owes, unless their outcome is not stored yet.
   std::erase_if(remembered_, [&](const auto& entry) {
     return !owed.contains(entry.first) && (entry.second.written || !entry.second.ended);
@@ -112,20 +114,20 @@ std::optional<Notification> Notifier::TakeDue() {
     const Receiver& receiver = entry.second;
     return receiver.sending == 0 && now > receiver.again + std::chrono::hours(1);
   });
-  return NextOf(due_);
+  return FindDue(due_);
 }
 
-std::optional<Notification> Notifier::NextOf(const std::vector<Notification>& all) {
+std::optional<Notification> Notifier::FindDue(const std::vector<Notification>& all) {
   const auto now = Steady::now();
   for (const Notification& due : all) {
-    if (under_way_.contains(KeyOf(due))) continue;
-    const auto known = remembered_.find(KeyOf(due));
+    if (under_way_.contains(NotificationKey(due))) continue;
+    const auto known = remembered_.find(NotificationKey(due));
     if (known != remembered_.end() && (known->second.ended || now < known->second.again)) continue;
-    Receiver& receiver = receivers_[ReceiverOf(due.url)];
+    Receiver& receiver = receivers_[ReceiverAddress(due.url)];
     const int most = receiver.silences > 0 ? 1 : options_.at_once_to_one;
     if (receiver.sending >= most || now < receiver.again) continue;
     ++receiver.sending;
-    under_way_.insert(KeyOf(due));
+    under_way_.insert(NotificationKey(due));
     Notification next = due;
     if (known != remembered_.end()) next.tries = known->second.tries;
     return next;
@@ -144,7 +146,7 @@ void Notifier::Deliver(const Notification& due) {
                                  NotificationBody(job)};
     answer = SendWebhook(message, options_.secret, stopping_);
     if (stopping_ && answer.status == 0) return;
-    NoteAnswer(due.url, answer.status != 0);
+    RecordAnswer(due.url, answer.status != 0);
   } catch (const Error& e) {
     answer.problem = e.what();
   }
@@ -156,14 +158,14 @@ void Notifier::Deliver(const Notification& due) {
                 "[job={}] notification {} {} ({})",
                 due.job,
                 delivered ? "was sent to" : "is given up for",
-                ForLog(due.url),
+                WithoutQuery(due.url),
                 how);
     return RecordOutcome(due, {true, due.tries + 1, {}});
   }
   const std::chrono::milliseconds pause = PauseAfter(due.tries);
   spdlog::warn("[job={}] notification was not accepted by {} ({}); retry in {} s",
                due.job,
-               ForLog(due.url),
+               WithoutQuery(due.url),
                how,
                pause.count() / 1000);
   RecordOutcome(due, {false, due.tries + 1, Steady::now() + pause});
@@ -173,9 +175,9 @@ std::chrono::milliseconds Notifier::PauseAfter(int tries) const {
   return options_.pauses[std::min(static_cast<size_t>(tries), options_.pauses.size() - 1)];
 }
 
-void Notifier::NoteAnswer(const std::string& url, bool answered) {
+void Notifier::RecordAnswer(const std::string& url, bool answered) {
   const MutexLock lock(mutex_);
-  Receiver& receiver = receivers_[ReceiverOf(url)];
+  Receiver& receiver = receivers_[ReceiverAddress(url)];
   if (answered) {
     receiver.silences = 0;
     return;
@@ -188,9 +190,9 @@ void Notifier::RecordOutcome(const Notification& due, const Outcome& outcome) {
   {
     // Before the store is told, so that it is not sent again if that fails.
     const MutexLock lock(mutex_);
-    remembered_[KeyOf(due)] = outcome;
+    remembered_[NotificationKey(due)] = outcome;
   }
-  Write(KeyOf(due), outcome);
+  Write(NotificationKey(due), outcome);
 }
 
 bool Notifier::Write(const Key& key, const Outcome& outcome) {
@@ -216,7 +218,7 @@ bool Notifier::Write(const Key& key, const Outcome& outcome) {
 }
 
 // Failed attempts are stored after their next try.
-void Notifier::WriteRemembered() {
+void Notifier::StoreOutcomes() {
   std::vector<std::pair<Key, Outcome>> unwritten;
   {
     const MutexLock lock(mutex_);

@@ -70,15 +70,16 @@ class Notifier {
   };
 
   void Loop();
-  std::optional<Notification> TakeDue() COLOR3D_REQUIRES(mutex_);
-  std::optional<Notification> NextOf(const std::vector<Notification>& due) COLOR3D_REQUIRES(mutex_);
+  std::optional<Notification> NextDue() COLOR3D_REQUIRES(mutex_);
+  std::optional<Notification> FindDue(const std::vector<Notification>& due)
+      COLOR3D_REQUIRES(mutex_);
   void Deliver(const Notification& due);
   std::chrono::milliseconds PauseAfter(int tries) const;
-  void NoteAnswer(const std::string& url, bool answered);
+  void RecordAnswer(const std::string& url, bool answered);
   void RecordOutcome(const Notification& due, const Outcome& outcome);
   // Stores the outcome. Returns false if the store does not accept it.
   bool Write(const Key& key, const Outcome& outcome);
-  void WriteRemembered();
+  void StoreOutcomes();
 
   JobStore& store_;
   const Clock clock_;

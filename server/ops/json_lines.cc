@@ -12,7 +12,7 @@ namespace color3d {
 namespace {
 
 // Removes the tag from the message and adds its fields. Returns false if there is no tag.
-bool TakeTag(std::string_view* message, nlohmann::ordered_json* line) {
+bool ParseTag(std::string_view* message, nlohmann::ordered_json* line) {
   const size_t end = message->find("] ");
   if (!message->starts_with('[') || end == std::string_view::npos) return false;
   std::istringstream words{std::string(message->substr(1, end - 1))};
@@ -38,7 +38,7 @@ class JsonLines : public spdlog::formatter {
         {"time", LogTime(message.time)},
         {"level", std::string(level.data(), level.size())},
         {"from", std::string(message.logger_name.data(), message.logger_name.size())}};
-    TakeTag(&text, &line);
+    ParseTag(&text, &line);
     line["message"] = std::string(text);
     // ASCII only, so that no control character reaches a terminal that shows the log.
     const std::string bytes =

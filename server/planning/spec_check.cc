@@ -26,7 +26,7 @@ constexpr size_t kMaxTextBytes = 4096;
 }
 
 void CheckNumber(const FieldDescriptor* field, double value, const std::string& path) {
-  const std::string why = WhyRefused(field, value);
+  const std::string why = RangeError(field, value);
   if (!why.empty()) Reject(path, why);
 }
 

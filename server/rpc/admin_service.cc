@@ -23,7 +23,7 @@ grpc::ServerUnaryReactor* AnswerAdmin(const RpcParts& parts,
 
 void SetPause(const RpcParts& parts, const Call& call, bool on) {
   parts.store.SetHold(Hold::kPaused, on);
-  spdlog::warn("{} has {} the queue", NameOf(call.caller), on ? "paused" : "resumed");
+  spdlog::warn("{} has {} the queue", CallerName(call.caller), on ? "paused" : "resumed");
 }
 
 void CollectNow(const RpcParts& parts,
@@ -89,7 +89,7 @@ grpc::ServerUnaryReactor* AdminServiceImpl::Drain(grpc::CallbackServerContext* c
                                                   v1::DrainResponse* response) {
   return AnswerAdmin(
       parts_, context, request, response, [this](const Call& call, const auto&, auto*) {
-        spdlog::warn("{} drains the server", NameOf(call.caller));
+        spdlog::warn("{} drains the server", CallerName(call.caller));
         parts_.drain();
       });
 }
@@ -101,7 +101,7 @@ grpc::ServerUnaryReactor* AdminServiceImpl::KillJob(grpc::CallbackServerContext*
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
         JobRecord job = parts_.store.Kill(in.name());
-        spdlog::warn("[job={}] killed by {}", job.name, NameOf(call.caller));
+        spdlog::warn("[job={}] killed by {}", job.name, CallerName(call.caller));
         job.scene = PublicScene(job.scene);
         *out = ToProto(job);
       });

@@ -54,7 +54,7 @@ void ListBackends(const RpcParts& parts, v1::ServerInfo* info) {
 }
 
 // Workers and their jobs of other projects are shown to operators only.
-bool IsOf(const Call& call, const std::string& job) {
+bool IsVisibleTo(const Call& call, const std::string& job) {
   if (call.caller.role == Role::kAdmin || job.empty()) return true;
   try {
     call.store.GetJob(job);
@@ -129,7 +129,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
           v1::WorkerInfo* entry = out->add_workers();
           entry->set_worker_id(worker.worker_id);
           entry->set_pid(worker.pid);
-          if (IsOf(call, worker.job)) entry->set_job(worker.job);
+          if (IsVisibleTo(call, worker.job)) entry->set_job(worker.job);
           entry->set_memory_bytes(worker.memory_bytes);
           entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
         }
@@ -145,7 +145,7 @@ grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerC
         out->set_project(call.caller.project);
         out->set_role(RoleName(call.caller.role));
         *out->mutable_usage() = ToProto(call.store.Usage(), parts_.limits);
-        out->set_waits_for(WhyHeld(parts_));
+        out->set_waits_for(HoldReason(parts_));
       });
 }
 

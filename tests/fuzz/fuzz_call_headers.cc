@@ -16,19 +16,19 @@ constexpr char kAllowed[] = "https://hooks.example.org/color3d";
 bool IsLowHex(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); }
 
 void CheckHeaders(std::string_view text) {
-  const std::string trace = TraceIdOf(text);
+  const std::string trace = ParseTraceId(text);
   const bool is_none = trace.empty();
   if (!is_none && (trace.size() != 32 || !std::ranges::all_of(trace, IsLowHex) ||
                    trace.find_first_not_of('0') == std::string::npos)) {
     std::abort();
   }
-  const std::string id = RequestIdOf(text);
+  const std::string id = ChooseRequestId(text);
   if (id.empty() || id.size() > 64 || !std::ranges::all_of(id, [](unsigned char c) {
         return c < 127 && (std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.');
       })) {
     std::abort();
   }
-  const std::string_view token = TokenOf(text);
+  const std::string_view token = ParseBearerToken(text);
   if (!token.empty() && !text.ends_with(token)) std::abort();
 }
 

@@ -34,7 +34,7 @@ std::vector<std::string> CertificateNames(const grpc::CallbackServerContext& con
 
 }  // namespace
 
-std::string_view TokenOf(std::string_view authorization) {
+std::string_view ParseBearerToken(std::string_view authorization) {
   return authorization.starts_with(kScheme) ? authorization.substr(kScheme.size())
                                             : std::string_view();
 }
@@ -51,7 +51,7 @@ void Access::LogRefusal(const std::string& why, const grpc::CallbackServerContex
 
 Caller Access::Require(Role role, const grpc::CallbackServerContext& context) const {
   if (!tokens_ && !certificates_) return {};
-  const std::string_view token = TokenOf(AuthorizationOf(context));
+  const std::string_view token = ParseBearerToken(AuthorizationOf(context));
   const bool by_token = tokens_ && (!certificates_ || !token.empty());
   const Caller caller = by_token ? ByToken(token, context) : ByCertificate(context);
   if (caller.role < role) {

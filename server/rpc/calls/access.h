@@ -23,12 +23,12 @@ struct Caller {
 };
 
 // Name for logs.
-inline const char* NameOf(const Caller& caller) {
+inline const char* CallerName(const Caller& caller) {
   return caller.name.empty() ? "somebody" : caller.name.c_str();
 }
 
 // Returns the part after "Bearer " of the metadata "authorization"; empty for other schemes.
-std::string_view TokenOf(std::string_view authorization);
+std::string_view ParseBearerToken(std::string_view authorization);
 
 class Access {
  public:

@@ -57,8 +57,8 @@ class CallWatch final : public grpc::experimental::Interceptor {
       return entry == metadata.end() ? std::string()
                                      : std::string(entry->second.data(), entry->second.size());
     };
-    request_id_ = RequestIdOf(find("x-request-id"));
-    trace_ = TraceIdOf(find("traceparent"));
+    request_id_ = ChooseRequestId(find("x-request-id"));
+    trace_ = ParseTraceId(find("traceparent"));
   }
 
   void TakePeer() {
@@ -131,7 +131,7 @@ const char* StatusName(grpc::StatusCode code) {
   return index < std::size(kNames) ? kNames[index] : "UNKNOWN";
 }
 
-std::string TraceIdOf(std::string_view traceparent) {
+std::string ParseTraceId(std::string_view traceparent) {
   // version "-" trace id "-" parent id "-" flags; later versions may append fields.
   if (traceparent.size() < 55 || traceparent[2] != '-' || traceparent[35] != '-' ||
       traceparent[52] != '-') {
@@ -151,7 +151,7 @@ std::string TraceIdOf(std::string_view traceparent) {
   return std::string(trace);
 }
 
-std::string RequestIdOf(std::string_view header) {
+std::string ChooseRequestId(std::string_view header) {
   return IsSaneId(header) ? std::string(header) : NewId();
 }
 

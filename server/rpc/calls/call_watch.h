@@ -21,11 +21,11 @@ const char* StatusName(grpc::StatusCode code);
 
 // Returns the trace id of a W3C "traceparent", 32 hexadecimal digits; empty if it is malformed or
 // all zeros. https://www.w3.org/TR/trace-context/
-std::string TraceIdOf(std::string_view traceparent);
+std::string ParseTraceId(std::string_view traceparent);
 
 // Returns the client's "x-request-id" if it is 1 to 64 letters, digits, '-', '_' or '.', else a new
 // id.
-std::string RequestIdOf(std::string_view header);
+std::string ChooseRequestId(std::string_view header);
 
 // Called at the begin and the end of each call, except those of gRPC's own services. `peer`: as
 // named by gRPC.
@@ -33,7 +33,7 @@ struct PeerObserver {
   std::function<void(const std::string&peer)> on_begin, on_end;
 };
 
-// Trailers of each call carry "x-request-id" (RequestIdOf). Observers may be empty.
+// Trailers of each call carry "x-request-id" (ChooseRequestId). Observers may be empty.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
     CallObserver observer, PeerObserver peers = {});
 

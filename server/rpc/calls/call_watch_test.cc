@@ -9,10 +9,10 @@
 namespace color3d::testing {
 namespace {
 
-TEST(CallWatchTest, TraceIdOfRejectsMalformedTraceParents) {
+TEST(CallWatchTest, ParseTraceIdRejectsMalformedTraceParents) {
   const std::string trace = "4bf92f3577b34da6a3ce929d0e0e4736", rest = "-00f067aa0ba902b7-01";
-  EXPECT_EQ(TraceIdOf("00-" + trace + rest), trace);
-  EXPECT_EQ(TraceIdOf("cc-" + trace + rest + "-later-fields"), trace);
+  EXPECT_EQ(ParseTraceId("00-" + trace + rest), trace);
+  EXPECT_EQ(ParseTraceId("cc-" + trace + rest + "-later-fields"), trace);
   for (const std::string& bad : {std::string(),
                                  "00-" + trace + rest + "-more",
                                  "ff-" + trace + rest,
@@ -22,7 +22,7 @@ TEST(CallWatchTest, TraceIdOfRejectsMalformedTraceParents) {
                                  "00_" + trace + rest,
                                  "00-" + trace,
                                  std::string(55, '-')}) {
-    EXPECT_EQ(TraceIdOf(bad), "") << bad;
+    EXPECT_EQ(ParseTraceId(bad), "") << bad;
   }
 }
 

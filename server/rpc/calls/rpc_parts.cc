@@ -39,7 +39,7 @@ Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& 
           ProjectStore(parts.store, caller.project),
           trace == context.client_metadata().end()
               ? ""
-              : TraceIdOf({trace->second.data(), trace->second.size()})};
+              : ParseTraceId({trace->second.data(), trace->second.size()})};
 }
 
 void RequireNotDraining(const RpcParts& parts) {
@@ -85,7 +85,7 @@ void RequireRoomForRows(const RpcParts& parts, const ProjectStore& store, int64_
   parts.blobs.RequireSpace(more_bytes);
 }
 
-QueueLimits LimitsOfQueue(const RpcParts& parts) {
+QueueLimits GetQueueLimits(const RpcParts& parts) {
   const int of_project = parts.limits.project_max_unfinished_jobs;
   return {parts.limits.max_unfinished_jobs, of_project > 0 ? of_project : INT64_MAX};
 }
@@ -104,7 +104,7 @@ v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limi
   return usage;
 }
 
-std::string WhyHeld(const RpcParts& parts) {
+std::string HoldReason(const RpcParts& parts) {
   const std::set<Hold> holds = parts.store.Holds();
   if (holds.contains(Hold::kPaused)) return "the operator has paused the queue";
   if (holds.contains(Hold::kStorage)) return "the disk is nearly full";

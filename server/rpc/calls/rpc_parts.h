@@ -119,10 +119,10 @@ void RequireQuota(const RpcParts& parts, const ProjectStore& store, int64_t more
 // To be called before rows of `more_bytes` are written. Throws QUOTA_EXCEEDED if they exceed the
 // quota of the project, STORAGE_FULL if the disk is or would be nearly full.
 void RequireRoomForRows(const RpcParts& parts, const ProjectStore& store, int64_t more_bytes);
-QueueLimits LimitsOfQueue(const RpcParts& parts);
+QueueLimits GetQueueLimits(const RpcParts& parts);
 v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limits);
 // Returns why workers get no jobs, for people; empty if they do.
-std::string WhyHeld(const RpcParts& parts);
+std::string HoldReason(const RpcParts& parts);
 
 // Runs `body(call, request, response)` on the executor, in the queue of the caller's project, if
 // the caller has the role. `body` may block and throw.
@@ -180,7 +180,7 @@ std::string DigestOfMessage(const google::protobuf::Message& message);
 
 // Idempotency key of a request: method, request_id, and a digest of all other fields.
 template <typename Request>
-RequestKey KeyOf(const std::string& method, const Request& request) {
+RequestKey IdempotencyKey(const std::string& method, const Request& request) {
   CheckRequestId(request.request_id());
   if (request.request_id().empty()) return {};
   Request body = request;

@@ -22,7 +22,7 @@ namespace color3d {
 namespace {
 
 // Size of the rows of a graph, before it is known which of its blobs the project holds.
-int64_t RowBytesOf(const NewGraph& graph) {
+int64_t EstimateRowBytes(const NewGraph& graph) {
   int64_t bytes = 0;
   for (const NewJob& job : graph.jobs) {
     JobRecord record;
@@ -126,7 +126,7 @@ JobRecord CreateJobRecord(const RpcParts& parts,
                           const Call& call,
                           const v1::CreateJobRequest& request) {
   const ProjectStore& store = call.store;
-  const RequestKey key = KeyOf("CreateJob", request);
+  const RequestKey key = IdempotencyKey("CreateJob", request);
   if (const auto existing = store.FindRequest(key)) return store.GetJob(*existing);
   RequireNotDraining(parts);
   if (!request.has_spec()) throw InvalidArgument("spec is required");
@@ -148,9 +148,9 @@ JobRecord CreateJobRecord(const RpcParts& parts,
   NewGraph graph = PlanRequest(store, spec);
   graph.priority = priority;
   graph.notify_url = request.notify_url();
-  RequireRoomForRows(parts, store, RowBytesOf(graph));
+  RequireRoomForRows(parts, store, EstimateRowBytes(graph));
   graph.trace = call.trace;
-  JobRecord job = store.CreateGraph(graph, key, LimitsOfQueue(parts));
+  JobRecord job = store.CreateGraph(graph, key, GetQueueLimits(parts));
   spdlog::info("[job={}{}{}] accepted {} of {} ({} jobs)",
                job.name,
                call.trace.empty() ? "" : " trace=",
@@ -235,7 +235,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext*
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
         *out = ToProto(WithRoomMade(parts_.make_room, [&] {
-          return call.store.Cancel(in.name(), KeyOf("CancelJob", in));
+          return call.store.Cancel(in.name(), IdempotencyKey("CancelJob", in));
         }));
         spdlog::info("[job={}] cancellation requested", in.name());
       });
@@ -247,10 +247,10 @@ grpc::ServerUnaryReactor* JobServiceImpl::RetryJob(grpc::CallbackServerContext* 
   return AnswerWrite(
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
-        const RequestKey key = KeyOf("RetryJob", in);
+        const RequestKey key = IdempotencyKey("RetryJob", in);
         RequireNotDraining(parts_);
         if (!call.store.FindRequest(key)) RequireRoomForRows(parts_, call.store, 0);
-        *out = ToProto(call.store.Retry(in.name(), in.from_scratch(), key, LimitsOfQueue(parts_)));
+        *out = ToProto(call.store.Retry(in.name(), in.from_scratch(), key, GetQueueLimits(parts_)));
         spdlog::info("[job={}] retried", in.name());
       });
 }
@@ -264,8 +264,9 @@ grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext*
                      response,
                      [this](const Call& call, const auto& in, v1::DeleteJobResponse*) {
                        CheckName(in.name(), "jobs");
-                       WithRoomMade(parts_.make_room,
-                                    [&] { call.store.Delete(in.name(), KeyOf("DeleteJob", in)); });
+                       WithRoomMade(parts_.make_room, [&] {
+                         call.store.Delete(in.name(), IdempotencyKey("DeleteJob", in));
+                       });
                      });
 }
 

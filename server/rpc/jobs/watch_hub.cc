@@ -40,7 +40,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   }
 
   // Called by the poller when these jobs have new events.
-  void Poke(const std::set<int64_t>& changed_jobs) {
+  void OnEvents(const std::set<int64_t>& changed_jobs) {
     {
       const MutexLock lock(mutex_);
       bool mine = false;
@@ -153,7 +153,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
           QueueState(event);
         } else if (const auto job = batch->progressed.find(event.job_id);
                    job != batch->progressed.end()) {
-          TakeProgress(event, job->second);
+          QueueProgress(event, job->second);
         }
       }
       if (batch->events.size() == WatchBatches::kMaxEvents) {
@@ -195,7 +195,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
         Item& item = queue_[i];
         const auto job = item.state ? jobs.find(item.state->job_id) : jobs.end();
         if (job != jobs.end()) {
-          item = {StateEvent(Then(job->second, *item.state), *item.state), std::nullopt};
+          item = {StateEvent(JobAtEvent(job->second, *item.state), *item.state), std::nullopt};
         } else if (item.state && std::ranges::find(wanted, item.state->job_id) !=
                                      wanted.end()) {  // the job was deleted
           queue_.erase(queue_.begin() + static_cast<std::ptrdiff_t>(i));
@@ -212,7 +212,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
   }
 
   // Returns the job at the time of the event, as far as it is known.
-  static JobRecord Then(const JobRecord& job, const EventRecord& event) {
+  static JobRecord JobAtEvent(const JobRecord& job, const EventRecord& event) {
     JobRecord then = job;
     if (then.state != event.state) {  // the job has changed since; later facts are not shown yet
       then.state = event.state;
@@ -224,7 +224,7 @@ class JobWatcher final : public grpc::ServerWriteReactor<v1::JobEvent> {
     return then;
   }
 
-  void TakeProgress(const EventRecord& event, const JobRecord& job) COLOR3D_REQUIRES(mutex_) {
+  void QueueProgress(const EventRecord& event, const JobRecord& job) COLOR3D_REQUIRES(mutex_) {
     v1::JobEvent progress;
     progress.set_revision(event.revision);
     progress.set_kind(v1::JobEvent::KIND_PROGRESS);
@@ -407,7 +407,7 @@ void WatchHub::Poll() {
     for (const auto& [key, watcher] : watchers_) all.push_back(watcher);
   }
   for (const auto& watcher : all) {
-    if (!changed.empty()) watcher->Poke(changed);
+    if (!changed.empty()) watcher->OnEvents(changed);
     watcher->Tick();
   }
 }

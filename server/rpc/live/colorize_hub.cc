@@ -52,7 +52,7 @@ class ColorizeStream final
     while (true) {
       switch (Decide()) {
         case Step::kNothing:
-          return NoteTurn();
+          return UpdateSilence();
         case Step::kRead: {
           StartRead(&incoming_);
           const MutexLock lock(mutex_);
@@ -140,7 +140,7 @@ class ColorizeStream final
   }
 
   // Silence counts only while no picture is pending.
-  void NoteTurn() {
+  void UpdateSilence() {
     const MutexLock lock(mutex_);
     const bool waits = reading_ && !writing_ && !end_ && pictures_.empty() && replies_.empty();
     if (waits == waits_for_client_) return;
@@ -167,7 +167,7 @@ class ColorizeStream final
 
   void Answer(const std::shared_ptr<Picture>& picture, const grpc::Status& answered) {
     v1::ColorizeImagesResponse& response = picture->response;
-    const grpc::Status status = answered.ok() ? TakeAnswer(picture) : answered;
+    const grpc::Status status = answered.ok() ? FillResponse(picture) : answered;
     response.set_request_id(picture->request.request_id().substr(0, 128));
     if (status.ok()) {
       response.clear_error();
@@ -189,7 +189,7 @@ class ColorizeStream final
   }
 
   // An answer that is too large for a message is stored as a blob of the project.
-  grpc::Status TakeAnswer(const std::shared_ptr<Picture>& picture) {
+  grpc::Status FillResponse(const std::shared_ptr<Picture>& picture) {
     v1::ColorizeImagesResponse& response = picture->response;
     internal::v1::ColorizeImageResponse& answer = picture->call->response;
     response.mutable_image()->swap(*answer.mutable_image());

@@ -87,7 +87,7 @@ ColorizerRecord FindColorizer(const ProjectStore& store, const v1::ColorizeImage
 
 // Encoder that the colorizer was trained with. Its file may have changed since: the worker compares
 // digests.
-std::string EncoderOf(const ProjectStore& store, const ColorizerRecord& record) {
+std::string TrainedEncoder(const ProjectStore& store, const ColorizerRecord& record) {
   return ParseSpec(store.GetJob(record.job).spec, record.job).personalize().encoder();
 }
 
@@ -116,7 +116,7 @@ void ResolveColorizeRequest(const RpcParts& parts,
   response->set_colorizer("colorizers/" + record.digest.sha256);
   response->set_scene(record.scene);
   call->set_colorizer_sha256(record.digest.sha256);
-  call->set_encoder(EncoderOf(store, record));
+  call->set_encoder(TrainedEncoder(store, record));
 }
 
 }  // namespace color3d

@@ -32,7 +32,7 @@ std::shared_ptr<grpc::Channel> MakeChannel(const std::string& target) {
 }
 
 // Statuses without details come from the transport, not from the worker.
-grpc::Status Explained(const grpc::Status& status, bool our_limit) {
+grpc::Status ExplainStatus(const grpc::Status& status, bool our_limit) {
   if (status.ok() || !status.error_details().empty()) return status;
   if (status.error_code() == grpc::StatusCode::CANCELLED) return status;
   const bool late = status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED;
@@ -47,7 +47,7 @@ grpc::Status Explained(const grpc::Status& status, bool our_limit) {
 }
 
 // A status without details comes from the transport, after the worker was reached.
-PoisonWatch::End EndOf(const grpc::Status& status) {
+PoisonWatch::End ClassifyEnd(const grpc::Status& status) {
   if (status.ok() || !status.error_details().empty()) return PoisonWatch::End::kAnswered;
   return status.error_code() == grpc::StatusCode::UNAVAILABLE ? PoisonWatch::End::kWorkerDied
                                                               : PoisonWatch::End::kUnknown;
@@ -119,14 +119,14 @@ void InferenceClient::Send(const Order& order) {
                                  OnEnd(order, stub, status);
                                  Pump();
                                  // Must come last: this object may be destroyed afterwards.
-                                 order.done(Explained(status, our_limit));
+                                 order.done(ExplainStatus(status, our_limit));
                                });
 }
 
 void InferenceClient::OnEnd(const Order& order,
                             const std::shared_ptr<Stub>& stub,
                             const grpc::Status& status) {
-  const PoisonWatch::End end = EndOf(status);
+  const PoisonWatch::End end = ClassifyEnd(status);
   const bool died = end == PoisonWatch::End::kWorkerDied;
   const LivePicture picture = died ? DigestOfMessage(order.call->request) : order.picture;
   const MutexLock lock(mutex_);

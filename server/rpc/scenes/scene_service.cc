@@ -29,7 +29,7 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CreateScene(grpc::CallbackServerCont
                                                         v1::Scene* response) {
   return AnswerWrite(
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Scene* out) {
-        const RequestKey key = KeyOf("CreateScene", in);
+        const RequestKey key = IdempotencyKey("CreateScene", in);
         const SceneRecord scene = CheckedScene(in, parts_.limits);
         if (!call.store.FindRequest(key)) RequireRoomForRows(parts_, call.store, RowBytes(scene));
         *out = ToProto(call.store.CreateScene(
@@ -81,7 +81,7 @@ grpc::ServerUnaryReactor* SceneServiceImpl::CommitScene(grpc::CallbackServerCont
       response,
       [this, context](const Call& call, const auto& in, v1::Scene* out) {
         CheckName(in.name(), "scenes");
-        const RequestKey key = KeyOf("CommitScene", in);
+        const RequestKey key = IdempotencyKey("CommitScene", in);
         const SceneRecord scene = call.store.GetScene(in.name());
         if (scene.state == SceneState::kActive) {  // committed before, hence immutable
           *out = ToProto(scene);
@@ -107,7 +107,8 @@ grpc::ServerUnaryReactor* SceneServiceImpl::AcceptKeyColor(grpc::CallbackServerC
           RequireChosenKeyView(call.store.GetJob(in.job()));
         }
         RequireRoomForRows(parts_, call.store, 0);
-        *out = ToProto(call.store.AcceptKeyColor(in.name(), in.job(), KeyOf("AcceptKeyColor", in)));
+        *out = ToProto(
+            call.store.AcceptKeyColor(in.name(), in.job(), IdempotencyKey("AcceptKeyColor", in)));
       });
 }
 
@@ -121,7 +122,7 @@ grpc::ServerUnaryReactor* SceneServiceImpl::DeleteScene(grpc::CallbackServerCont
                      [this](const Call& call, const auto& in, v1::DeleteSceneResponse*) {
                        CheckName(in.name(), "scenes");
                        WithRoomMade(parts_.make_room, [&] {
-                         call.store.DeleteScene(in.name(), KeyOf("DeleteScene", in));
+                         call.store.DeleteScene(in.name(), IdempotencyKey("DeleteScene", in));
                        });
                      });
 }

@@ -80,7 +80,7 @@ bool IsTransforms(const std::string& path) {
 }
 
 // Returns why the file is not a transforms.json; empty if it is.
-std::string WhyNoTransforms(std::string_view bytes, bool needs_frames) {
+std::string TransformsProblem(std::string_view bytes, bool needs_frames) {
   const TransformsOutline outline = OutlineOfTransforms(bytes);
   if (!outline.error.empty()) return "is not JSON: " + outline.error;
   if (!outline.is_object) return "is not a JSON object";
@@ -140,7 +140,7 @@ FileChecks::Problem FileChecks::ProblemOf(const SceneFileRecord& file, Part part
     return {file.path, "cannot be read from the server's disk; upload it again"};
   }
   if (part != Part::kPicture) {
-    return {file.path, WhyNoTransforms(mapped.bytes(), part == Part::kTransformsWithFrames)};
+    return {file.path, TransformsProblem(mapped.bytes(), part == Part::kTransformsWithFrames)};
   }
   try {
     ImageLimits image_limits;
