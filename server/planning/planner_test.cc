@@ -459,7 +459,8 @@ TEST(PlanColorizeScene, TakesAnAcceptedKeyView) {
   EXPECT_EQ(PlanError(spec, inputs).reason, "INPUT_MISSING");
   inputs[2].state = JobState::kSucceeded;
   inputs.erase(inputs.begin() + 1);
-  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("without its own input, the select_key_view"));
+  EXPECT_THAT(PlanError(spec, inputs).message,
+              HasSubstr("without its own input, the select_key_view"));
   EXPECT_THAT(PlanError(spec, {Done("import_scene")}).message, HasSubstr("key_color is required"));
   EXPECT_THAT(PlanError(spec, {Done("personalize")}).message, HasSubstr("personalize"));
 }
