@@ -31,7 +31,7 @@ std::string UnknownCommand(const CLI::App& app, const Context& context) {
   for (const CLI::App* command : app.get_subcommands({})) {
     if (command->get_name() == context.arguments[0]) return "";
   }
-  return "there is no command '" + context.arguments[0] + "'";
+  return "unknown command '" + context.arguments[0] + "'";
 }
 
 // Never on the command line, where others of the machine could read it.
@@ -55,7 +55,7 @@ int Main(int argc, char** argv) {
   CLI::App app("Turns monochrome photos of a scene into a coloured 3D scene.", "color3d");
   app.set_version_flag("--version", COLOR3D_VERSION);
   app.require_subcommand(1);
-  app.set_help_all_flag("--help-all", "Help for all commands");
+  app.set_help_all_flag("--help-all", "Show the help of all commands");
   app.footer(
       "Exit codes: 0 done, 1 the job failed or was cancelled, 2 wrong usage or input, 3 no server, "
       "4 no room, 130 detached.");
@@ -64,14 +64,15 @@ int Main(int argc, char** argv) {
                  "Address of the server: HOST:PORT, unix:PATH, or https://HOST:PORT for TLS")
       ->envname("COLOR3D_SERVER")
       ->capture_default_str();
-  app.add_option("--ca", context.server.ca, "PEM file: whom to believe the server's certificate")
+  app.add_option("--ca", context.server.ca, "PEM file of the certificate authority of the server")
       ->envname("COLOR3D_CA");
-  app.add_option("--client-cert", context.server.certificate, "PEM file: your own certificate")
+  app.add_option("--client-cert", context.server.certificate, "PEM file of the client certificate")
       ->envname("COLOR3D_CLIENT_CERT");
-  app.add_option("--client-key", context.server.key, "PEM file: its key")
+  app.add_option(
+         "--client-key", context.server.key, "PEM file of the key of the client certificate")
       ->envname("COLOR3D_CLIENT_KEY");
   std::filesystem::path token_file;
-  app.add_option("--token-file", token_file, "File that holds your token; or COLOR3D_TOKEN")
+  app.add_option("--token-file", token_file, "File with the token; or set COLOR3D_TOKEN")
       ->envname("COLOR3D_TOKEN_FILE");
   app.add_flag("--json", context.json, "Print one JSON object instead of text");
   AddColorizeCommand(app, context);

@@ -43,7 +43,7 @@ forbid() {
   [ -z "$bad" ] || complain "not allowed here:" "$bad"
 }
 allow core/base 'core/base'
-allow core/catalogue 'core/(base|catalogue)'
+allow core/catalogue 'core/(base|catalogue|image/probe)'
 allow core/simd 'core/(base|simd)'
 allow core/grid 'core/(base|simd|grid)'
 allow core/color 'core/(base|color)'
@@ -60,7 +60,7 @@ allow core/scene/sfm "core/($scene|scene(/(formats|sfm))?)"
 allow core/scene/import "core/($scene|scene(/(masks|formats|sfm|import))?)"
 allow core/encoder 'core/(base|color|image|weights|encoder(/[a-z]+)?)'
 for folder in keyview augment metrics; do
-  allow "core/$folder" "core/(base|color|image|weights|scene|encoder|$folder)"
+  allow "core/$folder" "core/(base|catalogue|color|image|weights|scene|encoder|$folder)"
 done
 allow core/matching 'core/(base|encoder(/[a-z]+)?|matching)'
 allow core/keycolor \
@@ -165,7 +165,7 @@ public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics
 public server/notify notifier webhook
-public server/planning job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
+public server/planning asked_formats job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store job job_store project_store sqlite_job_store store_file user_models

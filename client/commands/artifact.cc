@@ -44,7 +44,7 @@ ExitCode RunDownload(const Context& context, const ArtifactOptions& options) {
   if (!options.name.empty()) artifacts = {FindArtifact(job, options.name)};
   if (artifacts.empty()) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "{} has no artifacts: it is {}; they come when it has succeeded",
+                "{} has no artifacts: it is {}; a job has them once it has succeeded",
                 job.name(),
                 StateName(job.state()));
   }
@@ -66,21 +66,22 @@ ExitCode RunDownload(const Context& context, const ArtifactOptions& options) {
 }  // namespace
 
 void AddArtifactCommands(CLI::App& app, Context& context) {
-  CLI::App* artifact = app.add_subcommand("artifact", "Results of jobs");
+  CLI::App* artifact = app.add_subcommand("artifact", "List and download the results of jobs");
   artifact->require_subcommand(1)->fallthrough();
   const auto options = std::make_shared<ArtifactOptions>();
 
-  CLI::App* list = artifact->add_subcommand("list", "Names and sizes");
+  CLI::App* list = artifact->add_subcommand("list", "List the results of a job with their sizes");
   list->fallthrough()->add_option("JOB", options->job, "jobs/ID")->required();
   list->callback([&context, options] {
     context.action = [&context, options] { return RunList(context, *options); };
   });
 
-  CLI::App* download = artifact->add_subcommand("download", "Fetch one result, or all");
+  CLI::App* download = artifact->add_subcommand("download", "Download one result of a job, or all");
   download->fallthrough();
   download->add_option("JOB", options->job, "jobs/ID")->required();
-  download->add_option(
-      "NAME", options->name, fmt::format("Of the artifact, e.g. {}", artifact::kPly));
+  download->add_option("NAME",
+                       options->name,
+                       fmt::format("Name of the result, e.g. {}; default: all", artifact::kPly));
   download->add_option("-o,--out", options->out, "Folder to write to")->required();
   download->callback([&context, options] {
     context.action = [&context, options] { return RunDownload(context, *options); };

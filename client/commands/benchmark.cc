@@ -43,7 +43,7 @@ std::vector<BenchmarkView> ParseViews(const std::string& scene_json) {
   }
 }
 
-// The first one first.
+// In the order in which they were chosen.
 std::vector<std::string> ParseKeyViews(const std::string& key_view_json) {
   try {
     const auto json = nlohmann::json::parse(key_view_json);
@@ -62,7 +62,7 @@ std::vector<std::string> ParseKeyViews(const std::string& key_view_json) {
 
 struct Selection {
   std::vector<BenchmarkView> views;
-  std::vector<std::string> key_views;  // the first one first
+  std::vector<std::string> key_views;  // in the order in which they were chosen
 
   bool IsKey(const std::string& view) const {
     return std::find(key_views.begin(), key_views.end(), view) != key_views.end();
@@ -78,7 +78,7 @@ Selection SelectKeyView(Connection& connection,
   std::vector<std::string> jobs = {import_job.name()};
   v1::JobSpec spec = SelectSpec(connection, options, scene);
   spec.add_inputs(import_job.name());
-  // Several are chosen by what they see. A time budget would make another geometry.
+  // Several key views are chosen by their geometry, which a time budget would change.
   if (options.keys > 1 && options.time_budget_seconds == 0.0) {
     v1::JobSpec geometry = GeometrySpec(connection, options, scene);
     geometry.add_inputs(import_job.name());
@@ -88,9 +88,10 @@ Selection SelectKeyView(Connection& connection,
   const v1::Job select_job = SubmitJob(connection, spec);
   jobs.push_back(select_job.name());
   if (!Follow(connection, jobs, context, display)) {
-    throw CommandFailure(ExitCode::kDetached,
-                         "interrupted before the benchmark's colouring was submitted; run the same "
-                         "command again (finished stages are not repeated)");
+    throw CommandFailure(
+        ExitCode::kDetached,
+        "interrupted before the colouring was submitted; run the same command again "
+        "(finished stages are not repeated)");
   }
   const v1::Job imported = GetJob(connection, import_job.name());
   RequireSuccess(connection, context, imported);
@@ -100,7 +101,7 @@ Selection SelectKeyView(Connection& connection,
           ParseKeyViews(ReadArtifact(connection, selected, artifact::kKeyView))};
 }
 
-// By name, or by stem where no name fits; none: the server says what is wrong.
+// Returns the view of this name, else of this stem, else null: the server reports the error.
 const BenchmarkView* FindView(const std::vector<BenchmarkView>& views, const std::string& wanted) {
   for (const BenchmarkView& view : views) {
     if (view.name == wanted) return &view;
@@ -111,7 +112,7 @@ const BenchmarkView* FindView(const std::vector<BenchmarkView>& views, const std
   return nullptr;
 }
 
-// What carry_color would say, but not before the geometry has been made.
+// The checks of carry_color, before the time for the geometry is spent.
 void CheckAdditionalKeyViews(const ColorizeOptions& options, const Selection& selection) {
   for (const std::string& text : options.additional_key_views) {
     const AdditionalKeyView key = ParseAdditionalKeyView(text);
@@ -126,15 +127,15 @@ void CheckAdditionalKeyViews(const ColorizeOptions& options, const Selection& se
     }
     if (!key.HasRange() && selection.IsKey(view->name)) {
       throw InvalidArgument(
-          "--add-key-view {}: the view {} is the key view already; name each once",
+          "--add-key-view {}: the view {} is already a key view; name each view once",
           wanted,
           view->name);
     }
   }
 }
 
-// The originals of the key views and of the views that are scored against, as the scene's options.
-// Returns the files to upload.
+// Adds the photos of the key views and of the scored views to the options of the scene. Returns the
+// files to upload.
 std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
                                       const PhotoFolder& folder,
                                       const GrayCopies& copies,
@@ -150,15 +151,13 @@ std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
     const bool is_bound = options.bound && !view.held_out;
     if (original == originals.end() || !(is_key || is_bound || view.held_out)) continue;
     if (!copies.in_color.contains(view.image_file)) {
-      if (view.held_out) continue;  // nothing to score against
+      if (view.held_out) continue;  // without colour it cannot be scored
       if (is_key) {
-        throw InvalidArgument(
-            "the key view {} is monochrome itself; choose one in colour with --key-view",
-            view.name);
+        throw InvalidArgument("the key view {} is monochrome; choose one in colour with --key-view",
+                              view.name);
       }
       throw InvalidArgument(
-          "{} is monochrome itself; --bound needs the true colours of all views: leave it out",
-          view.name);
+          "{} is monochrome; --bound needs the true colours of all views: leave it out", view.name);
     }
     uploads.push_back({original->second->file, DigestFile(original->second->file)});
     const v1::Digest digest = ToProto(uploads.back().digest);

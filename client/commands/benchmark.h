@@ -1,4 +1,4 @@
-// `color3d colorize --benchmark`: what happens before the colorize_scene job.
+// `color3d colorize --benchmark`: the steps before the colorize_scene job.
 #pragma once
 
 #include "client/commands/command.h"
@@ -8,18 +8,17 @@
 
 namespace color3d::client {
 
-// Drops the photos' colour, uploads the grey copies as a scene, selects the key view, and uploads
-// the key view's and the held-out views' true colours. Returns the colorize_scene spec that is left
-// to submit. Throws Error{kInvalidArgument} when the photos are grey or fewer than 3,
-// CommandFailure when a stage fails or the user presses Ctrl-C (what was done is kept by the
-// server).
+// Drops the colour of the photos, uploads the grey copies as a scene, selects the key view, and
+// uploads the true colours of the key view and of the held-out views. Returns the colorize_scene
+// spec to submit. Throws Error{kInvalidArgument} if the photos are grey or fewer than 3, and
+// CommandFailure if a stage fails or the user presses Ctrl-C (the server keeps finished stages).
 v1::JobSpec PrepareBenchmark(Connection& connection,
                              const Context& context,
                              const ColorizeOptions& options,
                              const PhotoFolder& folder,
                              ProgressDisplay& display);
 
-// Fast check without the server, same errors.
+// The same checks without the server, with the same errors.
 void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& cancel);
 
 }  // namespace color3d::client

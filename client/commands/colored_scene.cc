@@ -28,10 +28,10 @@ const v1::Artifact* ModelOf(const v1::Job& job) {
 [[noreturn]] void RefuseFilm(const std::string& results) {
   throw Error(
       ErrorCode::kFailedPrecondition,
-      "{}: a film was coloured without poses, and no camera can move through it. Its "
-      "coloured frames are {} among the results (as pictures: colour it once more, with "
-      "--png; what is done is not done again); for a scene to move through, colour the film "
-      "with --film --poses, where one moving camera took it",
+      "{}: this film was coloured without poses, so no camera can move through it. Its "
+      "coloured frames are {} among the results (for pictures run the command again with --png; "
+      "finished stages are not repeated). For a scene to move through, colour a film of one "
+      "moving camera with --film --poses",
       results,
       artifact::kMovie);
 }
@@ -47,7 +47,7 @@ v1::Job WithModel(v1::Job job) {
   if (ModelOf(job) != nullptr) return job;
   if (job.kind() == kind::kColorizeScene) RefuseFilm(job.name());
   throw Error(ErrorCode::kFailedPrecondition,
-              "{} is a {} job and has no {} to look at; name a {} job",
+              "{} is a {} job and has no {}; name a {} job",
               job.name(),
               job.kind(),
               artifact::kModel,
@@ -90,7 +90,7 @@ v1::Job JobOfModel(Connection& connection, const fs::path& model) {
     request.set_page_token(jobs.next_page_token());
   } while (!request.page_token().empty());
   throw Error(ErrorCode::kFailedPrecondition,
-              "the server at {} has no job that made {}; name the server that did with --server, "
+              "no job of the server at {} made {}; name the server that has it with --server, "
               "or colour the scene again",
               connection.address(),
               model.string());
@@ -128,7 +128,7 @@ v1::Job NewestResult(Connection& connection, const std::string& scene) {
                 unfinished);
   }
   throw Error(ErrorCode::kFailedPrecondition,
-              "{} has not been coloured yet; do that with `color3d colorize {}`",
+              "{} is not coloured yet; run `color3d colorize {}`",
               scene,
               scene);
 }

@@ -1,4 +1,4 @@
-// The finished work that a user names: the folder that it was downloaded to, its job or its scene.
+// Finds the coloured scene that a user names by its folder of results, its job or its scene.
 #pragma once
 
 #include <string>
@@ -8,16 +8,16 @@
 
 namespace color3d::client {
 
-// True for "jobs/..." and "scenes/...", unless a file or folder is called like that.
+// Returns true for "jobs/..." and "scenes/..." unless a file or folder has that name.
 bool IsOnServer(const std::string& target);
 
-// The newest colorize_scene job of the scene that has succeeded. Throws RpcError without such a
-// scene, Error{kFailedPrecondition} that says what to do when it has no such job.
+// Returns the newest colorize_scene job of the scene that has succeeded. Throws RpcError if there
+// is no such scene, and Error{kFailedPrecondition} with the remedy if there is no such job.
 v1::Job NewestResult(Connection& connection, const std::string& scene);
 
-// The job whose model a folder of results ("color3d colorize -o"), jobs/ID or scenes/ID stands for.
-// A folder's is known by the digest of its model. Throws Error: kNotFound without such a folder;
-// kFailedPrecondition when there is no model, or the server knows none like it.
+// Returns the job that made the model of a folder of results ("color3d colorize -o"), jobs/ID or
+// scenes/ID. The job of a folder is found by the digest of its model. Throws Error: kNotFound if
+// there is no such folder, kFailedPrecondition if there is no model or the server does not know it.
 v1::Job FindColoredScene(Connection& connection, const std::string& target);
 
 }  // namespace color3d::client

@@ -42,8 +42,9 @@ class Colorize {
     if (options_.film) TakeAsFrames(&folder_);
     if (options_.poses && !options_.film && !folder_.film && folder_.camera_films.empty()) {
       throw InvalidArgument(
-          "--poses is for films, and {} is none; photos get poses anyway (frames as pictures: add "
-          "--film)",
+          "--poses is for films, and {} is not a film; poses of photos are always found (for "
+          "frames "
+          "as pictures add --film)",
           options_.photos);
     }
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
@@ -58,21 +59,21 @@ class Colorize {
       }
       if (!key.HasRange() && fs::path(key.view).replace_extension() ==
                                  fs::path(options_.key_view).replace_extension()) {
-        throw InvalidArgument("--add-key-view {}: it is the key view already", key.view);
+        throw InvalidArgument("--add-key-view {}: this is already the key view", key.view);
       }
     }
     RequireOutBesidePhotos(out_, folder_);
     RequireAugmentFiles(options_, folder_);
     if (!WantsAugmentFiles(options_) && !folder_.augment_files.empty()) {
       folder_.notes.push_back(
-          fmt::format("the {} pictures in augment/ are not learnt from; to use them, add "
-                      "--augment-files",
+          fmt::format("the {} pictures in augment/ are not used for training; to use them, "
+                      "add --augment-files",
                       folder_.augment_files.size()));
-      // Colours that nobody asked for have no business in a benchmark.
+      // A benchmark uses no colours but the requested ones.
       if (options_.benchmark) folder_.augment_files.clear();
     }
     if (options_.benchmark && folder_.splat) {
-      throw InvalidArgument("--benchmark compares with photos in colour; {} is a splat",
+      throw InvalidArgument("--benchmark needs photos in colour; {} is a splat",
                             folder_.splat->file.string());
     }
     if (options_.benchmark && !folder_.camera_films.empty()) {
@@ -99,7 +100,7 @@ class Colorize {
     connection_ = std::make_unique<Connection>(context_.server, *context_.interrupt);
   }
 
-  // The film's frames in place of the film: as pictures they can lose their colour.
+  // Replaces the film by its frames as pictures, so that their colour can be dropped.
   void TakeFilmForBenchmark() {
     frames_.emplace();
     const v1::ImportSceneSpec import = ImportSpec(options_, "").import_scene();
@@ -115,7 +116,7 @@ class Colorize {
         fmt::format("import_scene.film_frames_per_second={}", film.frames_per_second));
   }
 
-  // A scene of the server's: by the colour given here, else by the accepted one.
+  // A scene on the server: coloured from the given source, else from the accepted key view.
   ExitCode RunStored() {
     Connect();
     const std::string scene = ResourceName(options_.scene, "scenes");
@@ -125,20 +126,20 @@ class Colorize {
   v1::JobSpec AcceptedSpec(const std::string& scene) {
     if (!options_.key_view.empty() || options_.hold_out || options_.deflicker || options_.poses) {
       throw InvalidArgument(
-          "--key-view, --hold-out, --deflicker and --poses were settled when the key view was "
-          "selected (`color3d key select`); leave them out, or select anew with them");
+          "--key-view, --hold-out, --deflicker and --poses were fixed when the key view was "
+          "selected (`color3d key select`); leave them out, or select again with them");
     }
     const KeyState state = ReadKeyState(*connection_, scene);
     if (!state.accepted) {
       throw Error(ErrorCode::kFailedPrecondition,
                   "{} has no accepted key view: give a source of colour (--auto, ...), or select, "
-                  "colour and accept one (`color3d key select`, `key color`, `key accept`)",
+                  "colour and accept a key view (`color3d key select`, `key color`, `key accept`)",
                   scene);
     }
     v1::JobSpec spec = ColorizeSpec(options_, scene);
     spec.mutable_colorize_scene()->clear_select_key_view();
     AddKeyViews(*connection_, options_, spec.mutable_colorize_scene());
-    for (const std::string& input : WithItsInputs(*connection_, *state.accepted)) {
+    for (const std::string& input : JobAndInputs(*connection_, *state.accepted)) {
       spec.add_inputs(input);
     }
     display_.Say(fmt::format("key view {}, as accepted ({})",
@@ -147,21 +148,21 @@ class Colorize {
     return spec;
   }
 
-  // What a selection before has left in the folder of results; may be empty.
+  // The key view of an earlier selection in the folder of results; may be empty.
   std::string SelectedView() const {
     const auto key_view = ReadResult(out_, artifact::kKeyView);
     const auto view = key_view.find("view");
     return view != key_view.end() && view->is_string() ? view->get<std::string>() : "";
   }
 
-  // The view that the user's colour belongs to; empty: the server selects.
+  // The view that the given colour belongs to; empty: the server selects it.
   std::string KeyView() const {
     if (!options_.key_view.empty()) return options_.key_view;
-    // A file that is called like a photo is that photo, whatever was selected before.
+    // A file with the name of a photo is that photo, regardless of an earlier selection.
     const std::string same_stem = PhotoOfSameStem(folder_, options_.color.FileOfView());
     if (!same_stem.empty()) return same_stem;
     const std::string view = SelectedView();
-    // From another scene? Then it says nothing about this one.
+    // The selection may be of another scene.
     const bool known =
         std::any_of(folder_.photos.begin(), folder_.photos.end(), [&](const LocalFile& photo) {
           return Stem(photo.path) == Stem(view);
@@ -180,7 +181,7 @@ class Colorize {
     return spec;
   }
 
-  // Submits, follows and downloads; or returns at once with --detach.
+  // Submits the job, follows it and downloads the results; with --detach submits only.
   ExitCode Finish(const v1::JobSpec& spec) {
     const v1::Job submitted = SubmitJob(*connection_, spec, options_.notify);
     if (options_.detach) return Detached(submitted);
@@ -204,7 +205,7 @@ class Colorize {
     std::vector<std::string> jobs;
     v1::JobSpec spec = SelectSpec(*connection_, options_, scene);
     const v1::JobSpec import = ImportSpec(options_, scene);
-    if (import.import_scene().ByteSizeLong() > 0) {  // else the server's own will do
+    if (import.import_scene().ByteSizeLong() > 0) {  // else the default import
       jobs.push_back(SubmitJob(*connection_, import).name());
       spec.add_inputs(jobs.back());
     }
@@ -222,19 +223,19 @@ class Colorize {
                  {"files", files},
                  {"key_view", view}});
     } else {
-      PrintText(HowToGoOn(view));
+      PrintText(NextCommands(view));
     }
     return ExitCode::kOk;
   }
 
-  std::string HowToGoOn(const std::string& view) const {
+  std::string NextCommands(const std::string& view) const {
     const std::string picture = (out_ / artifact::kKeyViewGray).string();
     const std::string again = "  color3d " + ShellLine(context_.arguments);
     return "The key view is " + view + ", saved as " + picture +
-           ".\nColour it by any means and keep its size, then run\n" + again +
+           ".\nColour it, keep its size, and run\n" + again +
            " --key-color COLOURED.png\nor paint a few colour strokes on a transparent PNG of its "
-           "size (or list points as JSON), then run\n" +
-           again + " --hints STROKES.png\nor leave the colours to the server:\n" + again +
+           "size (or list points as JSON) and run\n" +
+           again + " --hints STROKES.png\nor let the server guess the colours:\n" + again +
            " --auto\n";
   }
 
@@ -253,7 +254,7 @@ class Colorize {
   const fs::path out_;
   ProgressDisplay display_;
   PhotoFolder folder_;
-  std::optional<ScratchFolder> frames_;  // of a film, for the benchmark
+  std::optional<ScratchFolder> frames_;  // of a film, for --benchmark
   std::unique_ptr<Connection> connection_;
 };
 
@@ -263,7 +264,8 @@ void AddColorizeCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<ColorizeOptions>();
   CLI::App* colorize = app.add_subcommand(
       "colorize",
-      "Photos to a coloured 3D scene. Without a source of colour: selects the photo to colour");
+      "Make a coloured 3D scene from photos, or colour a film. Without a source of colour: select "
+      "the photo to colour");
   colorize->fallthrough();
   DeclareOptions(*colorize, options.get());
   colorize->callback([&context, options] {

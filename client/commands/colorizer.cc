@@ -17,7 +17,7 @@ namespace {
 
 struct ColorizerOptions {
   std::string name;   // colorizers/... or scenes/...
-  std::string scene;  // of list
+  std::string scene;  // for list
   int limit = 100;
   std::vector<std::string> photos;
   std::string out = "colored";
@@ -84,16 +84,16 @@ ExitCode Apply(const Context& context, const ColorizerOptions& options) {
   } else {
     source.colorizer = ResourceName(options.name, "colorizers");
   }
-  return Conclude(context,
-                  ColorizeToFiles(connection, source, pictures, options.live, options.out),
-                  options.out);
+  return PrintSummary(context,
+                      ColorizeToFiles(connection, source, pictures, options.live, options.out),
+                      options.out);
 }
 
 }  // namespace
 
 void AddColorizerCommands(CLI::App& app, Context& context) {
-  CLI::App* group =
-      app.add_subcommand("colorizer", "Personalized colorizers")->require_subcommand(1);
+  CLI::App* group = app.add_subcommand("colorizer", "List, show and apply personalized colorizers")
+                        ->require_subcommand(1);
   group->fallthrough();
   const auto options = std::make_shared<ColorizerOptions>();
   const auto command = [&](const char* name,
@@ -105,15 +105,18 @@ void AddColorizerCommands(CLI::App& app, Context& context) {
     });
     return sub;
   };
-  CLI::App* list = command("list", "Newest first", &List);
-  list->add_option("--scene", options->scene, "Only of this scene");
-  list->add_option("--limit", options->limit, "At most so many")
+  CLI::App* list = command("list", "List colorizers, newest first", &List);
+  list->add_option("--scene", options->scene, "Only colorizers of this scene");
+  list->add_option("--limit", options->limit, "Maximum number of entries")
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
-  CLI::App* show = command("show", "Scene, job, size and time", &Show);
+  CLI::App* show = command("show", "Show scene, job, size and time of a colorizer", &Show);
   show->add_option("colorizer", options->name, "colorizers/SHA256")->required();
-  CLI::App* apply = command("apply", "Colour photos live, without a job", &Apply);
-  apply->add_option("colorizer", options->name, "colorizers/SHA256, or scenes/ID: its newest one")
+  CLI::App* apply =
+      command("apply", "Colour photos with a colorizer at once, without a job", &Apply);
+  apply
+      ->add_option(
+          "colorizer", options->name, "colorizers/SHA256, or scenes/ID for its newest colorizer")
       ->required();
   apply->add_option("photos", options->photos, "Photos, or folders of photos")->required();
   apply->add_option("-o,--out", options->out, "Folder for the coloured pictures")
@@ -121,13 +124,14 @@ void AddColorizerCommands(CLI::App& app, Context& context) {
   apply
       ->add_option("--max-side",
                    options->live.max_side_px,
-                   "Longer side of the coloured pictures, px; 0: as the photos")
+                   "Longer side of the coloured pictures, px; 0: that of the photos")
       ->check(CLI::Range(0, 8192))
       ->capture_default_str();
   apply
-      ->add_option("--in-flight",
-                   options->live.in_flight,
-                   "Photos that are sent before the first is back, at most; 0: as the server takes")
+      ->add_option(
+          "--in-flight",
+          options->live.in_flight,
+          "Maximum number of photos sent before the first result; 0: the limit of the server")
       ->check(CLI::Range(0, 1000))
       ->capture_default_str();
 }

@@ -1,4 +1,4 @@
-// What all commands share: global options, the interrupt flag, and how one is run.
+// Shared by all commands: global options, the interrupt flag, the action to run.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -17,12 +17,12 @@ struct Context {
   bool json = false;
   // Set by the first Ctrl-C; the second one ends the program at once.
   const CancellationToken* interrupt = nullptr;
-  std::vector<std::string> arguments;  // as typed, without the program's name
-  // What the command line asks for; set while it is parsed.
+  std::vector<std::string> arguments;  // as typed, without the name of the program
+  // The requested command; set while the command line is parsed.
   std::function<ExitCode()> action;
 };
 
-// Ends the program with this code; what() is the line for the user, empty when all has been said.
+// Ends the program with this exit code. what() is the message for the user; empty: none.
 class CommandFailure : public std::runtime_error {
  public:
   CommandFailure(ExitCode code, const std::string& message)
@@ -33,7 +33,7 @@ class CommandFailure : public std::runtime_error {
   ExitCode code_;
 };
 
-// Each declares its commands in `app`; `context` must outlive it.
+// Each declares its commands in `app`. Requires: `context` outlives `app`.
 void AddColorizeCommand(CLI::App& app, Context& context);
 void AddInspectCommand(CLI::App& app, Context& context);
 void AddSceneCommands(CLI::App& app, Context& context);

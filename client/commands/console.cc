@@ -22,7 +22,8 @@ void PrintError(const Context& context, const std::string& code, const std::stri
   if (context.json) PrintJson({{"error", {{"code", code}, {"message", message}}}});
 }
 
-// A server's message names some of its violations already: list them only when there are more.
+// The message of a server already names the first violations: they are listed only if there are
+// more.
 std::string WithViolations(const RpcError& error) {
   std::string text = error.what();
   const auto& violations = error.violations();
@@ -45,8 +46,8 @@ void PrintText(const std::string& text) {
 }
 
 void PrintJson(const nlohmann::ordered_json& value) {
-  // Names that are not UTF-8 must not stop the answer. For a terminal ASCII alone: it finds no
-  // control character there.
+  // Names that are not UTF-8 must not stop the output. ASCII on a terminal, so that no control
+  // character remains.
   const bool is_terminal = ::isatty(STDOUT_FILENO) == 1;
   std::cout << value.dump(2, ' ', is_terminal, nlohmann::json::error_handler_t::replace)
             << std::endl;
@@ -88,7 +89,7 @@ ExitCode ReportException(const Context& context, const std::exception& exception
     PrintError(context,
                ErrorCodeName(error->code()),
                interrupted ? "interrupted before a job was submitted; run the same command again "
-                             "(what was uploaded is kept)"
+                             "(uploaded files are kept)"
                            : error->what());
     return ExitCodeOf(error->code());
   }

@@ -1,4 +1,4 @@
-// What goes to stdout (results) and to stderr (notes, errors).
+// Output: results on stdout, notes and errors on stderr.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -11,18 +11,18 @@
 
 namespace color3d::client {
 
-// On a terminal nothing but line ends and tabs controls it: names and messages are a server's.
+// Escapes control characters other than line ends and tabs on a terminal, because names and
+// messages come from a server.
 void PrintText(const std::string& text);
 void PrintJson(const nlohmann::ordered_json& value);
-// Protobuf's JSON mapping, with fields that have their default value.
+// In Protobuf's JSON mapping, fields with default values included.
 void PrintJson(const google::protobuf::Message& message);
 nlohmann::ordered_json ToJson(const google::protobuf::Message& message);
 
-// "color3d: note: ..." on stderr; nothing with --json.
+// Prints "color3d: note: ..." on stderr; nothing with --json.
 void PrintNote(const Context& context, const std::string& text);
 
-// Says on stderr what went wrong (with --json also as {"error": ...} on stdout); returns the exit
-// code that fits.
+// Prints the error on stderr and, with --json, as {"error": ...} on stdout. Returns the exit code.
 ExitCode ReportException(const Context& context, const std::exception& exception);
 
 }  // namespace color3d::client

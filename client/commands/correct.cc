@@ -1,4 +1,4 @@
-// `color3d correct`: a coloured scene, mended by strokes on its photos, saturation and white
+// `color3d correct`: corrects a coloured scene by strokes on its photos, saturation and white
 // balance.
 #include <fmt/core.h>
 
@@ -45,13 +45,13 @@ struct CorrectOptions {
   bool ChangesWhole() const { return saturation || tint || warmth; }
 };
 
-// A disc as hints say it.
+// A disc, in the format of hints.
 std::string PointHints(const CorrectOptions& options) {
   double x = 0.0, y = 0.0;
   int end = 0;
   if (std::sscanf(options.at.c_str(), "%lf,%lf%n", &x, &y, &end) != 2 ||
       static_cast<size_t>(end) != options.at.size()) {
-    throw InvalidArgument("--at {} is no place; give X,Y in px of the photo, e.g. --at 320,180",
+    throw InvalidArgument("--at {} is not a place; give X,Y in px of the photo, e.g. --at 320,180",
                           options.at);
   }
   const nlohmann::json hints = {
@@ -63,27 +63,27 @@ void Check(const CorrectOptions& options) {
   options.paint.Check();
   if (!options.at.empty()) {
     if (options.paint.Given()) {
-      throw InvalidArgument("--at and --hints (or --image) do not go together: one at a time");
+      throw InvalidArgument("--at cannot be combined with --hints or --image; give one of them");
     }
     if (options.color.empty()) {
-      throw InvalidArgument("--at needs the colour of that place: --color \"#rrggbb\"");
+      throw InvalidArgument("--at needs the colour of the place: --color \"#rrggbb\"");
     }
     PointHints(options);
   } else if (!options.color.empty()) {
     throw InvalidArgument("--color needs a place: --at X,Y");
   }
   if (options.Paints() && options.view.empty()) {
-    throw InvalidArgument("say which photo was painted on: --view NAME");
+    throw InvalidArgument("--view is missing: the photo that was painted on");
   }
   if (!options.view.empty() && !options.Paints()) {
     throw InvalidArgument(
-        "--view {} needs what was painted on it: --hints FILE, --image FILE, or --at X,Y --color "
+        "--view {} needs a correction: --hints FILE, --image FILE, or --at X,Y --color "
         "\"#rrggbb\"",
         options.view);
   }
 }
 
-// Takes away the last corrections. Throws when there are not so many.
+// Removes the last corrections. Throws Error{kInvalidArgument} if there are fewer.
 void Undo(const std::string& how_many, v1::CorrectColorsSpec* correct) {
   const int count = correct->corrections_size();
   int drop = 0, end = 0;
@@ -91,7 +91,8 @@ void Undo(const std::string& how_many, v1::CorrectColorsSpec* correct) {
     drop = count;
   } else if (std::sscanf(how_many.c_str(), "%d%n", &drop, &end) != 1 || drop < 1 ||
              static_cast<size_t>(end) != how_many.size()) {
-    throw InvalidArgument("--undo {} is no number of corrections; give one, or all", how_many);
+    throw InvalidArgument("--undo {} is not a number of corrections; give a number, or all",
+                          how_many);
   }
   if (count == 0 || drop > count) {
     throw Error(ErrorCode::kFailedPrecondition,
@@ -102,7 +103,7 @@ void Undo(const std::string& how_many, v1::CorrectColorsSpec* correct) {
   for (int i = 0; i < drop; ++i) correct->mutable_corrections()->RemoveLast();
 }
 
-// A place is sent as the file of hints that it stands for, which stays among the results.
+// Writes the place as a file of hints, which stays among the results.
 v1::KeyColorSource Upload(Connection& connection, const CorrectOptions& options) {
   if (options.at.empty()) return UploadKeyColor(connection, options.paint);
   const fs::path file = fs::path(options.out) / "point.json";
@@ -124,7 +125,7 @@ v1::JobSpec SpecOf(Connection& connection, const CorrectOptions& options, const 
     *correction->mutable_color() = Upload(connection, options);
   }
   if (options.proposals) correct->set_proposals(*options.proposals);
-  // Whoever only changes the whole scene needs no stage for single places.
+  // Changes of the whole scene need no stage for places.
   if (correct->corrections().empty() && !options.proposals &&
       (options.ChangesWhole() || !options.undo.empty())) {
     scene->clear_correct_colors();
@@ -136,8 +137,8 @@ v1::JobSpec SpecOf(Connection& connection, const CorrectOptions& options, const 
   return spec;
 }
 
-// Pictures to paint on are those of this job: the ones before go, and what the user has painted
-// over is kept under another name.
+// Replaces the pictures to paint on by those of this job. Pictures that the user has painted on are
+// kept under another name.
 void ClearPaintFolder(const Context& context, const fs::path& out, const v1::Job& before) {
   const fs::path folder = out / artifact::kPaint;
   std::error_code none;
@@ -166,7 +167,7 @@ void ClearPaintFolder(const Context& context, const fs::path& out, const v1::Job
       kept.replace_extension(fmt::format(".{}.painted{}", number, file.extension().string()));
     }
     fs::rename(file, kept);
-    PrintNote(context, "what you painted is kept as " + kept.string());
+    PrintNote(context, "the painted picture is kept as " + kept.string());
   }
 }
 
@@ -183,7 +184,7 @@ void FetchScene(Connection& connection,
   }
   const auto fetched = DownloadArtifacts(connection, files, out, display);
   if (std::find(fetched.begin(), fetched.end(), artifact::kViewPage) == fetched.end()) return;
-  display.Say((out / artifact::kViewPage).string() + " shows it already; figures follow");
+  display.Say((out / artifact::kViewPage).string() + " shows the corrected scene; metrics follow");
 }
 
 std::string ProposalText(const Context& context,
@@ -192,7 +193,7 @@ std::string ProposalText(const Context& context,
                          const nlohmann::ordered_json& facts) {
   const auto proposals = facts.value("proposals", nlohmann::ordered_json::array());
   if (proposals.empty()) return "";
-  std::string text = "Where a stroke would tell most now:\n";
+  std::string text = "Places where a stroke would correct most:\n";
   for (const auto& place : proposals) {
     const std::string view = place.at("view");
     const fs::path picture =
@@ -226,7 +227,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
   Check(options);
   const bool folder = !IsOnServer(options.target);
   if (options.out.empty()) options.out = folder ? options.target : "corrected";
-  // Without anything to do: where would it be worth it?
+  // Without a correction: proposals only.
   if (!options.Paints() && !options.ChangesWhole() && options.undo.empty() && !options.proposals) {
     options.proposals = 3;
   }
@@ -234,7 +235,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
   const v1::Job before = FindColoredScene(connection, options.target);
   if (before.kind() != kind::kColorizeScene) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "{} is a {} job; corrections are for {} jobs",
+                "{} is a {} job; only {} jobs can be corrected",
                 before.name(),
                 before.kind(),
                 kind::kColorizeScene);
@@ -242,7 +243,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
   PrepareOut(options.out);
   const v1::Job submitted = SubmitJob(connection, SpecOf(connection, options, before));
   ProgressDisplay display(context.json);
-  // The scene as it is now is there to be looked at before it is scored and reported.
+  // The corrected scene can be viewed before it is scored and reported.
   const auto fetch_scene = [&](const v1::Job& stage) {
     if (stage.kind() == kind::kExport) FetchScene(connection, stage, options.out, display);
   };
@@ -267,7 +268,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
   }
   std::string text = Summary(options.out);
   if (corrections > 0) {
-    text += fmt::format("{} correction{}; `{}` takes the last one back\n",
+    text += fmt::format("{} correction{}; `{}` removes the last one\n",
                         corrections,
                         corrections == 1 ? "" : "s",
                         CommandLine(context, {"correct", options.target, "--undo", "1"}));
@@ -286,51 +287,51 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
                    "Folder of results that `color3d colorize` wrote, or jobs/ID or scenes/ID")
       ->required();
   command->add_option(
-      "-o,--out", options->out, "Folder for the results; default: RESULTS when that is a folder");
-  const char* place = "One place: what is painted spreads to what is alike and near, in all views";
+      "-o,--out", options->out, "Folder for the results; default: RESULTS if that is a folder");
+  const char* place = "One place: the colour spreads to similar surfaces nearby, in all views";
   command->add_option("--view", options->view, "The photo that was painted on")->group(place);
   command
       ->add_option("--hints,--strokes,--points",
                    options->paint.hints,
-                   "Colour strokes (PNG of the photo's shape, transparent elsewhere), or points, "
+                   "Colour strokes (PNG of the photo's size, transparent elsewhere), or points, "
                    "lines and regions (JSON)")
       ->group(place);
   command
       ->add_option("--labels",
                    options->paint.labels,
-                   "Grey PNG whose values the \"label\" entries of points name")
+                   "Grey PNG with the labels of the \"label\" entries of points")
       ->group(place);
   command
       ->add_option("--image",
                    options->paint.image,
-                   "The photo in the colours that it should have, e.g. RESULTS/paint/NAME.png "
-                   "painted over; counts where it was changed")
+                   "The photo in its right colours, e.g. RESULTS/paint/NAME.png after painting on "
+                   "it; only changed pixels count")
       ->group(place);
-  command->add_option("--at", options->at, "X,Y: one place, px of the photo")->group(place);
-  command->add_option("--color", options->color, "\"#rrggbb\" of the place --at")->group(place);
-  command->add_option("--radius", options->radius, "Of the place --at, px")
+  command->add_option("--at", options->at, "X,Y: the place, px of the photo")->group(place);
+  command->add_option("--color", options->color, "\"#rrggbb\": the colour at --at")->group(place);
+  command->add_option("--radius", options->radius, "Radius of the place at --at, px")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->group(place);
   const char* whole = "The whole scene";
   command
-      ->add_option("--saturation", options->saturation, "Factor on all colours, 0..4; 1: as solved")
+      ->add_option(
+          "--saturation", options->saturation, "Factor on all colours, 0 to 4; 1: unchanged")
       ->group(whole);
   command
       ->add_option("--warmth",
                    options->warmth,
-                   "White balance: b (blue to yellow) of what was a middle grey, -50..50")
+                   "White balance, blue to yellow: b of a middle grey, -50 to 50")
       ->group(whole);
   command
-      ->add_option("--tint",
-                   options->tint,
-                   "White balance: a (green to red) of what was a middle grey, -50..50")
+      ->add_option(
+          "--tint", options->tint, "White balance, green to red: a of a middle grey, -50 to 50")
       ->group(whole);
   command->add_option(
-      "--undo", options->undo, "Take back so many corrections of places, the last first, or all");
+      "--undo", options->undo, "Remove this many corrections of places, the last first, or all");
   command->add_option("--proposals",
                       options->proposals,
-                      "How many places to name where a stroke would tell most (alone: 3)");
+                      "Number of places to propose for a stroke (default without a correction: 3)");
 }
 
 }  // namespace
@@ -338,7 +339,7 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
 void AddCorrectCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<CorrectOptions>();
   CLI::App* command =
-      app.add_subcommand("correct", "Mend colours of a coloured scene; its geometry stays")
+      app.add_subcommand("correct", "Correct the colours of a coloured scene; its geometry is kept")
           ->fallthrough();
   DeclareOptions(command, options.get());
   command->callback([&context, options] {

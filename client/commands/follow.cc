@@ -54,7 +54,7 @@ bool Follow(Connection& connection,
             const Context& context,
             ProgressDisplay& display,
             const StageDone& on_stage_done) {
-  // A job that has failed may have stages that go on: their results are kept, but not waited for.
+  // Stages of a failed job may still run. Their results are kept, but not waited for.
   std::set<std::string> unfinished(jobs.begin(), jobs.end()), done;
   const auto keep_going = [&] {
     display.OnTick([&] { return GetJob(connection, jobs.back()); });
@@ -77,7 +77,7 @@ bool Follow(Connection& connection,
     display.Clear();
     throw CommandFailure(
         ExitCode::kUnreachable,
-        fmt::format("lost the server at {}; what it had accepted goes on when it is back: {}",
+        fmt::format("lost the server at {}; accepted jobs continue when it is back: {}",
                     connection.address(),
                     ReattachHint(context, jobs.back(), "")));
   }
@@ -87,11 +87,11 @@ void RequireSuccess(Connection& connection, const Context& context, const v1::Jo
   if (job.state() == v1::Job::STATE_SUCCEEDED) return;
   if (job.state() == v1::Job::STATE_CANCELLED) {
     throw CommandFailure(ExitCode::kJobFailed,
-                         fmt::format("{} was cancelled; `{}` goes on",
+                         fmt::format("{} was cancelled; `{}` continues it",
                                      job.name(),
                                      CommandLine(context, {"job", "retry", job.name()})));
   }
-  // The stage that is to blame: the first failed child, or the job itself.
+  // The failed stage: the first failed child, or the job itself.
   v1::Job blamed = job;
   for (const v1::Job& child : ListChildren(connection, job.name())) {
     if (child.state() != v1::Job::STATE_FAILED) continue;
@@ -106,7 +106,7 @@ void RequireSuccess(Connection& connection, const Context& context, const v1::Jo
       "the stage " + StageName(blamed) + " failed (" + blamed.name() + "): " + reason;
   if (code == ExitCode::kJobFailed) {
     message += "; `" + CommandLine(context, {"job", "retry", job.name()}) +
-               "` goes on from its last checkpoint";
+               "` continues from its last checkpoint";
   }
   throw CommandFailure(code == ExitCode::kOk ? ExitCode::kJobFailed : code, message);
 }
@@ -121,7 +121,7 @@ v1::Job FollowToSuccess(Connection& connection,
     throw CommandFailure(
         ExitCode::kDetached,
         fmt::format(
-            "detached; {} goes on; {}", jobs.back(), ReattachHint(context, jobs.back(), out)));
+            "detached; {} continues; {}", jobs.back(), ReattachHint(context, jobs.back(), out)));
   }
   v1::Job job;
   for (const std::string& name : jobs) {

@@ -1,4 +1,4 @@
-// Submitting jobs and following them to their end, with what the user is told on the way.
+// Submits jobs and follows them to their end, with progress for the user.
 #pragma once
 
 #include <functional>
@@ -12,14 +12,15 @@
 
 namespace color3d::client {
 
-// `notify_url`: told when it has ended; empty: nobody.
+// `notify_url`: address that receives a notification at the end; empty: none.
 v1::Job SubmitJob(Connection& connection,
                   const v1::JobSpec& spec,
                   const std::string& notify_url = "");
 
-// True when all of them have ended (stages that go on after a failure are not waited for); false
-// when the user pressed Ctrl-C. Throws CommandFailure{kUnreachable} that says how to attach again
-// when the server stays away. `on_stage_done` gets every stage that has succeeded, as it happens.
+// Returns true when all of them have ended (after a failure, stages that still run are not waited
+// for), false when the user pressed Ctrl-C. Throws CommandFailure{kUnreachable} with the command to
+// attach again if the server does not come back. `on_stage_done` is called for each stage that
+// succeeds.
 using StageDone = std::function<void(const v1::Job& stage)>;
 bool Follow(Connection& connection,
             const std::vector<std::string>& jobs,
@@ -27,15 +28,15 @@ bool Follow(Connection& connection,
             ProgressDisplay& display,
             const StageDone& on_stage_done = {});
 
-// "the job goes on; attach again with ..., then fetch ...". `out` may be empty.
+// The commands to attach again and to download the results. `out` may be empty.
 std::string ReattachHint(const Context& context, const std::string& job, const std::string& out);
 
-// Throws CommandFailure that names the stage and why, unless the job has succeeded.
+// Throws CommandFailure with the failed stage and the reason unless the job has succeeded.
 void RequireSuccess(Connection& connection, const Context& context, const v1::Job& job);
 
-// Follows `jobs` to their end, requires all to succeed, prints their warnings (and their stages')
-// and returns the last, fresh. Throws CommandFailure; one of kDetached after Ctrl-C says how to
-// attach again. `out` is the folder for the results; may be empty.
+// Follows `jobs` to their end, prints their warnings and those of their stages, and returns the
+// last job in its final state. Throws CommandFailure if one has not succeeded; after Ctrl-C
+// kDetached with the command to attach again. `out`: folder for the results; may be empty.
 v1::Job FollowToSuccess(Connection& connection,
                         const Context& context,
                         const std::vector<std::string>& jobs,
@@ -43,7 +44,7 @@ v1::Job FollowToSuccess(Connection& connection,
                         ProgressDisplay& display,
                         const StageDone& on_stage_done = {});
 
-// "color3d ARGUMENTS", with --server when it was given.
+// "color3d ARGUMENTS", with --server if it was given.
 std::string CommandLine(const Context& context, std::vector<std::string> arguments);
 
 }  // namespace color3d::client

@@ -12,17 +12,17 @@ namespace {
 
 constexpr int kMaxPhotos = 24;
 constexpr char kUnsure[] =
-    "; unsure: they may be prints with stains or tints, or photos most of which has one hue";
+    "; unsure: prints with stains or tints look the same as photos of mostly one hue";
 
 ExitCode RunInspect(const Context& context, const std::string& photos) {
   const PhotoFolder folder = CollectPhotos(photos);
   if (folder.splat) {
-    throw InvalidArgument("{} is a splat; inspect looks at photos", folder.splat->file.string());
+    throw InvalidArgument("{} is a splat; inspect needs photos", folder.splat->file.string());
   }
   if (folder.film || !folder.camera_films.empty()) {
     const LocalFile& film = folder.film ? *folder.film : folder.camera_films.front();
     throw InvalidArgument(
-        "{} is a film; inspect looks at pictures: give some of its frames as pictures in a folder",
+        "{} is a film; inspect needs pictures: give some of its frames as pictures in a folder",
         film.file.string());
   }
   for (const std::string& note : folder.notes) PrintNote(context, note);
@@ -37,7 +37,7 @@ ExitCode RunInspect(const Context& context, const std::string& photos) {
                {"unsure", count.unsure},
                {"sure", count.IsSure()}});
   } else {
-    PrintText(fmt::format("{}: {} of {} photos looked at are in colour ({} photos){}\n",
+    PrintText(fmt::format("{}: {} of {} inspected photos are in colour ({} photos){}\n",
                           kind,
                           count.in_color,
                           count.looked_at,
@@ -51,7 +51,8 @@ ExitCode RunInspect(const Context& context, const std::string& photos) {
 
 void AddInspectCommand(CLI::App& app, Context& context) {
   auto photos = std::make_shared<std::string>();
-  CLI::App* inspect = app.add_subcommand("inspect", "Are these photos in colour or monochrome?");
+  CLI::App* inspect =
+      app.add_subcommand("inspect", "Tell whether photos are in colour or monochrome");
   inspect->fallthrough();
   inspect->add_option("PHOTOS", *photos, "Folder of photos")->required();
   inspect->callback([&context, photos] {

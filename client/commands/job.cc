@@ -56,10 +56,10 @@ ExitCode RunSubmit(const Context& context, const std::string& file, const std::s
 }
 
 struct AllInOneArguments {
-  std::vector<std::string> scenes;  // scenes/ID, or scenes/ID=jobs/ID with the key view's job
+  std::vector<std::string> scenes;  // scenes/ID, or scenes/ID=jobs/ID with the job of the key view
   std::optional<int> iterations;
   bool again = false;
-  std::string notify;  // empty: nobody is told
+  std::string notify;  // empty: no notification
 };
 
 ExitCode RunAllInOne(const Context& context, const AllInOneArguments& arguments) {
@@ -120,9 +120,9 @@ ExitCode RunShow(const Context& context, const std::string& name) {
       job.max_attempts(),
       job.artifacts_size());
   if (!job.parent().empty()) text += "parent     " + job.parent() + "\n";
-  if (job.pinned()) text += "pinned     stays however old it is\n";
+  if (job.pinned()) text += "pinned     never deleted by age\n";
   if (job.queue_position() > 0) {
-    text += fmt::format("queue      place {}{}\n",
+    text += fmt::format("queue      position {}{}\n",
                         job.queue_position(),
                         job.waits_for().empty() ? "" : ", waits for " + job.waits_for());
   }
@@ -150,7 +150,7 @@ ExitCode RunWatch(const Context& context, const std::string& text) {
   if (!Follow(connection, {name}, context, display)) {
     throw CommandFailure(
         ExitCode::kDetached,
-        fmt::format("detached; {} goes on; {}", name, ReattachHint(context, name, "")));
+        fmt::format("detached; {} continues; {}", name, ReattachHint(context, name, "")));
   }
   const v1::Job job = GetJob(connection, name);
   RequireSuccess(connection, context, job);
@@ -209,21 +209,21 @@ ExitCode RunKill(const Context& context, const std::string& name) {
   return ExitCode::kOk;
 }
 
-// Goes on from where it was when the connection breaks.
+// Continues at the same position after a lost connection.
 ExitCode RunLog(const Context& context, const std::string& name, bool follow) {
   Connection connection(context.server, *context.interrupt);
   v1::ReadJobLogRequest request;
   request.set_name(ResourceName(name, "jobs"));
   request.set_follow(follow);
   Backoff backoff;
-  std::string rest;  // of a line that is not whole yet
+  std::string rest;  // start of an incomplete line
   while (true) {
     grpc::ClientContext call;
     const auto stream = connection.jobs().ReadJobLog(&call, request);
     v1::JobLogChunk chunk;
     while (stream->Read(&chunk)) {
       rest += chunk.data();
-      const size_t whole = rest.rfind('\n') + 1;  // 0: no line is
+      const size_t whole = rest.rfind('\n') + 1;  // 0: no complete line
       PrintText(rest.substr(0, whole));
       rest.erase(0, whole);
       request.set_offset(chunk.offset() + static_cast<int64_t>(chunk.data().size()));
@@ -238,7 +238,7 @@ ExitCode RunLog(const Context& context, const std::string& name, bool follow) {
   }
 }
 
-// A subcommand of `job` that takes one job's name.
+// Adds a subcommand of `job` that takes the name of a job.
 CLI::App* AddNamed(CLI::App* job,
                    Context& context,
                    const std::string& command,
@@ -256,7 +256,7 @@ CLI::App* AddNamed(CLI::App* job,
 }  // namespace
 
 void AddJobCommands(CLI::App& app, Context& context) {
-  CLI::App* job = app.add_subcommand("job", "Jobs: the stages of the method");
+  CLI::App* job = app.add_subcommand("job", "Submit, list, follow and manage jobs");
   job->require_subcommand(1)->fallthrough();
   const auto file = std::make_shared<std::string>();
   const auto parent = std::make_shared<std::string>();
@@ -266,21 +266,26 @@ void AddJobCommands(CLI::App& app, Context& context) {
   CLI::App* submit = job->add_subcommand("submit", "Submit a job");
   submit->fallthrough();
   auto* spec_option =
-      submit->add_option("SPEC", *file, "JobSpec as JSON (protobuf mapping); - reads stdin");
+      submit->add_option("SPEC", *file, "JobSpec as JSON (protobuf mapping); -: standard input");
   const auto all_in_one = std::make_shared<AllInOneArguments>();
   auto* scenes_option =
       submit
-          ->add_option("--all-in-one",
-                       all_in_one->scenes,
-                       "Personalize these scenes together: scenes/ID each, or scenes/ID=jobs/ID "
-                       "with the job that coloured its key view (default: the accepted one)")
+          ->add_option(
+              "--all-in-one",
+              all_in_one->scenes,
+              "Personalize these scenes together: scenes/ID, or scenes/ID=jobs/ID with the "
+              "job that coloured its key view (default: the accepted one)")
           ->expected(1, 10'000)
           ->excludes(spec_option);
-  submit->add_option("--iterations", all_in_one->iterations, "With --all-in-one: for each scene")
+  submit
+      ->add_option(
+          "--iterations", all_in_one->iterations, "With --all-in-one: iterations for each scene")
       ->needs(scenes_option);
-  submit->add_flag("--again", all_in_one->again, "With --all-in-one: not from the stage cache")
+  submit->add_flag("--again", all_in_one->again, "With --all-in-one: ignore the stage cache")
       ->needs(scenes_option);
-  submit->add_option("--notify", all_in_one->notify, "Address that is told when it has ended");
+  submit->add_option("--notify",
+                     all_in_one->notify,
+                     "Address that receives a notification when the job has ended");
   submit->callback([&context, file, all_in_one] {
     if (file->empty() && all_in_one->scenes.empty()) {
       throw CLI::RequiredError("SPEC or --all-in-one");
@@ -291,43 +296,45 @@ void AddJobCommands(CLI::App& app, Context& context) {
     };
   });
 
-  CLI::App* list = job->add_subcommand("list", "Newest first");
+  CLI::App* list = job->add_subcommand("list", "List jobs, newest first");
   list->fallthrough();
-  list->add_option("PARENT", *parent, "Only those of jobs/ID or scenes/ID");
-  list->add_option("--limit", *limit, "At most this many")
+  list->add_option("PARENT", *parent, "Only the stages of jobs/ID, or the jobs of scenes/ID");
+  list->add_option("--limit", *limit, "Maximum number of entries")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   list->callback([&context, parent, limit] {
     context.action = [&context, parent, limit] { return RunList(context, *parent, *limit); };
   });
 
-  AddNamed(job, context, "show", "One job with its stages", RunShow);
+  AddNamed(job, context, "show", "Show a job with its stages", RunShow);
   AddNamed(job, context, "watch", "Follow a job to its end", RunWatch);
   AddNamed(job, context, "cancel", "Cancel a job and its stages", RunCancel);
   AddNamed(job, context, "delete", "Delete a finished job", RunDelete);
   AddNamed(
-      job, context, "pin", "Keep a job however old it is", [](const auto& c, const auto& name) {
+      job, context, "pin", "Keep a job regardless of its age", [](const auto& c, const auto& name) {
         return RunPin(c, name, true);
       });
-  AddNamed(job, context, "unpin", "Let it go when it is old", [](const auto& c, const auto& name) {
-    return RunPin(c, name, false);
-  });
-  AddNamed(job, context, "kill", "End a job of any project at once (role admin)", RunKill);
+  AddNamed(job,
+           context,
+           "unpin",
+           "Let a job be deleted by age again",
+           [](const auto& c, const auto& name) { return RunPin(c, name, false); });
+  AddNamed(job, context, "kill", "Kill a job of any project at once (role admin)", RunKill);
   const auto follow = std::make_shared<bool>(false);
   AddNamed(job,
            context,
            "log",
-           "What its attempts wrote to the log; of a stage, which `job show` names",
+           "Print the log of a stage (`job show` lists the stages of a job)",
            [follow](const Context& c, const std::string& name) { return RunLog(c, name, *follow); })
-      ->add_flag("-f,--follow", *follow, "Go on until it has ended");
+      ->add_flag("-f,--follow", *follow, "Follow the log until the job has ended");
   AddNamed(job,
            context,
            "retry",
-           "Go on with a failed or cancelled job from its last checkpoint",
+           "Continue a failed or cancelled job from its last checkpoint",
            [from_scratch](const Context& c, const std::string& name) {
              return RunRetry(c, name, *from_scratch);
            })
-      ->add_flag("--from-scratch", *from_scratch, "Forget the checkpoint");
+      ->add_flag("--from-scratch", *from_scratch, "Start again without the checkpoint");
 }
 
 }  // namespace color3d::client

@@ -1,4 +1,4 @@
-// `color3d key`: choose, colour, look at and accept the key view before the long job starts.
+// `color3d key`: selects, colours and accepts the key view before the long job starts.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -30,12 +30,12 @@ struct KeyOptions {
   std::string out = "key_view";
   std::string view;
   std::string strategy;
-  std::string encoder;   // weights by name in the server's configuration
-  std::string features;  // CLIP weights, likewise
+  std::string encoder;   // name of weights in the configuration of the server
+  std::string features;  // name of CLIP weights
   std::string job;
-  int count = 1;           // key views that are chosen together
-  bool film = false;       // the target is a folder of a film's frames
-  ColorizeOptions import;  // what its import is asked for, and no more
+  int count = 1;           // number of key views chosen together
+  bool film = false;       // the target is a folder of frames of a film
+  ColorizeOptions import;  // options of the import only
   KeyColorFlags color;
 };
 
@@ -61,16 +61,16 @@ class Key {
     spec.set_scene(scene);
     return spec;
   }
-  bool AsksForImport() const {
+  bool HasImportOptions() const {
     return ImportSpec(options_.import, "").import_scene().ByteSizeLong() > 0;
   }
-  // Submits the selection that the options ask for, with the import that it needs.
+  // Submits the selection, with the import if options for it are given.
   v1::Job SubmitSelection(const std::string& scene);
   v1::Job Follow(const std::vector<std::string>& jobs) {
     return FollowToSuccess(connection_, context_, jobs, options_.out, display_);
   }
-  // A submitted job at its end, what it chose, and the files that it left in options_.out. What an
-  // import that was asked for has to say belongs to its selection.
+  // Follows a submitted job to its end; downloads its files to options_.out. Warnings of the import
+  // are printed with those of its selection.
   struct Fetched {
     v1::Job job;
     KeyViewChoice choice;
@@ -78,7 +78,7 @@ class Key {
   };
   Fetched Fetch(const v1::Job& submitted) {
     std::vector<std::string> jobs = {submitted.name()};
-    if (AsksForImport()) {  // which was submitted with it
+    if (HasImportOptions()) {  // submitted with the selection
       jobs.insert(jobs.begin(), submitted.spec().inputs().begin(), submitted.spec().inputs().end());
     }
     const v1::Job job = Follow(jobs);
@@ -86,13 +86,13 @@ class Key {
             ReadChoice(connection_, job),
             DownloadResults(connection_, context_, job, options_.out, display_)};
   }
-  // The selection that a new colour goes with: the one asked for, else the newest.
+  // The selection for a new colour: the requested one, else the newest.
   std::vector<std::string> SelectionFor(const std::string& scene);
   std::string Command(std::vector<std::string> arguments) const {
     return "  " + CommandLine(context_, std::move(arguments)) + "\n";
   }
-  // What can be done with the chosen view.
-  std::string HowToColor(const std::string& scene) const;
+  // The next commands for the chosen view.
+  std::string NextCommands(const std::string& scene) const;
 
   const Context& context_;
   const KeyOptions& options_;
@@ -116,13 +116,13 @@ v1::Job Key::SubmitSelection(const std::string& scene) {
   if (options_.count > 1) select->set_count(options_.count);
   select->set_encoder(options_.encoder);
   select->set_features(options_.features);
-  if (AsksForImport()) {  // else the server's own will do
+  if (HasImportOptions()) {  // else the default import
     spec.add_inputs(SubmitJob(connection_, ImportSpec(options_.import, scene)).name());
   }
   return SubmitJob(connection_, spec);
 }
 
-std::string Key::HowToColor(const std::string& scene) const {
+std::string Key::NextCommands(const std::string& scene) const {
   std::vector<std::string> again = {"key", "select", scene, "--view", "NAME"};
   if (options_.import.hold_out) again.emplace_back("--hold-out");
   if (options_.import.deflicker) again.emplace_back("--deflicker");
@@ -130,9 +130,9 @@ std::string Key::HowToColor(const std::string& scene) const {
   for (const std::string& setting : options_.import.settings) {
     again.insert(again.end(), {"--set", setting});
   }
-  return "Colour it, for instance\n" + Command({"key", "color", scene, "--auto"}) +
+  return "Colour it, for example\n" + Command({"key", "color", scene, "--auto"}) +
          Command({"key", "color", scene, "--image", "COLOURED.png"}) +
-         Command({"key", "color", scene, "--hints", "STROKES.png"}) + "or take another view\n" +
+         Command({"key", "color", scene, "--hints", "STROKES.png"}) + "or choose another view\n" +
          Command(again);
 }
 
@@ -158,7 +158,7 @@ ExitCode Key::Select() {
     for (size_t i = 1; i < choice.views.size(); ++i) {
       command.insert(command.end(), {"--add-key-view", choice.views[i] + "=COLOURED.png"});
     }
-    PrintText(fmt::format("key views  {}\n           {}\nColour each, and give them together\n{}",
+    PrintText(fmt::format("key views  {}\n           {}\nColour each, and pass them together\n{}",
                           fmt::join(choice.views, ", "),
                           choice.description,
                           Command(command)));
@@ -169,25 +169,25 @@ ExitCode Key::Select() {
                         choice.description,
                         (out / artifact::kKeyViewGray).string(),
                         (out / artifact::kKeyViewRanking).string(),
-                        HowToColor(scene)));
+                        NextCommands(scene)));
   return ExitCode::kOk;
 }
 
 std::vector<std::string> Key::SelectionFor(const std::string& scene) {
-  if (!options_.view.empty() || AsksForImport()) {
+  if (!options_.view.empty() || HasImportOptions()) {
     const v1::Job select = SubmitSelection(scene);
-    return WithItsInputs(connection_, select);
+    return JobAndInputs(connection_, select);
   }
   const KeyState state = ReadKeyState(connection_, scene);
-  if (state.selected) return WithItsInputs(connection_, *state.selected);
-  return {};  // the server selects
+  if (state.selected) return JobAndInputs(connection_, *state.selected);
+  return {};  // selected by the server
 }
 
 ExitCode Key::Color() {
   options_.color.Check();
   if (!options_.color.Given()) {
     throw InvalidArgument(
-        "say where the colour comes from: --auto, --image, --hints, --reference, --prompt, "
+        "a source of colour is missing: --auto, --image, --hints, --reference, --prompt, "
         "--backend, --script or --edit");
   }
   PrepareOut(options_.out);
@@ -207,8 +207,8 @@ ExitCode Key::Color() {
     return ExitCode::kOk;
   }
   PrintText(
-      fmt::format("key view   {}\ncolour     from {}\nlook at    {}\nIf you like it, accept "
-                  "it\n{}or colour it again in another way: each try is kept.\n",
+      fmt::format("key view   {}\ncolour     from {}\npicture    {}\nAccept it\n{}"
+                  "or colour it again from another source: each result is kept.\n",
                   choice.view,
                   DescribeSource(job),
                   (fs::path(options_.out) / artifact::kKeyViewColored).string(),
@@ -249,12 +249,12 @@ ExitCode Key::Show() {
   };
   line("coloured   ", state.colored);
   line("accepted   ", state.accepted);
-  text += "pictures and figures\n" +
+  text += "download the pictures\n" +
           Command({"artifact", "download", newest->name(), "-o", options_.out});
   text += state.accepted
               ? "colour the scene\n" + Command({"colorize", "--scene", scene, "-o", "OUT"})
           : state.colored ? "accept the colour\n" + Command({"key", "accept", scene})
-                          : HowToColor(scene);
+                          : NextCommands(scene);
   PrintText(text);
   return ExitCode::kOk;
 }
@@ -266,7 +266,7 @@ ExitCode Key::Accept() {
     const KeyState state = ReadKeyState(connection_, scene);
     if (!state.colored) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  "no key view of {} has been coloured yet; first run `{}`",
+                  "no key view of {} is coloured yet; first run `{}`",
                   scene,
                   CommandLine(context_, {"key", "color", scene, "--auto"}));
     }
@@ -293,11 +293,11 @@ void AddTarget(CLI::App* command, KeyOptions* options) {
           options->target,
           "scenes/ID, a folder of photos, a splat (.ply, .sog, .spz), or a film (.mp4, ...)")
       ->required();
-  command->add_flag("--film", options->film, "The folder's photos are frames of a film");
+  command->add_flag("--film", options->film, "The photos are frames of a film");
 }
 
 void AddView(CLI::App* command, KeyOptions* options) {
-  command->add_option("--view", options->view, "Take this photo (its name) as the key view");
+  command->add_option("--view", options->view, "Name of the photo to use as the key view");
   DeclareImportOptions(*command, &options->import);
   command->add_option("-o,--out", options->out, "Folder for the pictures")->capture_default_str();
 }
@@ -305,8 +305,7 @@ void AddView(CLI::App* command, KeyOptions* options) {
 }  // namespace
 
 void AddKeyCommands(CLI::App& app, Context& context) {
-  CLI::App* key =
-      app.add_subcommand("key", "Select, colour and accept the picture that all colours come from");
+  CLI::App* key = app.add_subcommand("key", "Select, colour and accept the key view of a scene");
   key->require_subcommand(1)->fallthrough();
   const auto options = std::make_shared<KeyOptions>();
   const auto run = [&context, options](CLI::App* command, ExitCode (Key::*action)()) {
@@ -315,37 +314,39 @@ void AddKeyCommands(CLI::App& app, Context& context) {
     });
   };
 
-  CLI::App* select = key->add_subcommand("select", "Find the photo that is best coloured");
+  CLI::App* select = key->add_subcommand("select", "Select the photo to colour");
   AddTarget(select, options.get());
   AddView(select, options.get());
   select->add_option("--strategy", options->strategy, "coverage (default), tracks or entropy")
       ->check(CLI::IsMember({"coverage", "tracks", "entropy"}));
   select
-      ->add_option(
-          "--count",
-          options->count,
-          "So many photos, chosen together for the least error that is expected; of a film "
-          "one a shot, the longest first")
+      ->add_option("--count",
+                   options->count,
+                   "Number of key views, chosen together for the least expected error; for films "
+                   "one for each "
+                   "shot, the longest first")
       ->check(CLI::Range(1, kMaxAdditionalKeyViews + 1));
   select->add_option(
-      "--encoder", options->encoder, "Weights that this server knows, to compare by");
-  select->add_option("--features", options->features, "CLIP weights that this server knows");
+      "--encoder", options->encoder, "Encoder weights on the server to compare views with");
+  select->add_option(
+      "--features", options->features, "CLIP weights on the server to compare views with");
   run(select, &Key::Select);
 
-  CLI::App* color = key->add_subcommand("color", "Colour it, and fetch it to look at");
+  CLI::App* color = key->add_subcommand("color", "Colour the key view and download it");
   color->alias("colour");
   AddTarget(color, options.get());
   AddView(color, options.get());
   DeclareKeyColorFlags(*color, &options->color);
   run(color, &Key::Color);
 
-  CLI::App* show = key->add_subcommand("show", "What is selected, coloured and accepted");
+  CLI::App* show = key->add_subcommand("show", "Show the selected, coloured and accepted key view");
   AddTarget(show, options.get());
   run(show, &Key::Show);
 
-  CLI::App* accept = key->add_subcommand("accept", "Use the newest colour for the scene");
+  CLI::App* accept =
+      key->add_subcommand("accept", "Accept the newest colours of the key view for the scene");
   AddTarget(accept, options.get());
-  accept->add_option("--job", options->job, "An older one: the job that coloured it");
+  accept->add_option("--job", options->job, "Accept those of this job instead");
   run(accept, &Key::Accept);
 }
 

@@ -15,7 +15,7 @@ namespace {
 constexpr int kPageSize = 200;
 constexpr int kMaxPages = 50;
 
-// Newest first; stops as soon as both have been found.
+// Newest first; stops when both are found.
 void FindNewest(Connection& connection, KeyState* state) {
   v1::ListJobsRequest request;
   request.set_parent(state->scene.name());
@@ -49,7 +49,7 @@ KeyState ReadKeyState(Connection& connection, const std::string& scene) {
   return state;
 }
 
-std::vector<std::string> WithItsInputs(Connection& connection, const v1::Job& job) {
+std::vector<std::string> JobAndInputs(Connection& connection, const v1::Job& job) {
   std::vector<std::string> names(job.spec().inputs().begin(), job.spec().inputs().end());
   for (const v1::Job& child : ListChildren(connection, job.name())) names.push_back(child.name());
   names.push_back(job.name());
@@ -57,7 +57,7 @@ std::vector<std::string> WithItsInputs(Connection& connection, const v1::Job& jo
 }
 
 KeyViewChoice ReadChoice(Connection& connection, const v1::Job& job) {
-  for (const std::string& name : WithItsInputs(connection, job)) {
+  for (const std::string& name : JobAndInputs(connection, job)) {
     const v1::Job input = name == job.name() ? job : GetJob(connection, name);
     if (input.kind() != kind::kSelectKeyView) continue;
     const auto json = nlohmann::json::parse(
@@ -71,7 +71,7 @@ KeyViewChoice ReadChoice(Connection& connection, const v1::Job& job) {
     return choice;
   }
   throw Error(ErrorCode::kNotFound,
-              "{} read no key view: its {} job is gone; select again",
+              "{} has no key view: its {} job was deleted; select again",
               job.name(),
               kind::kSelectKeyView);
 }

@@ -34,7 +34,7 @@ void AddFolder(const Context& context, const fs::path& folder, std::vector<LiveP
   for (const std::string& file : found) pictures->push_back({file, root / file, std::nullopt});
 }
 
-// Distinct names for the answers.
+// Distinct names for the coloured pictures.
 std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
   std::set<std::string> taken;
   std::vector<std::string> names;
@@ -49,7 +49,8 @@ std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
   return names;
 }
 
-// The answers have the photos' names: beside them they would be taken for photos, or replace them.
+// The coloured pictures have the names of the photos. In the same folder they would replace the
+// photos or be taken for photos.
 void RequireOtherFolder(const std::vector<LivePicture>& pictures, const fs::path& out) {
   for (const LivePicture& picture : pictures) {
     std::error_code none;
@@ -129,7 +130,7 @@ LiveSummary ColorizeToFiles(Connection& connection,
     const auto there = std::count_if(
         written.begin(), written.end(), [](const std::string& name) { return !name.empty(); });
     throw Error(ErrorCode::kUnavailable,
-                "{}; {} of {} pictures are in {}, whole; run the command again for the rest",
+                "{}; {} of {} pictures are complete in {}; run the command again for the rest",
                 e.what(),
                 there,
                 pictures.size(),
@@ -144,7 +145,7 @@ LiveSummary ColorizeToFiles(Connection& connection,
   return summary;
 }
 
-ExitCode Conclude(const Context& context, const LiveSummary& summary, const fs::path& out) {
+ExitCode PrintSummary(const Context& context, const LiveSummary& summary, const fs::path& out) {
   if (context.json) {
     nlohmann::ordered_json json = summary.ToJson();
     json["out"] = out.string();

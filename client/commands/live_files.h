@@ -1,4 +1,4 @@
-// Photos in and coloured pictures out, for the commands that colour live.
+// Files of the commands that colour photos live.
 #pragma once
 
 #include <filesystem>
@@ -11,26 +11,26 @@
 
 namespace color3d::client {
 
-// Files as they are given, and the photos of folders (in images/ when there is one), by name.
-// Prints notes on what is passed over. Throws Error{kNotFound} or kInvalidArgument naming what is
-// no photo, or when one of them lies in `out`, where the answers would replace it.
+// Returns the given files and the photos of the given folders (of images/ if there is one), by
+// name. Prints notes on files that are passed over. Throws Error: kNotFound for a missing file,
+// kInvalidArgument for a file that is not a photo or that lies in `out` and would be overwritten.
 std::vector<LivePicture> CollectPictures(const Context& context,
                                          const std::vector<std::string>& arguments,
                                          const std::filesystem::path& out);
 
 struct LiveSummary {
   std::vector<std::string> files;   // written, relative to OUT
-  std::vector<std::string> errors;  // "LABEL: why"
+  std::vector<std::string> errors;  // "LABEL: reason"
   std::string colorizer;
   std::string encoder_digest;
   double seconds = 0.0;
-  double first_seconds = 0.0;     // until the first was there
+  double first_seconds = 0.0;     // until the first picture
   ExitCode code = ExitCode::kOk;  // of the first error
 
   nlohmann::ordered_json ToJson() const;
 };
 
-// Colours them and writes out/STEM.png (a number is added where stems are equal). Errors of single
+// Colours the pictures and writes out/STEM.png (with a number if stems are equal). Errors of single
 // pictures are collected.
 LiveSummary ColorizeToFiles(Connection& connection,
                             const LiveSource& source,
@@ -39,8 +39,8 @@ LiveSummary ColorizeToFiles(Connection& connection,
                             const std::filesystem::path& out);
 
 // Prints the summary; returns its exit code.
-ExitCode Conclude(const Context& context,
-                  const LiveSummary& summary,
-                  const std::filesystem::path& out);
+ExitCode PrintSummary(const Context& context,
+                      const LiveSummary& summary,
+                      const std::filesystem::path& out);
 
 }  // namespace color3d::client

@@ -1,4 +1,4 @@
-// `color3d turntable` and `color3d render`: a coloured scene as a movie or as pictures.
+// `color3d turntable` and `color3d render`: render a coloured scene as a movie or as pictures.
 #include <fmt/core.h>
 
 #include <cmath>
@@ -25,15 +25,15 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr char kOrbit[] = "orbit", kOriginal[] = "original", kStill[] = "still";
-constexpr double kSeconds = 8.0, kFramesPerSecond = 30.0;  // unless told
+constexpr double kSeconds = 8.0, kFramesPerSecond = 30.0;  // by default
 
 struct MovieOptions {
   std::string target;  // folder of results, jobs/ID or scenes/ID
-  std::string out;     // a file that ends in .mp4, or a folder; empty: by the command
+  std::string out;     // a file that ends in .mp4, or a folder; empty: the default of the command
   std::string path;    // kOrbit, kOriginal, kStill or a file of cameras; empty: pictures of views
   std::vector<std::string> views;
   std::optional<double> seconds;
-  std::optional<double> time_s;  // at which a scene that moves stands still
+  std::optional<double> time_s;  // dynamic scenes: the time that is shown throughout
   double frames_per_second = kFramesPerSecond;
   std::optional<int> max_side_px;
   bool pictures = false;
@@ -48,25 +48,26 @@ bool IsMovieName(const fs::path& out) {
   return extension == ".mp4" || extension == ".MP4";
 }
 
-// Before the server is asked for anything.
+// Checks that need no server.
 void Check(const MovieOptions& options) {
   if (options.path.empty() &&
       (options.seconds || options.time_s || options.bounce || options.pictures)) {
     throw InvalidArgument(
-        "--seconds, --at, --bounce and --png belong to a path: say which with --path orbit, --path "
-        "original, --path still or --path FILE");
+        "--seconds, --at, --bounce and --png need a path: --path orbit, --path original, --path "
+        "still "
+        "or --path FILE");
   }
   if (options.path.empty() && IsMovieName(options.out)) {
     throw InvalidArgument(
-        "{} is to be a movie: say which way it goes with --path orbit, --path "
-        "original or --path FILE",
+        "{} is a movie and needs a path: --path orbit, --path original, --path still or --path "
+        "FILE",
         options.out);
   }
   if (!options.path.empty() && options.path != kOriginal && !options.views.empty()) {
-    throw InvalidArgument("--views are passed by --path original only");
+    throw InvalidArgument("--views needs --path original; other paths pass no photos");
   }
   if (!options.video && !options.pictures) {
-    throw InvalidArgument("--no-video leaves nothing without --png");
+    throw InvalidArgument("--no-video without --png leaves nothing to write");
   }
   if (options.pictures && IsMovieName(options.out)) {
     throw InvalidArgument("--png needs a folder for the pictures; name one with -o in place of {}",
@@ -75,7 +76,7 @@ void Check(const MovieOptions& options) {
   if (options.out.empty() || IsMovieName(options.out)) return;
   std::error_code none;
   if (fs::exists(options.out, none) && !fs::is_directory(options.out, none)) {
-    throw InvalidArgument("{} is no folder, and a movie's name ends in .mp4", options.out);
+    throw InvalidArgument("{} is not a folder; the name of a movie ends in .mp4", options.out);
   }
 }
 
@@ -84,7 +85,7 @@ v1::Digest UploadCameras(Connection& connection, const std::string& path) {
   if (!fs::is_regular_file(path, none)) {
     throw Error(
         ErrorCode::kNotFound,
-        "there is no file {}; --path is {}, {}, {} or a file of cameras (a transforms.json)",
+        "there is no file {}; --path takes {}, {}, {} or a file of cameras (transforms.json)",
         path,
         kOrbit,
         kOriginal,
@@ -110,7 +111,7 @@ v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1
   v1::JobSpec spec;
   spec.set_scene(of.spec().scene());
   spec.set_skip_cache(options.skip_cache);
-  for (const std::string& input : WithItsInputs(connection, of)) spec.add_inputs(input);
+  for (const std::string& input : JobAndInputs(connection, of)) spec.add_inputs(input);
   v1::RenderSpec* render = spec.mutable_render();
   for (const std::string& view : options.views) render->add_views(view);
   if (options.max_side_px) {
@@ -129,7 +130,7 @@ v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1
     render->set_path(v1::RenderSpec::PATH_CAMERAS);
     *render->mutable_cameras() = UploadCameras(connection, options.path);
   }
-  // Whoever takes a path of the capture itself gets it at its own pace, if it has one.
+  // A path of the capture itself keeps its own speed unless another is given.
   const bool as_in_the_file =
       !options.seconds &&
       (render->has_cameras() || options.path == kStill ||
@@ -143,7 +144,7 @@ v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1
   return spec;
 }
 
-// Where results go: the movie under its own name, the rest below a folder.
+// Downloads the movie under its name and the other results into the folder. Returns their paths.
 std::vector<std::string> Fetch(Connection& connection,
                                const v1::Job& job,
                                const fs::path& out,
@@ -200,29 +201,30 @@ void AddCommonOptions(CLI::App* command, MovieOptions* options) {
                    options->target,
                    "Folder of results that `color3d colorize` wrote, or jobs/ID or scenes/ID")
       ->required();
-  command->add_option("--seconds", options->seconds, "Length of the movie")
+  command->add_option("--seconds", options->seconds, "Length of the movie, s")
       ->check(CLI::Range(0.01, 86400.0));
-  command->add_option("--fps", options->frames_per_second, "Frames a second")
+  command->add_option("--fps", options->frames_per_second, "Frames per second")
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str();
   command->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px");
-  command->add_option("--at", options->time_s, "A scene that moves stands still at this second")
+  command->add_option("--at", options->time_s, "Dynamic scenes: show this time throughout, s")
       ->check(CLI::Range(0.0, 86400.0));
-  command->add_flag("--bounce", options->bounce, "There and back again");
-  command->add_flag("--skip-cache", options->skip_cache, "Render again what was rendered before");
+  command->add_flag("--bounce", options->bounce, "Go back along the path at its end");
+  command->add_flag(
+      "--skip-cache", options->skip_cache, "Render again even if the result is cached");
 }
 
 }  // namespace
 
 void AddMovieCommands(CLI::App& app, Context& context) {
   const auto turning = std::make_shared<MovieOptions>();
-  CLI::App* turntable =
-      app.add_subcommand("turntable", "A movie around what the key view shows, without an end");
+  CLI::App* turntable = app.add_subcommand("turntable", "Render a turntable movie");
   AddCommonOptions(turntable, turning.get());
   turning->path = kOrbit;
   turning->movie_name = "turntable.mp4";
-  turntable->add_option(
-      "-o,--out", turning->out, "FILE.mp4 or a folder; else turntable.mp4 among the results");
+  turntable->add_option("-o,--out",
+                        turning->out,
+                        "FILE.mp4 or a folder; default: turntable.mp4 in the folder of results");
   turntable->callback([&context, turning] {
     context.action = [&context, turning] {
       if (turning->out.empty()) turning->out = IsOnServer(turning->target) ? "." : turning->target;
@@ -231,22 +233,22 @@ void AddMovieCommands(CLI::App& app, Context& context) {
   });
 
   const auto rendering = std::make_shared<MovieOptions>();
-  CLI::App* render = app.add_subcommand("render", "A movie along a path, or pictures of views");
+  CLI::App* render =
+      app.add_subcommand("render", "Render a movie along a camera path, or pictures of views");
   AddCommonOptions(render, rendering.get());
   rendering->out = "render";
   render->add_option(
       "--path",
       rendering->path,
-      "orbit, original (through the photos' cameras; of a scene that moves, as the "
-      "key view's camera took it), still (that camera stands still while time runs) "
-      "or a file of cameras (transforms.json, of a scene that moves perhaps with the `time` "
-      "of each frame); none: pictures of views");
-  render->add_option("--views",
-                     rendering->views,
-                     "Photos: whose views to render, or to pass on the original path");
+      "orbit, original (through the cameras of the photos; for dynamic scenes along the key view's "
+      "camera), still (dynamic scenes: the key view's camera stands still while time passes) or a "
+      "file of cameras (transforms.json, for dynamic scenes with the `time` of each frame); "
+      "default: no movie, but pictures of views");
+  render->add_option(
+      "--views", rendering->views, "Names of the views to render, or to pass on the path original");
   render->add_option("-o,--out", rendering->out, "FILE.mp4 or a folder")->capture_default_str();
-  render->add_flag("--png", rendering->pictures, "Every frame as a picture, too");
-  render->add_flag("!--no-video", rendering->video, "With --png: no movie");
+  render->add_flag("--png", rendering->pictures, "Also write every frame as a picture");
+  render->add_flag("!--no-video", rendering->video, "With --png: write no movie");
   render->callback([&context, rendering] {
     context.action = [&context, rendering] { return RunMovie(context, *rendering); };
   });

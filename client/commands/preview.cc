@@ -1,5 +1,4 @@
-// `color3d preview`: what a coloured key view would do to other photos, in seconds and without a
-// job.
+// `color3d preview`: colours some photos from a coloured key view within seconds, without a job.
 #include <algorithm>
 #include <filesystem>
 
@@ -22,13 +21,13 @@ namespace {
 struct PreviewOptions {
   std::string target;     // folder of photos or scenes/ID
   std::string key_color;  // a coloured key view
-  std::string key;        // which photo that is; empty: by its file's name
+  std::string key;        // the photo that it is of; empty: the one with its name
   std::string out = "preview";
   int count = 5;
   int max_side_px = 500;
 };
 
-// The photos of a scene that the server holds: nothing is sent.
+// The photos of a scene on the server. Nothing is uploaded.
 std::vector<LivePicture> PicturesOf(const v1::Scene& scene) {
   std::vector<LivePicture> pictures;
   for (const v1::SceneFile& file : scene.files()) {
@@ -38,7 +37,7 @@ std::vector<LivePicture> PicturesOf(const v1::Scene& scene) {
   return pictures;
 }
 
-// Evenly spread, without the key view.
+// Evenly spread over all photos but the key view.
 std::vector<LivePicture> Spread(const std::vector<LivePicture>& all,
                                 const std::string& key,
                                 int count) {
@@ -62,13 +61,13 @@ v1::Digest UploadExample(Connection& connection, const fs::path& file) {
   return ToProto(upload.digest);
 }
 
-// The coloured key view that the scene has: the accepted one, else the newest.
+// The coloured key view of the scene: the accepted one, else the newest.
 v1::Digest ExampleOf(Connection& connection, const std::string& scene, std::string* key) {
   const KeyState state = ReadKeyState(connection, scene);
   const std::optional<v1::Job>& job = state.accepted ? state.accepted : state.colored;
   if (!job) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "{} has no coloured key view yet: give one with --key-color, or make one with "
+                "{} has no coloured key view yet: give one with --key-color, or colour one with "
                 "`color3d key color {} ...`",
                 scene,
                 scene);
@@ -80,7 +79,7 @@ v1::Digest ExampleOf(Connection& connection, const std::string& scene, std::stri
 ExitCode Preview(const Context& context, const PreviewOptions& options) {
   const bool stored = options.target.starts_with("scenes/") && !fs::is_directory(options.target);
   if (!stored && options.key_color.empty()) {
-    throw InvalidArgument("--key-color is missing: the coloured key view to take colours from");
+    throw InvalidArgument("--key-color is missing: the coloured key view");
   }
   std::vector<LivePicture> pictures;
   if (!stored) pictures = CollectPictures(context, {options.target}, options.out);
@@ -104,8 +103,8 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
     if (key.empty()) key = options.key_color;
   }
   pictures = Spread(pictures, key, options.count);
-  if (pictures.empty()) throw InvalidArgument("there is no photo besides the key view");
-  return Conclude(
+  if (pictures.empty()) throw InvalidArgument("there is no photo but the key view");
+  return PrintSummary(
       context,
       ColorizeToFiles(
           connection, source, pictures, {.max_side_px = options.max_side_px}, options.out),
@@ -116,20 +115,21 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
 
 void AddPreviewCommand(CLI::App& app, Context& context) {
   CLI::App* preview =
-      app.add_subcommand("preview", "Colour a handful of photos like a coloured key view, at once")
+      app.add_subcommand("preview", "Colour a few photos from a coloured key view within seconds")
           ->fallthrough();
   const auto options = std::make_shared<PreviewOptions>();
   preview->add_option("photos", options->target, "Folder of photos, or scenes/ID")->required();
   preview->add_option("--key-color",
                       options->key_color,
-                      "The coloured key view; a scene's own is taken when this is missing");
-  preview->add_option("--key",
-                      options->key,
-                      "Which photo the key view is: left out of the preview; default: the one of "
-                      "the same name");
+                      "The coloured key view; default for scenes/ID: that of the scene");
+  preview->add_option(
+      "--key",
+      options->key,
+      "The photo that the key view is, which is left out of the preview; default: the "
+      "one with the same name");
   preview->add_option("-o,--out", options->out, "Folder for the coloured pictures")
       ->capture_default_str();
-  preview->add_option("--count", options->count, "How many photos, evenly spread")
+  preview->add_option("--count", options->count, "Number of photos, evenly spread")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   preview->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px")

@@ -4,7 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <optional>
+#include <string_view>
 #include <utility>
 
 #include "client/commands/follow.h"
@@ -13,37 +13,11 @@
 #include "client/lib/text.h"
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
+#include "core/catalogue/metrics.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
-
-struct MetricLine {
-  const char* name;
-  const char* label;
-  int decimals;
-  const char* unit;
-};
-constexpr MetricLine kMetricLines[] = {
-    {"psnr_rgb", "PSNR of held-out views", 2, " dB"},
-    {"ssim_rgb", "SSIM", 4, ""},
-    {"psnr_l", "PSNR of luminance", 2, " dB"},
-    {"psnr_l_camera", "  of a camera held out", 2, " dB"},
-    {"psnr_l_moment", "  of single moments", 2, " dB"},
-    {"psnr_l_block", "  of a block of time", 2, " dB"},
-    {"delta_e00_chroma", "chroma error (CIEDE2000)", 2, ""},
-    {"delta_e00_chroma_camera", "  of a camera held out", 2, ""},
-    {"delta_e00_chroma_moment", "  of single moments", 2, ""},
-    {"delta_e00_chroma_block", "  of a block of time", 2, ""},
-    {"delta_e00_chroma_bound", "  with all true colours", 2, ""},
-    {"delta_e00_gray", "  for comparison, grey", 2, ""},
-    {"tc_chroma", "TC of chroma (Lab)", 2, ""},
-    {"tc_chroma_truth", "  of the true colours", 2, ""},
-    {"cdc", "CDC", 5, ""},
-    {"cdc_truth", "  of the true colours", 5, ""},
-    {"share_seen", "share seen in a key view", 2, ""},
-    {"gaussians", "Gaussians", 0, ""},
-};
 
 std::string Line(const std::string& label, const std::string& value) {
   return fmt::format("{:<28}{}\n", label, value);
@@ -101,7 +75,7 @@ void PrepareOut(const fs::path& out) {
 
 namespace {
 
-// `go_on`: how to fetch the rest when the server is gone.
+// `go_on`: the remedy if the server is lost.
 std::vector<std::string> Fetch(Connection& connection,
                                const std::vector<v1::Artifact>& artifacts,
                                const fs::path& out,
@@ -136,11 +110,8 @@ std::vector<std::string> DownloadArtifacts(Connection& connection,
                                            const std::vector<v1::Artifact>& artifacts,
                                            const fs::path& out,
                                            ProgressDisplay& display) {
-  return Fetch(connection,
-               artifacts,
-               out,
-               display,
-               "run the command again: what is there is not fetched again");
+  return Fetch(
+      connection, artifacts, out, display, "run the command again: downloaded files are kept");
 }
 
 std::vector<std::string> DownloadResults(Connection& connection,
@@ -153,12 +124,12 @@ std::vector<std::string> DownloadResults(Connection& connection,
                  {job.artifacts().begin(), job.artifacts().end()},
                  out,
                  display,
-                 "fetch the rest with `" + FetchCommand(context, job, out) + "`");
+                 "download the rest with `" + FetchCommand(context, job, out) + "`");
   } catch (const Error& e) {
     if (e.code() != ErrorCode::kCancelled) throw;
     throw CommandFailure(
         ExitCode::kDetached,
-        fmt::format("{} is done, its results are partly here; fetch them with `{}`",
+        fmt::format("{} is done, but its results are incomplete here; download them with `{}`",
                     job.name(),
                     FetchCommand(context, job, out)));
   }
@@ -167,32 +138,29 @@ std::vector<std::string> DownloadResults(Connection& connection,
 std::string Summary(const fs::path& out) {
   std::string text;
   const nlohmann::ordered_json metrics = ReadResult(out, artifact::kMetrics);
-  const auto number = [&](const char* name) -> std::optional<double> {
-    const auto found = metrics.find(name);
-    if (found == metrics.end() || !found->is_number()) return std::nullopt;
-    return found->get<double>();
-  };
-  for (const MetricLine& line : kMetricLines) {
-    if (const auto value = number(line.name)) {
-      text += Line(line.label, fmt::format("{:.{}f}{}", *value, line.decimals, line.unit));
-    }
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : metrics.items()) {
+    if (value.is_number()) keys.push_back(key);
   }
-  if (const auto seconds = number("seconds_total")) {
-    text += Line("computing time", HumanSeconds(*seconds));
+  for (const std::string& key : InMetricOrder(std::move(keys))) {
+    const auto [metric, variant] = FindMetric(key);
+    if (metric == nullptr || !metric->in_summary) continue;
+    if (variant != nullptr && !variant->in_summary) continue;
+    const std::string label =
+        variant == nullptr ? metric->label : std::string("  ") + variant->label;
+    text += Line(label, MetricText(key, metrics.at(key).get<double>()));
+  }
+  if (const auto seconds = metrics.find("seconds_total");
+      seconds != metrics.end() && seconds->is_number()) {
+    text += Line(MetricLabel("seconds_total"), HumanSeconds(seconds->get<double>()));
   }
   std::error_code none;
-  // Of a film with poses the movie is a rendered one.
-  const bool has_film = fs::exists(out / artifact::kFilm, none);
-  const std::pair<const char*, const char*> files[] = {
-      {"coloured film", artifact::kFilm},
-      {"of every camera", artifact::kFilms},
-      {"coloured frames", artifact::kFilmFrames},
-      {has_film ? "rendered movie" : "coloured film", artifact::kMovie},
-      {"coloured scene", artifact::kPly},
-      {"report", artifact::kReport},
-      {"in the browser", artifact::kViewPage}};
-  for (const auto& [label, name] : files) {
-    if (fs::exists(out / name, none)) text += Line(label, (out / name).string());
+  for (const Artifact& artifact : ArtifactCatalogue()) {
+    if (artifact.label == nullptr || !fs::exists(out / artifact.name, none)) continue;
+    // For films without poses the movie is the film.
+    const bool is_film = std::string_view(artifact.name) == artifact::kMovie &&
+                         !fs::exists(out / artifact::kFilm, none);
+    text += Line(is_film ? "coloured film" : artifact.label, (out / artifact.name).string());
   }
   return text;
 }

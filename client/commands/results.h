@@ -1,4 +1,4 @@
-// A job's artifacts on the user's disk, and the short summary at the end.
+// Downloads the artifacts of a job and prints their summary.
 #pragma once
 
 #include <filesystem>
@@ -13,35 +13,35 @@
 
 namespace color3d::client {
 
-// The artifact of this name. Throws Error{kNotFound} that lists what there is.
+// Throws Error{kNotFound} with the names that there are if the job has no such artifact.
 const v1::Artifact& FindArtifact(const v1::Job& job, const std::string& name);
 
-// Its bytes, fetched through a temporary file.
+// Returns the bytes of an artifact, downloaded through a temporary file.
 std::string ReadArtifact(Connection& connection, const v1::Job& job, const std::string& name);
 
-// Creates `out` when it is missing. Throws Error{kFailedPrecondition} when that fails or when it
-// cannot be written.
+// Creates the folder `out` if it is missing. Throws Error{kFailedPrecondition} if it cannot be
+// created or written to.
 void PrepareOut(const std::filesystem::path& out);
 
-// Writes them to out/NAME (DownloadBelow); returns the names in order. Files that are there already
-// are kept.
+// Downloads artifacts to out/NAME (DownloadBelow). Returns their names in order. Files that are
+// already there are kept.
 std::vector<std::string> DownloadArtifacts(Connection& connection,
                                            const std::vector<v1::Artifact>& artifacts,
                                            const std::filesystem::path& out,
                                            ProgressDisplay& display);
 
-// All of a job's artifacts. After Ctrl-C throws CommandFailure{kDetached} that says how to fetch
-// the rest.
+// Downloads all artifacts of a job. After Ctrl-C throws CommandFailure{kDetached} with the command
+// that downloads the rest.
 std::vector<std::string> DownloadResults(Connection& connection,
                                          const Context& context,
                                          const v1::Job& job,
                                          const std::filesystem::path& out,
                                          ProgressDisplay& display);
 
-// A JSON artifact that was downloaded into `out`; null when there is none or it cannot be read.
+// Returns a JSON artifact in `out`; null if there is none or it cannot be read.
 nlohmann::ordered_json ReadResult(const std::filesystem::path& out, const std::string& name);
 
-// A few lines about the metrics and what else lies in `out`, for people.
+// Returns a summary for the user: metrics (in_summary) and results (Artifact::label) in `out`.
 std::string Summary(const std::filesystem::path& out);
 
 }  // namespace color3d::client

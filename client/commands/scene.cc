@@ -8,31 +8,17 @@
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
 #include "core/base/error.h"
+#include "core/catalogue/captures.h"
 
 namespace color3d::client {
 namespace {
 
 std::string LayoutName(v1::Scene::Layout layout) {
-  switch (layout) {
-    case v1::Scene::LAYOUT_PHOTOS:
-      return "photos";
-    case v1::Scene::LAYOUT_COLMAP:
-      return "colmap";
-    case v1::Scene::LAYOUT_TRANSFORMS:
-      return "transforms";
-    case v1::Scene::LAYOUT_SPLAT:
-      return "splat";
-    case v1::Scene::LAYOUT_FILM:
-      return "film";
-    case v1::Scene::LAYOUT_NERFIES:
-      return "nerfies";
-    case v1::Scene::LAYOUT_POSES_BOUNDS:
-      return "poses_bounds";
-    case v1::Scene::LAYOUT_FILMS:
-      return "films";
-    default:
-      return "-";
+  const auto known = static_cast<CaptureLayout>(layout);
+  for (const CaptureLayoutInfo& info : CaptureLayouts()) {
+    if (info.layout == known) return info.name;
   }
+  return std::to_string(layout);  // of a newer server
 }
 
 std::string SceneState(const v1::Scene& scene) {
@@ -45,7 +31,7 @@ ExitCode RunCreate(const Context& context,
                    bool film) {
   PhotoFolder folder = CollectPhotos(photos, film);
   if (film && !masks.empty()) {
-    throw InvalidArgument("--masks is for photos of a place; --film takes frames as they are");
+    throw InvalidArgument("--masks cannot be combined with --film: frames of a film have no masks");
   }
   if (film) TakeAsFrames(&folder);
   if (!masks.empty()) AddMasks(masks, &folder);
@@ -137,7 +123,7 @@ ExitCode RunDelete(const Context& context, const std::string& name) {
 }  // namespace
 
 void AddSceneCommands(CLI::App& app, Context& context) {
-  CLI::App* scene = app.add_subcommand("scene", "Scenes that the server holds");
+  CLI::App* scene = app.add_subcommand("scene", "Upload, list, show and delete scenes");
   scene->require_subcommand(1)->fallthrough();
   const auto text = std::make_shared<std::string>();
   const auto limit = std::make_shared<int>(50);
@@ -149,7 +135,10 @@ void AddSceneCommands(CLI::App& app, Context& context) {
           "PHOTOS", *text, "Folder of photos, a splat (.ply, .sog, .spz), or a film (.mp4, ...)")
       ->required();
   const auto masks = std::make_shared<std::string>();
-  create->add_option("--masks", *masks, "Folder of masks, called like the photos: white counts");
+  create->add_option(
+      "--masks",
+      *masks,
+      "Folder of masks with the names of the photos: white counts, black is ignored");
   const auto film = std::make_shared<bool>(false);
   create->add_flag("--film", *film, "The photos are frames of a film");
   create->callback([&context, text, masks, film] {
@@ -158,16 +147,16 @@ void AddSceneCommands(CLI::App& app, Context& context) {
     };
   });
 
-  CLI::App* list = scene->add_subcommand("list", "Newest first");
+  CLI::App* list = scene->add_subcommand("list", "List scenes, newest first");
   list->fallthrough();
-  list->add_option("--limit", *limit, "At most this many")
+  list->add_option("--limit", *limit, "Maximum number of entries")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   list->callback([&context, limit] {
     context.action = [&context, limit] { return RunList(context, *limit); };
   });
 
-  CLI::App* show = scene->add_subcommand("show", "One scene with its files");
+  CLI::App* show = scene->add_subcommand("show", "Show a scene with its files");
   show->fallthrough()->add_option("NAME", *text, "scenes/ID")->required();
   show->callback(
       [&context, text] { context.action = [&context, text] { return RunShow(context, *text); }; });

@@ -20,15 +20,15 @@ std::string UploadFolder(Connection& connection,
       UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
         display.OnTransfer("uploading", done, total);
       });
-  display.Say(
-      folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
-      : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
-      : !folder.camera_films.empty()
-          ? fmt::format("{}: {} films of cameras{}",
-                        scene.name(),
-                        folder.camera_films.size(),
-                        folder.model_files.empty() ? "; their poses are looked for" : " with poses")
-          : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
+  display.Say(folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
+              : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
+              : !folder.camera_films.empty()
+                  ? fmt::format("{}: {} films of cameras{}",
+                                scene.name(),
+                                folder.camera_films.size(),
+                                folder.model_files.empty() ? "; their poses will be estimated"
+                                                           : " with poses")
+                  : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
   return scene.name();
 }
 
@@ -40,15 +40,15 @@ std::string ResolveScene(Connection& connection,
   std::error_code none;
   if (!fs::is_directory(text, none) && !fs::is_regular_file(text, none)) {
     if (film && text.starts_with("scenes/")) {
-      throw InvalidArgument("--film is for a folder; {} was a film or not when it was uploaded",
-                            text);
+      throw InvalidArgument(
+          "--film is for a folder; whether {} is a film was decided at its upload", text);
     }
     if (text.starts_with("scenes/")) return text;
-    throw Error(
-        ErrorCode::kNotFound,
-        "'{}' is neither a folder of photos, nor a splat, nor a scene of the server's (scenes/ID; "
-        "`color3d scene list` shows them)",
-        text);
+    throw Error(ErrorCode::kNotFound,
+                "'{}' is neither a folder of photos, a splat or a film, nor a scene on the server "
+                "(scenes/ID; "
+                "see `color3d scene list`)",
+                text);
   }
   PhotoFolder folder = CollectPhotos(text, film);
   if (film) TakeAsFrames(&folder);

@@ -1,5 +1,5 @@
-// What a user names as a scene: a folder of photos or a splat on this machine, or a scene that the
-// server holds.
+// The scene that a user names: a folder of photos, a film or a splat on this machine, or a scene on
+// the server.
 #pragma once
 
 #include <string>
@@ -10,15 +10,15 @@
 
 namespace color3d::client {
 
-// Uploads the photos, unless the server has them, and returns "scenes/...".
+// Uploads the files that the server does not have. Returns "scenes/...".
 std::string UploadFolder(Connection& connection,
                          const Context& context,
                          const PhotoFolder& folder,
                          ProgressDisplay& display);
 
-// `text`: "scenes/...", or a folder, splat or film, which is uploaded; `film`: the folder's
-// pictures are frames of a film (TakeAsFrames). Throws Error{kNotFound} when it is none of them,
-// Error{kInvalidArgument} for a scene of the server's with `film`.
+// `text`: "scenes/...", or a folder, splat or film to upload. `film`: the pictures of the folder
+// are frames of a film (TakeAsFrames). Throws Error: kNotFound if `text` is none of these,
+// kInvalidArgument for a scene on the server with `film`.
 std::string ResolveScene(Connection& connection,
                          const Context& context,
                          const std::string& text,

@@ -37,7 +37,7 @@ std::string DescribeBackend(const v1::BackendStatus& backend) {
   return text + "\n";
 }
 
-std::string OfLimit(const std::string& used, const std::string& limit, bool is_limited) {
+std::string UsageOfLimit(const std::string& used, const std::string& limit, bool is_limited) {
   return is_limited ? used + " of " + limit : used;
 }
 
@@ -48,12 +48,12 @@ std::string DescribeUsage(const v1::ProjectUsage& usage,
                      label,
                      role.empty() ? "" : role + " in ",
                      usage.project().empty() ? "no project" : "the project " + usage.project(),
-                     OfLimit(HumanBytes(usage.stored_bytes()),
-                             HumanBytes(usage.max_stored_bytes()),
-                             usage.max_stored_bytes() > 0),
-                     OfLimit(fmt::to_string(usage.unfinished_jobs()),
-                             fmt::to_string(usage.max_unfinished_jobs()),
-                             usage.max_unfinished_jobs() > 0));
+                     UsageOfLimit(HumanBytes(usage.stored_bytes()),
+                                  HumanBytes(usage.max_stored_bytes()),
+                                  usage.max_stored_bytes() > 0),
+                     UsageOfLimit(fmt::to_string(usage.unfinished_jobs()),
+                                  fmt::to_string(usage.max_unfinished_jobs()),
+                                  usage.max_unfinished_jobs() > 0));
 }
 
 std::string Describe(const v1::ServerInfo& info) {
@@ -69,12 +69,12 @@ std::string Describe(const v1::ServerInfo& info) {
       info.running_jobs(),
       info.queued_jobs(),
       kinds);
-  if (!info.waits_for().empty()) text += "queue      held back: " + info.waits_for() + "\n";
+  if (!info.waits_for().empty()) text += "queue      waits for: " + info.waits_for() + "\n";
   text += DescribeUsage(info.usage(), "you are   ", info.role());
   for (const v1::ModelInfo& model : info.models()) text += DescribeModel(model);
   for (const v1::BackendStatus& backend : info.backends()) text += DescribeBackend(backend);
   for (const v1::WorkerInfo& worker : info.workers()) {
-    text += fmt::format("worker     {}, pid {}, {}, {}, heard of {} ago\n",
+    text += fmt::format("worker     {}, pid {}, {}, {}, last seen {} ago\n",
                         worker.worker_id(),
                         worker.pid(),
                         HumanBytes(worker.memory_bytes()),
@@ -125,7 +125,7 @@ ExitCode RunServerPresets(const Context& context, const std::string& name) {
   return ExitCode::kOk;
 }
 
-// A call of AdminService that answers nothing, and what is said when it has.
+// Calls an RPC of AdminService without a result and prints `said`.
 template <typename Request, typename Response>
 ExitCode RunAdmin(const Context& context,
                   grpc::Status (v1::AdminService::Stub::*method)(grpc::ClientContext*,
@@ -149,10 +149,10 @@ ExitCode RunCollect(const Context& context, const v1::CollectRequest& request) {
   if (context.json) {
     PrintJson(gone);
   } else {
-    PrintText(fmt::format("{} blobs ({}) that nothing names {}\n",
+    PrintText(fmt::format("{} unreferenced blobs ({}) {}\n",
                           gone.blobs(),
                           HumanBytes(gone.bytes()),
-                          request.dry_run() ? "would go" : "are gone"));
+                          request.dry_run() ? "would be removed" : "were removed"));
   }
   return ExitCode::kOk;
 }
@@ -178,29 +178,29 @@ void AddAdminCommands(CLI::App* server, Context& context) {
     return command;
   };
   using Admin = v1::AdminService::Stub;
-  add("pause", "No job is begun until `resume`; running ones go on (role admin)", [&context] {
+  add("pause", "Pause the queue: running jobs continue, no job starts (role admin)", [&context] {
     return RunAdmin(context, &Admin::PauseQueue, "the queue is paused");
   });
-  add("resume", "Jobs are begun again (role admin)", [&context] {
-    return RunAdmin(context, &Admin::ResumeQueue, "the queue goes on");
+  add("resume", "Resume the queue (role admin)", [&context] {
+    return RunAdmin(context, &Admin::ResumeQueue, "the queue is resumed");
   });
-  add("drain", "Save running jobs and end the server, as SIGTERM does (role admin)", [&context] {
-    return RunAdmin(context, &Admin::Drain, "the server drains and ends");
+  add("drain", "Save running jobs and stop the server, as SIGTERM does (role admin)", [&context] {
+    return RunAdmin(context, &Admin::Drain, "the server drains and stops");
   });
-  add("projects", "What each project has (role admin)", [&context] {
+  add("projects", "Show the usage of each project (role admin)", [&context] {
     return RunProjects(context);
   });
   const auto dry_run = std::make_shared<bool>(false);
   const auto hours = std::make_shared<int>(24);
   CLI::App* collect =
-      add("collect", "Remove blobs that nothing names (role admin)", [&context, dry_run, hours] {
+      add("collect", "Remove unreferenced blobs (role admin)", [&context, dry_run, hours] {
         v1::CollectRequest collect_request;
         collect_request.set_dry_run(*dry_run);
         collect_request.set_grace_seconds(int64_t{3600} * *hours);
         return RunCollect(context, collect_request);
       });
-  collect->add_flag("--dry-run", *dry_run, "Only say what would go");
-  collect->add_option("--hours", *hours, "Noted as unnamed for this long")
+  collect->add_flag("--dry-run", *dry_run, "Only count the blobs");
+  collect->add_option("--hours", *hours, "Minimum time without a reference, h")
       ->check(CLI::Range(1, 24 * 365))
       ->capture_default_str();
 }
@@ -208,17 +208,18 @@ void AddAdminCommands(CLI::App* server, Context& context) {
 }  // namespace
 
 void AddServerCommands(CLI::App& app, Context& context) {
-  CLI::App* server = app.add_subcommand("server", "The server itself")->require_subcommand(1);
+  CLI::App* server =
+      app.add_subcommand("server", "Show and manage the server")->require_subcommand(1);
   server->fallthrough();
-  server->add_subcommand("info", "Version, job kinds, workers, memory")
+  server->add_subcommand("info", "Show version, job kinds, workers and memory")
       ->fallthrough()
       ->callback([&context] { context.action = [&context] { return RunServerInfo(context); }; });
   AddAdminCommands(server, context);
   const auto name = std::make_shared<std::string>();
   CLI::App* presets = server->add_subcommand(
       "presets",
-      "What the presets mean, as text: the form that `color3d colorize --preset FILE` reads");
-  presets->add_option("NAME", *name, "Only this one");
+      "Print the options of the presets, in the format of `color3d colorize --preset FILE`");
+  presets->add_option("NAME", *name, "Only this preset");
   presets->fallthrough()->callback([&context, name] {
     context.action = [&context, name] { return RunServerPresets(context, *name); };
   });

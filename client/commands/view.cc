@@ -1,4 +1,4 @@
-// `color3d view`: a coloured scene in the browser.
+// `color3d view`: shows a coloured scene in the browser.
 #include <fcntl.h>
 #include <fmt/core.h>
 #include <spawn.h>
@@ -32,8 +32,8 @@ struct ViewOptions {
 };
 
 constexpr const char* kHowToGetPage =
-    "it is of an older version, or its worker was built without the viewer; build that where npm "
-    "reaches its registry, and run `color3d colorize` again";
+    "the scene is of an older version, or the worker was built without the viewer; build it where "
+    "npm reaches its registry, and run `color3d colorize` again";
 
 fs::path PageIn(const fs::path& target) {
   std::error_code none;
@@ -68,7 +68,7 @@ fs::path Download(const Context& context, const ViewOptions& options) {
                           : GetJob(connection, ResourceName(options.target, "jobs"));
   if (job.kind() != kind::kColorizeScene) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "{} is a {} job; a page to look at comes with {} jobs only",
+                "{} is a {} job; only {} jobs have a page for the browser",
                 job.name(),
                 job.kind(),
                 kind::kColorizeScene);
@@ -94,9 +94,9 @@ fs::path Download(const Context& context, const ViewOptions& options) {
               kHowToGetPage);
 }
 
-// Starts `program` on a file, apart from us: it may become the browser and must outlive us. False
-// when it is not there or fails within a moment.
-bool StartApart(const char* program, const fs::path& file) {
+// Starts `program` on a file in a session of its own, because it may become the browser and must
+// outlive this process. Returns false if it is missing or fails within two seconds.
+bool StartDetached(const char* program, const fs::path& file) {
   posix_spawnattr_t attributes;
   posix_spawn_file_actions_t actions;
   posix_spawnattr_init(&attributes);
@@ -123,13 +123,13 @@ bool StartApart(const char* program, const fs::path& file) {
   return true;
 }
 
-// In the browser that the desktop names; false where there is no desktop or it fails.
+// Opens the page in the default browser. Returns false if there is no desktop or it fails.
 bool OpenInBrowser(const fs::path& page) {
 #if defined(__APPLE__)
-  return StartApart("open", page);
+  return StartDetached("open", page);
 #else
   if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return false;
-  return StartApart("xdg-open", page);
+  return StartDetached("xdg-open", page);
 #endif
 }
 
@@ -143,7 +143,7 @@ ExitCode RunView(const Context& context, const ViewOptions& options) {
   }
   PrintText(page.string() + "\n");
   if (options.open && !opened) {
-    PrintNote(context, "there is no browser to open here; open this file in one, or send it");
+    PrintNote(context, "no browser can be started here; open the file in a browser");
   }
   return ExitCode::kOk;
 }
@@ -153,13 +153,14 @@ ExitCode RunView(const Context& context, const ViewOptions& options) {
 void AddViewCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<ViewOptions>();
   CLI::App* view =
-      app.add_subcommand("view", "Turn a coloured scene in the browser")->fallthrough();
+      app.add_subcommand("view", "Show a coloured scene in the browser")->fallthrough();
   view->add_option("RESULTS",
                    options->target,
-                   "Folder of results, or jobs/ID or scenes/ID, which are fetched")
+                   "Folder of results, or jobs/ID or scenes/ID, whose page is downloaded")
       ->required();
-  view->add_option("-o,--out", options->out, "Folder for what is fetched")->capture_default_str();
-  view->add_flag("!--no-open", options->open, "Only say where the page is");
+  view->add_option("-o,--out", options->out, "Folder for the downloaded page")
+      ->capture_default_str();
+  view->add_flag("!--no-open", options->open, "Only print the path of the page");
   view->callback([&context, options] {
     context.action = [&context, options] { return RunView(context, *options); };
   });

@@ -203,7 +203,7 @@ CarriedColor CarryColor(const SurfaceView& source,
   return out;
 }
 
-void TakeSurer(const CarriedColor& other, CarriedColor* color) {
+void KeepMoreConfident(const CarriedColor& other, CarriedColor* color) {
   for (size_t i = 0; i < color->confidence.data.size(); ++i) {
     if (!(other.confidence.data[i] > color->confidence.data[i])) continue;
     color->confidence.data[i] = other.confidence.data[i];

@@ -45,7 +45,7 @@ CarriedColor CarryColor(const SurfaceView& source,
                         const CarryOptions& options);
 
 // Replaces each pixel of `color` by that of `other` where `other` is more confident.
-void TakeSurer(const CarriedColor& other, CarriedColor* color);
+void KeepMoreConfident(const CarriedColor& other, CarriedColor* color);
 // Adds a source of lower rank. Its confidence is multiplied by 1 - that of `color`, so that it
 // fills what is open and changes nothing that is known.
 void FillFrom(const CarriedColor& other, CarriedColor* color);

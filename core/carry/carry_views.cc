@@ -107,7 +107,7 @@ CarriedColor CarryFromAll(const std::vector<ColoredKeyView>& keys,
     };
     CarriedColor carried = carry(key.surfaces.rendered, target.rendered);
     if (key.surfaces.swept && target.swept) {
-      TakeSurer(carry(*key.surfaces.swept, *target.swept), &carried);
+      KeepMoreConfident(carry(*key.surfaces.swept, *target.swept), &carried);
     }
     FillFrom(carried, &all);
   }

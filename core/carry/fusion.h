@@ -34,7 +34,7 @@ struct FusionOptions {
   double bold_distance_ends = 3.0;
   double bold_chroma_begins = 15.0;
   double bold_chroma_ends = 25.0;
-  // What spreads over the picture is chroma relative to luminance.
+  // The system is solved for chroma relative to luminance.
   RelativeChroma relative_chroma;
   void Validate() const;
 };

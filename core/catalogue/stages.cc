@@ -4,89 +4,102 @@
 #include "core/catalogue/artifacts.h"
 
 namespace color3d {
+namespace {
+
+std::vector<Stage> WithArtifacts(std::vector<Stage> stages) {
+  for (Stage& stage : stages) {
+    for (const Artifact& artifact : ArtifactCatalogue()) {
+      if (artifact.stage == nullptr || std::string_view(artifact.stage) != stage.kind) continue;
+      stage.leaves.push_back(artifact.name);
+      if (artifact.is_result) stage.results.push_back(artifact.name);
+    }
+  }
+  return stages;
+}
+
+}  // namespace
 
 const std::vector<Stage>& StageCatalogue() {
   using namespace artifact;
-  static const std::vector<Stage> catalogue = {
+  static const std::vector<Stage> catalogue = WithArtifacts({
       {.kind = kind::kImportScene,
-       .leaves = {kScene, kImportFacts, kSfmLog, kGivenViews, kMovingRegions, kGivenGeometry},
-       .results = {kSfmLog}},
+       .step = "structure_from_motion",
+       .purpose = "the photos come without camera poses"},
       {.kind = kind::kSelectKeyView,
+       .step = "key_view_selection",
+       .purpose = "the key view is chosen among the views",
        .needs = {kScene},
-       .reads = {kImportFacts, kGeometry},  // geometry of an earlier job, if it is given one
-       .leaves = {kKeyView, kKeyViewGray, kKeyViewRanking},
-       .results = {kKeyView, kKeyViewGray, kKeyViewRanking},
+       .reads = {kImportFacts, kGeometry},  // the latter of an earlier job
        .brings_prerequisites = true},
       {.kind = kind::kColorizeKeyView,
-       .needs = {kScene, kKeyView},
-       // For an additional key view kKeyView is not needed; other stages read its artifacts below
-       // kKeyViews.
-       .leaves = {kKeyColor, kKeyColorFacts, kKeyColorRegions, kKeyViewColored, kKeyViews},
-       .results = {kKeyColorFacts, kKeyColorRegions, kKeyViewColored, kKeyViews},
+       .step = "key_view_color",
+       .purpose = "all colours of the scene come from its key views",
+       .needs = {kScene, kKeyView},  // kKeyView for the first key view only
        .brings_prerequisites = true},
       {.kind = kind::kReconstructGeometry,
+       .step = "luminance_geometry",
+       .purpose = "every scene needs geometry",
        .needs = {kScene},
        .reads = {kGivenGeometry, kMovingRegions},  // the former in place of training
-       .leaves = {kGeometry, kMemoryPlan},
        .brings_prerequisites = true,
        .resumes = true,
        .keeps_time_limit = true},
       {.kind = kind::kCarryColor,
+       .step = "carried_color",
+       .purpose = "colours are carried to every view that sees the same surface",
        .needs = {kScene, kKeyView, kKeyColor, kGeometry},
        .reads = {kKeyViews},
-       .leaves = {kCarried, kCarryFacts},
        .resumes = true},
       {.kind = kind::kGenerateAugmentations,
+       .step = "augmentations",
+       .purpose = "the colorizer also learns from generated pictures",
        .needs = {kScene, kKeyView, kKeyColor},
-       .reads = {kGeometry, kCarryFacts},
-       .leaves = {kAugmentationFacts, kAugmentations, kAugmentationSheet},
-       .results = {kAugmentationSheet}},
+       .reads = {kGeometry, kCarryFacts}},
       {.kind = kind::kPersonalize,
+       .step = "personalization",
+       .purpose = "surfaces that no key view shows get the colours of similar ones",
        .needs = {kScene, kKeyView, kKeyColor},
        .reads = {kAugmentationFacts, kAugmentations, kCarried, kGeometry},
-       .leaves = {kColorizer},
-       .results = {kColorizer},
        .runs_in_batch = true,
        .resumes = true,
        .keeps_time_limit = true},
       {.kind = kind::kColorizeViews,
+       .step = "view_colors",
+       .purpose = "every view gets a colour at every pixel",
        .needs = {kScene, kColorizer},
        .reads = {kCarried, kCarryFacts, kGeometry},
-       .leaves = {kViewsAb, kProvenance},
        .resumes = true},
       {.kind = kind::kCorrectColors,
+       .step = "corrections",
+       .purpose = "corrections were given",
        .needs = {kScene, kKeyView, kKeyColor, kColorizer, kViewsAb},
-       .reads = {kGeometry, kProvenance, kKeyViews},
-       .leaves = {kCorrectedAb, kCorrectedProvenance, kCorrections, kPaint},
-       .results = {kCorrections, kPaint}},
+       .reads = {kGeometry, kProvenance, kKeyViews}},
       {.kind = kind::kSolveChroma,
+       .step = "chroma",
+       .purpose = "a and b are fitted on the finished geometry",
        .needs = {kScene, kKeyView, kKeyColor, kViewsAb, kGeometry},
        .reads = {kProvenance, kCorrectedAb, kCorrectedProvenance},
-       .leaves = {kModel},
-       .results = {kModel},
        .resumes = true,
        .keeps_time_limit = true},
       {.kind = kind::kExport,
+       .step = "export",
+       .purpose = "viewers read files of their own",
        .needs = {kScene, kModel},
-       .reads = {kKeyView},
-       .leaves = {kPly, kSog, kSpz, kGlb, kSplat, kSplat4d, kMoments, kViewPage, kExportScores},
-       .results = {kPly, kSog, kSpz, kGlb, kSplat, kSplat4d, kMoments, kViewPage}},
+       .reads = {kKeyView}},
       {.kind = kind::kRender,
+       .step = "render",
+       .purpose = "the report shows rendered views",
        .needs = {kScene, kModel},
-       // of films and what moves
-       .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb, kImportFacts},
-       .leaves = {kRenders, kMovie, kFilm, kFilms, kFilmFrames, kFrames},
-       .results = {kRenders, kMovie, kFilm, kFilms, kFilmFrames}},
+       // the reads: for films and dynamic scenes
+       .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb, kImportFacts}},
       {.kind = kind::kEvaluate,
+       .step = "evaluation",
+       .purpose = "the views are compared with true colours or with each other",
        .needs = {kScene, kViewsAb, kModel},
-       .reads = {kKeyView, kKeyColor, kProvenance, kCorrectedAb, kCorrectedProvenance},
-       .leaves = {kScores, kTruths, kColored2d}},
-      // Its report reads what all the others have left.
-      {.kind = kind::kColorizeScene,
-       .leaves = {kReport, kMetrics, kAllCurves, kPlan},
-       .results = {kReport, kMetrics, kAllCurves, kPlan}},
+       .reads = {kKeyView, kKeyColor, kProvenance, kCorrectedAb, kCorrectedProvenance}},
+      {.kind = kind::kColorizeScene},  // its report reads the artifacts of all others
       {.kind = kind::kPersonalizeScenes},
-  };
+  });
   return catalogue;
 }
 
@@ -106,13 +119,8 @@ const Stage& StageOf(std::string_view kind) {
 }
 
 const Stage* StageThatLeaves(std::string_view artifact) {
-  for (const Stage& stage : StageCatalogue()) {
-    for (const std::string_view made : stage.leaves) {
-      const bool below = made.ends_with('/') && artifact.starts_with(made);
-      if (artifact == made || below) return &stage;
-    }
-  }
-  return nullptr;
+  const Artifact* found = FindArtifact(artifact);
+  return found != nullptr && found->stage != nullptr ? FindStage(found->stage) : nullptr;
 }
 
 }  // namespace color3d

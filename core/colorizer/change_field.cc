@@ -15,7 +15,7 @@ namespace {
 constexpr double kUnknownApart = 0.8;  // of places in space from those whose position is not known
 constexpr double kLeastWeight = 0.05;
 constexpr double kSamePlace = 0.75;  // of the most that two places can be alike
-constexpr double kWorthAsking = 1e-5;
+constexpr double kWorthInferring = 1e-5;
 
 // Places that are not known lie together, away from all others.
 torch::Tensor InSpace(const torch::Tensor& positions) {
@@ -108,7 +108,7 @@ std::vector<ChangeField::Proposal> ChangeField::Propose(const FieldPlaces& place
         covariance.square().sum(1) / (covariance.diagonal().clamp_min(0.0) + noise + 1e-12);
     const int64_t row = gains.argmax().item<int64_t>();
     const double gain = gains[row].item<double>() / total;
-    if (!(gain > kWorthAsking)) break;
+    if (!(gain > kWorthInferring)) break;
     proposals.push_back({row, gain});
     const torch::Tensor told = covariance[row].clone();
     const double variance = std::max(told[row].item<double>(), 0.0) + noise[row].item<double>();

@@ -64,7 +64,7 @@ Image LocalContrast(const Image& luminance) {
 }
 
 // Mean difference of two pictures of local contrast around each pixel, 0..2.
-Image Unlike(const Image& one, const Image& other) {
+Image LocalDifference(const Image& one, const Image& other) {
   Image difference(one.width, one.height, 1);
   for (size_t i = 0; i < difference.data.size(); ++i) {
     difference.data[i] = std::min(2.0f, std::abs(one.data[i] - other.data[i]));
@@ -88,8 +88,8 @@ void Register(const Image& picture,
     if (x * x + y * y > kMostPx * kMostPx) x = y = 0.0f;
   }
   const Image registered = SampledAt(*place, Moved(rest));
-  const Image before = Unlike(contrast, SampledAt(other_contrast, *place));
-  const Image after = Unlike(contrast, SampledAt(other_contrast, registered));
+  const Image before = LocalDifference(contrast, SampledAt(other_contrast, *place));
+  const Image after = LocalDifference(contrast, SampledAt(other_contrast, registered));
   for (size_t i = 0; i < before.data.size(); ++i) {
     if (after.data[i] >= before.data[i] - kLeastGain) continue;
     for (int c = 0; c < 2; ++c) place->Plane(c)[i] = registered.Plane(c)[i];
@@ -108,7 +108,7 @@ Image ConfidenceOf(const Image& place,
                    const Image& contrast,
                    const Image& other_contrast,
                    const FilmCarryOptions& options) {
-  const Image unlike = Unlike(contrast, SampledAt(other_contrast, place));
+  const Image unlike = LocalDifference(contrast, SampledAt(other_contrast, place));
   const Image returned = SampledAt(back, place);
   const int width = contrast.width, height = contrast.height;
   const double inverse_square_tolerance =
@@ -155,13 +155,13 @@ double MeanOf(const Image& image) {
 }
 
 // Takes the tracks that features find, where they are more confident than flow.
-void TakeFoundAgain(const FoundAgain& again,
-                    const Image& frame,
-                    const Image& contrast,
-                    const Image& key_contrast,
-                    const FilmCarryOptions& options,
-                    const CancellationToken& cancel,
-                    FilmTrack* track) {
+void TakeReappearing(const ReappearingRegions& again,
+                     const Image& frame,
+                     const Image& contrast,
+                     const Image& key_contrast,
+                     const FilmCarryOptions& options,
+                     const CancellationToken& cancel,
+                     FilmTrack* track) {
   const auto in_key = [&](const FilmTrack& t) {
     return Places{t.in_key, ConfidenceOf(t.in_key, t.in_frame, contrast, key_contrast, options)};
   };
@@ -292,7 +292,7 @@ class Walker {
     cancel_.ThrowIfCancelled();
     Register(*key_, key_contrast_, next, contrast, &track->in_frame);
     cancel_.ThrowIfCancelled();
-    TakeFoundAgain(*again_, next, contrast, key_contrast_, options_, cancel_, track);
+    TakeReappearing(*again_, next, contrast, key_contrast_, options_, cancel_, track);
   }
 
   const Walk& walk_;
@@ -301,7 +301,7 @@ class Walker {
   const CancellationToken& cancel_;
   const std::shared_ptr<const Image> key_;
   const Image key_contrast_;
-  std::optional<FoundAgain> again_;
+  std::optional<ReappearingRegions> again_;
   int frame_;
   std::shared_ptr<const Image> luminance_;  // of the frame
   double moved_;
@@ -310,7 +310,7 @@ class Walker {
 };
 
 // Drops the frames that are done.
-void TakeUp(const std::vector<FilmWalk>& walks, Walk* walk) {
+void DropFinished(const std::vector<FilmWalk>& walks, Walk* walk) {
   for (const FilmWalk& done : walks) {
     if (done.key != walk->key->frame || done.direction != walk->direction) continue;
     const auto last = std::find(walk->frames.begin(), walk->frames.end(), done.frame);
@@ -340,7 +340,7 @@ std::vector<Walk> WalksOf(const FilmFrames& frames,
         walk.frames.push_back(i);
         if (is_nearest) walk.nearest = walk.frames.size();
       }
-      TakeUp(done, &walk);
+      DropFinished(done, &walk);
       if (!walk.frames.empty()) walks.push_back(std::move(walk));
     }
   }
@@ -376,16 +376,16 @@ std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames,
   return near;
 }
 
-CarriedColor CarryFoundAgain(const FilmKey& key,
-                             const FoundAgain& again,
-                             const Image& frame,
-                             const FilmCarryOptions& options,
-                             const CancellationToken& cancel) {
+CarriedColor CarryIntoReappearing(const FilmKey& key,
+                                  const ReappearingRegions& again,
+                                  const Image& frame,
+                                  const FilmCarryOptions& options,
+                                  const CancellationToken& cancel) {
   constexpr float kNowhere = -1e4f;
   const Image contrast = LocalContrast(frame), key_contrast = LocalContrast(again.key());
   const Image nowhere(frame.width, frame.height, 2, kNowhere);
   FilmTrack track{nowhere, nowhere};
-  TakeFoundAgain(again, frame, contrast, key_contrast, options, cancel, &track);
+  TakeReappearing(again, frame, contrast, key_contrast, options, cancel, &track);
   return ColorOf(key, key_contrast, contrast, track, options);
 }
 

@@ -11,7 +11,7 @@
 #include "core/base/image.h"
 #include "core/base/parallel.h"
 #include "core/carry/carry.h"
-#include "core/film/found_again.h"
+#include "core/film/reappearing_regions.h"
 
 namespace color3d {
 
@@ -79,11 +79,11 @@ std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames, const std:
 // Carries a key frame's colours into a frame that no walk reaches, as behind a cut, to the regions
 // that local features find again; confidence is 0 elsewhere. `regions`: of the key frame. `frame`:
 // as FilmFrames::luminance. Throws Error{kCancelled}.
-CarriedColor CarryFoundAgain(const FilmKey& key,
-                             const FoundAgain& regions,
-                             const Image& frame,
-                             const FilmCarryOptions& options,
-                             const CancellationToken& cancel);
+CarriedColor CarryIntoReappearing(const FilmKey& key,
+                                  const ReappearingRegions& regions,
+                                  const Image& frame,
+                                  const FilmCarryOptions& options,
+                                  const CancellationToken& cancel);
 
 using OnCarriedFrame = std::function<void(int frame, const CarriedColor& color)>;
 

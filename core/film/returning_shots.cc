@@ -50,7 +50,7 @@ std::optional<FilmKey> ReturningShots::KeyAt(int frame) const {
   std::vector<CarriedColor> colors(keys_.size());
   pool_.ForEach(static_cast<int64_t>(keys_.size()), [&](int64_t i, int) {
     cancel_.ThrowIfCancelled();
-    colors[i] = CarryFoundAgain(keys_[i], *regions_[i], *luminance, options_, cancel_);
+    colors[i] = CarryIntoReappearing(keys_[i], *regions_[i], *luminance, options_, cancel_);
   });
   std::optional<FilmKey> found;
   double most = kLeastFound;

@@ -35,8 +35,8 @@ class ReturningShots {
   const FilmCarryOptions options_;
   ThreadPool& pool_;
   const CancellationToken& cancel_;
-  std::vector<std::shared_ptr<const Image>> pictures_;  // of the key frames
-  std::vector<std::optional<FoundAgain>> regions_;      // of the key frames
+  std::vector<std::shared_ptr<const Image>> pictures_;      // of the key frames
+  std::vector<std::optional<ReappearingRegions>> regions_;  // of the key frames
 };
 
 }  // namespace color3d

@@ -39,7 +39,7 @@ double Difference(const Image& one, const Image& other, int dx, int dy) {
   return sum / (static_cast<double>(x1 - x0) * (y1 - y0));
 }
 
-// Of normalised pictures.
+// Unlikeness of two normalised pictures.
 double UnlikenessOf(const Image& one, const Image& other) {
   double best = 1e9;
   const int limit_x = std::min(kMaxShiftPx, one.width / 4),
@@ -68,7 +68,7 @@ double Usual(const std::vector<double>& steps, int k) {
 double Unlikeness(const Image& one, const Image& other) {
   if (one.channels != 1 || other.channels != 1 || one.width != other.width ||
       one.height != other.height || one.Empty()) {
-    throw InvalidArgument("shots are told from pictures of one channel and one size");
+    throw InvalidArgument("shots are found in pictures of one channel and one size");
   }
   return UnlikenessOf(Normalised(one), Normalised(other));
 }
@@ -84,7 +84,7 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
     const Image& image = thumbnails[i];
     if (image.channels != 1 || image.width != thumbnails[0].width ||
         image.height != thumbnails[0].height || image.Empty()) {
-      throw InvalidArgument("shots are told from pictures of one channel and one size");
+      throw InvalidArgument("shots are found in pictures of one channel and one size");
     }
     if (TonesOfPicture(image).deviation < kBlankDeviation) {
       result.fault[i] = FrameFault::kBlank;

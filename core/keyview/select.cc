@@ -13,6 +13,7 @@
 #include "core/base/median.h"
 #include "core/base/parallel.h"
 #include "core/base/range_check.h"
+#include "core/catalogue/limits.h"
 
 namespace color3d {
 namespace {
@@ -191,7 +192,7 @@ std::vector<std::vector<int>> Members(const std::vector<int>& groups, size_t cou
 void KeyViewOptions::Validate() const {
   const RangeCheck check("key view option");
   check("temperature", temperature, 1e-6, 1e6);
-  check("count", count, 1, 17);
+  check("count", count, 1, kMaxAdditionalKeyViews + 1);
 }
 
 std::vector<bool> GuardedViews::Kept() const {

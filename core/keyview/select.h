@@ -19,7 +19,8 @@ struct KeyViewOptions {
   // Set aside frames that show nothing (UnfitFrames) and, among 5 views or more, those with mean
   // similarity < median - 2 MAD.
   bool outlier_guard = true;
-  // So many views together (expected_error.h), 1..17; the strategy alone counts for 1.
+  // Number of views, chosen together (expected_error.h), 1..kMaxAdditionalKeyViews + 1. The
+  // strategy counts for one view only.
   int count = 1;
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const KeyViewOptions&) const = default;

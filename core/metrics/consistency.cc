@@ -27,7 +27,7 @@ void CheckDepth(const PosedDepth& view) {
                         view.camera.height);
 }
 
-// The four pixels around (u, v), whose centres are at +0.5, and their shares.
+// Bilinear weights of the four pixels around (u, v). Pixel centres are at +0.5.
 struct Corners {
   int x = 0, y = 0;         // upper left
   int right = 0, down = 0;  // steps to the others; 0 at the border
@@ -41,7 +41,7 @@ struct Corners {
   }
 };
 
-// Nothing when (u, v) is not inside of the picture.
+// Returns nullopt if (u, v) is outside the picture.
 std::optional<Corners> CornersAt(double u, double v, int width, int height) {
   if (!(u >= 0.0 && v >= 0.0 && u <= width && v <= height)) return std::nullopt;
   const double x = std::clamp(u - 0.5, 0.0, width - 1.0);
@@ -56,7 +56,7 @@ std::optional<Corners> CornersAt(double u, double v, int width, int height) {
   return c;
 }
 
-// Depth between pixels that all have one.
+// Interpolated depth. Requires depth at all four pixels.
 double DepthAt(const Image& depth, const Corners& c) {
   for (const int y : {c.y, c.y + c.down}) {
     for (const int x : {c.x, c.x + c.right}) {

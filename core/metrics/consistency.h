@@ -1,9 +1,11 @@
-// Do two views show the same colour where they show the same surface? Matching error (ME) and
-// temporal consistency (TC) of METHOD.md "Metrics", with matches from geometry: poses and depth.
-// Pure functions and values, thread-safe.
+// Agreement of two views where they show the same surface: matching error (ME) and temporal
+// consistency (TC) of METHOD.md "Metrics", with matches from poses and depth. Pure functions and
+// values.
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "core/base/image.h"
@@ -11,7 +13,7 @@
 
 namespace color3d {
 
-// What a view sees, of any origin.
+// A camera with its depth map, from any source.
 struct PosedDepth {
   Camera camera;
   Pose cam_from_world;
@@ -20,7 +22,7 @@ struct PosedDepth {
 };
 
 struct MatchOptions {
-  double max_reprojection_px = 1.0;  // there and back again, 0..100
+  double max_reprojection_px = 1.0;  // after the way there and back, 0..100
   double depth_tolerance = 0.01;     // relative, 0..1
   int stride_px = 1;                 // every n-th pixel of every n-th row, 1..1000
   void Validate() const;             // throws Error{kInvalidArgument}
@@ -35,15 +37,14 @@ struct PixelMatch {
   float v = 0.0f;
 };
 
-// A pixel matches when its surface point falls into the second picture, lies there at the depth
-// that the second view sees (so nothing stands before it), and that view's own surface point comes
-// back to the pixel. In rows from top to bottom. Throws Error{kInvalidArgument} when a depth map is
-// not of its camera's size.
+// A pixel matches if its surface point falls into the second picture, is not occluded there (equal
+// depth), and the surface point of the second view reprojects to the pixel. In rows from top to
+// bottom. Throws Error{kInvalidArgument} if a depth map does not have the size of its camera.
 std::vector<PixelMatch> MatchByGeometry(const PosedDepth& from,
                                         const PosedDepth& to,
                                         const MatchOptions& options);
 
-// A picture twice: 3 channels of sRGB in 0..1, and of Lab.
+// A picture in sRGB (0..1) and in Lab, 3 channels each.
 struct ColoredPicture {
   Image srgb;
   Image lab;
@@ -56,7 +57,7 @@ struct PairDifference {
   double squared_rgb = 0.0;   // its square: the warping error of Lai et al. 2018 (section 4)
   double delta_e00 = 0.0;
 };
-// Throws Error{kInvalidArgument} for a match outside of a picture.
+// Throws Error{kInvalidArgument} for a match outside a picture.
 PairDifference CompareMatches(const ColoredPicture& from,
                               const ColoredPicture& to,
                               const std::vector<PixelMatch>& matches);
@@ -68,23 +69,29 @@ struct ViewPair {
 };
 inline constexpr int kShortGap = 1;
 inline constexpr int kLongGap = 7;
-// `groups`: how many views each has, which are numbered on from group to group; two of one group
-// are compared. All (i, i + 1) and (i, i + 7), at most `most` of each over all groups, evenly
-// spread; by `first`, then `second`. In a group of fewer than 8 views the long gap is that of the
-// first and the last view (none below 3).
+// All pairs (i, i + 1) and (i, i + 7) within a group, at most `most` of each kind over all groups,
+// evenly spread, ordered by `first`, then `second`. In a group of fewer than 8 views the long gap
+// is that of the first and the last view; groups of fewer than 3 have none. `groups`: number of
+// views of each; views are numbered through all groups.
 std::vector<ViewPair> ConsistencyPairs(const std::vector<int>& groups, int most);
 
 struct Consistency {
-  int pairs = 0;          // that have matches
+  int pairs = 0;          // with matches
   int64_t matches = 0;    // over all pairs
   double me = 0.0;        // mean over all matches of |dRGB|, 0..1
   double me_de00 = 0.0;   // the same in CIEDE2000
   double tc_short = 0.0;  // mean over the pairs of squared_rgb
   double tc_long = 0.0;
-  double tc = 0.0;  // mean of both; the one that there is when the other has no match
+  double tc = 0.0;  // mean of both; of one if the other has no match
+
+  // The metrics by their keys (core/catalogue/metrics.h).
+  std::map<std::string, double> Figures() const {
+    return {
+        {"me", me}, {"me_de00", me_de00}, {"tc", tc}, {"tc_short", tc_short}, {"tc_long", tc_long}};
+  }
 };
 
-// Sums up pairs. A plain value.
+// Accumulates pairs. A plain value.
 class ConsistencyMeter {
  public:
   void Add(const ViewPair& pair, const PairDifference& difference);

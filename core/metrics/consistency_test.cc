@@ -83,7 +83,7 @@ TEST(MatchByGeometry, FindsTheSameSurfacePointOfASlantedPlane) {
   EXPECT_NEAR(static_cast<double>(fewer.size()), matches.size() / 16.0, 0.1 * fewer.size());
 }
 
-TEST(MatchByGeometry, WhatStandsBeforeASurfaceHidesIt) {
+TEST(MatchByGeometry, OccludedPixelsDoNotMatch) {
   const Seen a = Look(-0.5, 0.0, true), b = Look(0.5, 0.0, true);
   const auto matches = MatchByGeometry(a.view, b.view, {});
   int on_occluder = 0, wrong = 0;
@@ -116,7 +116,7 @@ TEST(MatchByGeometry, ViewsWithoutOverlapOrDepthHaveNoMatches) {
   EXPECT_THROW(MatchByGeometry(a.view, a.view, {.stride_px = 0}), Error);
 }
 
-TEST(CompareMatches, AKnownOffsetIsTheMatchingError) {
+TEST(CompareMatches, KnownOffsetIsTheError) {
   const Seen a = Look(-0.3, 0.0, false), b = Look(0.3, 0.0, false);
   const Seen redder = Look(0.3, 0.0, false, 0.09);
   const auto matches = MatchByGeometry(a.view, b.view, {});
@@ -139,7 +139,7 @@ TEST(CompareMatches, AKnownOffsetIsTheMatchingError) {
   EXPECT_THROW(CompareMatches(a.picture, b.picture, {{64, 0, 1.0f, 1.0f}}), Error);
 }
 
-TEST(ConsistencyPairs, AreTheShortAndTheLongGapWhateverTheNumberOfViews) {
+TEST(ConsistencyPairs, HaveShortAndLongGaps) {
   EXPECT_TRUE(ConsistencyPairs({}, 24).empty());
   EXPECT_TRUE(ConsistencyPairs({1}, 24).empty());
   const auto two = ConsistencyPairs({2}, 24);
@@ -156,7 +156,7 @@ TEST(ConsistencyPairs, AreTheShortAndTheLongGapWhateverTheNumberOfViews) {
   }
 }
 
-TEST(ConsistencyPairs, AreOfOneGroup) {
+TEST(ConsistencyPairs, StayWithinAGroup) {
   // Views 0..3 are of one moment, 4 of another, 5..6 of a third.
   const auto pairs = ConsistencyPairs({4, 1, 2}, 24);
   std::vector<std::tuple<int, int, bool>> found;

@@ -5,9 +5,9 @@
 
 namespace color3d {
 
-// Of two lists of equal length, -1..1; equal values share the mean of their ranks. 0 when a list is
-// constant or shorter than 2. Throws Error{kInvalidArgument} for lists of different length and for
-// values that are not finite.
+// Correlation of two lists of equal length, -1..1; equal values share the mean of their ranks. 0 if
+// a list is constant or has fewer than 2 values. Throws Error{kInvalidArgument} for lists of
+// different length and for values that are not finite.
 double RankCorrelation(const std::vector<float>& x, const std::vector<float>& y);
 
 }  // namespace color3d

@@ -9,9 +9,9 @@
 namespace color3d {
 namespace {
 
-constexpr int kMaxPairs = 24;  // of each gap; with more views they are spread evenly
-constexpr int kStridePx = 3;   // some 20 000 matches a pair; the paper's protocol takes 5 000
-constexpr size_t kBatch = 8;   // pairs at once: bounds the pictures in memory
+constexpr int kMaxPairs = 24;  // for each gap, evenly spread
+constexpr int kStridePx = 3;   // about 20,000 matches a pair; the protocol of the paper uses 5,000
+constexpr size_t kBatch = 8;   // pairs at a time: bounds the pictures in memory
 
 struct ViewPictures {
   PosedDepth geometry;
@@ -61,7 +61,7 @@ class Scorer {
   }
 
  private:
-  // Pairs come in order of their first view: what lies before it is not needed again.
+  // Pairs are ordered by their first view: earlier views are not needed again.
   void Load(const std::vector<ViewPair>& batch) {
     views_.erase(views_.begin(), views_.lower_bound(batch.front().first));
     std::vector<int> missing;

@@ -1,5 +1,4 @@
-// ME and TC of a whole scene (METHOD.md "Metrics"): which pairs of views are compared, and how
-// their pictures are fetched without keeping more than a few in memory.
+// ME and TC of a whole scene (METHOD.md "Metrics"), with few pictures in memory at a time.
 #pragma once
 
 #include <functional>
@@ -12,38 +11,38 @@
 
 namespace color3d {
 
-// Pictures are compared at no more than this longer side.
+// Maximum longer side of the compared pictures.
 inline constexpr int kConsistencySidePx = 500;
 
-// Where the pictures of a scene's views come from; all of a view have one size.
+// Source of the pictures of a scene. All pictures of a view have the same size.
 struct ConsistencySource {
   struct Rendered {
     PosedDepth geometry;
     Image lab;  // 3 channels
   };
 
-  // Which views are compared (ConsistencyPairs): how many there are of each group, numbered on from
-  // group to group.
+  // Number of views of each group, as ConsistencyPairs takes them.
   std::vector<int> groups;
-  // The coloured model as a view sees it. Called for one view at a time: it may use the pool.
+  // Render of the coloured model in a view. Called for one view at a time, so that it may use the
+  // pool.
   std::function<Rendered(int view)> render;
-  // The photo with the colours that were predicted for it, 3 channels of Lab. Called from several
-  // threads at once.
+  // The photo in its predicted colours, 3 channels of Lab. Called from several threads at once.
   std::function<Image(int view)> colored_lab;
-  // The photo in its true colours, 3 channels of sRGB, where has_truth says so. As colored_lab.
+  // The photo in its true colours, 3 channels of sRGB, for views with has_truth. Called from
+  // several threads at once.
   std::function<bool(int view)> has_truth;
   std::function<Image(int view)> true_srgb;
 };
 
 struct SceneConsistency {
-  Consistency rendered;              // pictures of the coloured model
+  Consistency rendered;              // renders of the coloured model
   Consistency colored;               // the photos in their predicted colours
-  std::optional<Consistency> truth;  // the true colours: what the photos themselves leave
+  std::optional<Consistency> truth;  // the photos in their true colours
 };
 
-// Over ConsistencyPairs of all groups, training and held-out ones alike; matches come from the
-// model's own depth. The truth is scored when every view of the pairs has one. Throws
-// Error{kCancelled} and what the source throws.
+// Consistency over ConsistencyPairs of all groups, training and held-out views alike. Matches come
+// from the depth of the model. The truth is scored if every view of the pairs has one. Throws
+// Error{kCancelled} and the errors of the source.
 SceneConsistency MeasureConsistency(const ConsistencySource& source,
                                     ThreadPool& pool,
                                     const CancellationToken& cancel);

@@ -16,11 +16,11 @@
 namespace color3d {
 namespace {
 
-constexpr int kStretch = 16;  // neighbouring frames that one thread compares
+constexpr int kStretch = 16;  // number of neighbouring frames that one thread compares
 constexpr size_t kMostStretches = 16;
 constexpr int kReach = kCdcDistances.back();
 
-// Frames [begin, end) of a shot, each compared with those before it.
+// Frames [begin, end) of a shot; each is compared with earlier ones.
 struct Stretch {
   const std::vector<int>* shot = nullptr;
   int begin = 1;
@@ -38,7 +38,7 @@ std::vector<Stretch> StretchesOf(const std::vector<std::vector<int>>& shots) {
   return EvenlyOf(std::move(stretches), kMostStretches);
 }
 
-// One colouring of a stretch.
+// Sums for one colouring of a stretch.
 struct Sums {
   ChromaAlongMotion chroma;
   std::array<double, 3> divergence = {};
@@ -74,10 +74,10 @@ TemporalConsistency Result(const Sums& sums) {
   return result;
 }
 
-// What is kept of a frame while later ones are compared with it.
+// Data of earlier frames that later frames are compared with.
 struct Remembered {
   Image ab;                               // of the last frame only
-  std::deque<ColorHistogram> histograms;  // the last one in front
+  std::deque<ColorHistogram> histograms;  // the newest first
 };
 
 std::vector<Sums> Compare(const Stretch& stretch,
@@ -94,7 +94,7 @@ std::vector<Sums> Compare(const Stretch& stretch,
     Image luminance;
     FollowedPixels followed;
     if (i + 1 >= stretch.begin) luminance = source.luminance(frame);
-    if (compared) followed = FollowBack(luminance, luminance_before);
+    if (compared) followed = FollowToPreviousFrame(luminance, luminance_before);
     for (size_t k = 0; k < colorings; ++k) {
       const Image lab = source.colorings[k](frame);
       const ColorHistogram histogram = HistogramOf(SrgbFromLab(lab));
@@ -150,12 +150,12 @@ double Divergence(const ColorHistogram& one, const ColorHistogram& other) {
   return std::max(0.0, sum / static_cast<double>(one.size()));
 }
 
-FollowedPixels FollowBack(const Image& luminance, const Image& luminance_before) {
+FollowedPixels FollowToPreviousFrame(const Image& luminance, const Image& luminance_before) {
   const Image back = DenseFlow(luminance, luminance_before);
   const Image forth = DenseFlow(luminance_before, luminance);
   const int width = luminance.width, height = luminance.height;
   FollowedPixels followed{Image(width, height, 2), std::vector<char>(luminance.PlaneSize(), 0)};
-  constexpr int kSmallestSide = 32;  // below, flow is 0 and means nothing
+  constexpr int kSmallestSide = 32;  // optical flow of smaller pictures is 0
   const bool too_small = std::min(width, height) < kSmallestSide;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -207,6 +207,15 @@ void ChromaAlongMotion::Add(const ChromaAlongMotion& other) {
   all_pixels += other.all_pixels;
   difference += other.difference;
   chroma += other.chroma;
+}
+
+std::map<std::string, double> TemporalConsistency::Figures() const {
+  std::map<std::string, double> figures = {
+      {"followed", followed}, {"tc_chroma", tc_chroma}, {"chroma", chroma}, {"cdc", cdc}};
+  for (size_t d = 0; d < kCdcDistances.size(); ++d) {
+    figures["cdc_" + std::to_string(kCdcDistances[d])] = cdc_at[d];
+  }
+  return figures;
 }
 
 std::vector<TemporalConsistency> MeasureTemporalConsistency(const TemporalSource& source,

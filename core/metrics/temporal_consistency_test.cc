@@ -62,7 +62,7 @@ std::vector<int> Frames(int count) {
   return frames;
 }
 
-TEST(TemporalConsistency, DivergenceIsThatOfJensenAndShannon) {
+TEST(TemporalConsistency, DivergenceIsJensenShannon) {
   Image dark(4, 2, 3, 0.0f), half = dark;
   for (int c = 0; c < 3; ++c) {
     for (int i = 0; i < 4; ++i) half.Plane(c)[i] = 1.0f;
@@ -80,7 +80,7 @@ TEST(TemporalConsistency, DivergenceIsThatOfJensenAndShannon) {
   EXPECT_THROW(HistogramOf(Image(4, 2, 1)), Error);
 }
 
-TEST(TemporalConsistency, ColorsThatGoWithThingsAreSteadyAndOthersAreNot) {
+TEST(TemporalConsistency, ColorsThatFollowMotionAreSteady) {
   const double step = 2.0;
   const auto figures = Measure(
       {Frames(40)},
@@ -106,7 +106,7 @@ TEST(TemporalConsistency, ColorsThatGoWithThingsAreSteadyAndOthersAreNot) {
       flickers.cdc, (flickers.cdc_at[0] + flickers.cdc_at[1] + flickers.cdc_at[2]) / 3.0, 1e-12);
 }
 
-TEST(TemporalConsistency, NothingIsComparedAcrossCuts) {
+TEST(TemporalConsistency, ComparesNothingAcrossCuts) {
   const auto jumping = [](int frame) {
     return Lab(0, 0.0, 0.0, frame < 3 ? 0.0 : frame < 20 ? 1e-9 : 30.0 * (frame - 19));
   };
@@ -120,7 +120,7 @@ TEST(TemporalConsistency, NothingIsComparedAcrossCuts) {
   EXPECT_EQ(none.cdc, 0.0);
 }
 
-TEST(TemporalConsistency, LongFilmsAreComparedInStretches) {
+TEST(TemporalConsistency, ComparesLongFilmsInStretches) {
   std::atomic<int> decoded = 0;
   const auto steady = [&](int) {
     ++decoded;
@@ -136,7 +136,7 @@ TEST(TemporalConsistency, LongFilmsAreComparedInStretches) {
                Error);
 }
 
-TEST(TemporalConsistency, PicturesTooSmallForFlowAreNotFollowed) {
+TEST(TemporalConsistency, DoesNotFollowTinyPictures) {
   const auto small = [](int) { return Image(20, 20, 1, 50.0f); };
   ThreadPool pool(1);
   CancellationToken cancel;

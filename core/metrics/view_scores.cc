@@ -11,13 +11,12 @@
 namespace color3d {
 namespace {
 
-// True L with other chroma: a colour error that a luminance error cannot hide.
+// The true L with the given chroma, so that luminance errors do not hide colour errors.
 Image UnderTrueL(const Image& true_lab, const Image& ab) {
   return JoinLab(LuminanceOfLab(true_lab), Resize(ab, true_lab.width, true_lab.height));
 }
 
-// In two steps, whatever the size of the picture: a truth that is reduced in one holds detail that
-// one reduced in two does not.
+// Always reduces in two steps, because the detail that is left depends on the number of steps.
 Image AtColorSide(const Image& image) {
   return FitWithin(FitWithin(image, kScoreSidePx), kColorSidePx);
 }
@@ -26,7 +25,7 @@ LabColor Pixel(const Image& lab, size_t i) {
   return {lab.Plane(0)[i], lab.Plane(1)[i], lab.Plane(2)[i]};
 }
 
-// Which pixels of a picture of this size count: the whole ones of `mask`. All for null.
+// Indices of the pixels of a picture of this size that lie wholly within `mask`; all if it is null.
 std::vector<size_t> Counting(const Image* mask, int width, int height) {
   std::vector<size_t> pixels;
   const Image reduced =
@@ -37,7 +36,7 @@ std::vector<size_t> Counting(const Image* mask, int width, int height) {
   return pixels;
 }
 
-// The pixels that count, in one row: what is a mean over pixels is one over these.
+// The given pixels in one row, for means over them.
 Image Gather(const Image& image, const std::vector<size_t>& pixels) {
   Image row(static_cast<int>(pixels.size()), 1, image.channels);
   for (int c = 0; c < image.channels; ++c) {
@@ -46,7 +45,7 @@ Image Gather(const Image& image, const std::vector<size_t>& pixels) {
   return row;
 }
 
-// Mean over the pixels that count, where the others show what the truth shows.
+// Mean over the given pixels. The other pixels are set to the truth.
 double MaskedSsim(const Image& drawn, const Image& truth, const std::vector<size_t>& pixels) {
   if (pixels.size() == truth.PlaneSize()) return Ssim(drawn, truth, 1.0);
   Image composed = truth;

@@ -38,7 +38,7 @@ Image Stripes(int width, float shift) {
 }
 
 // Figures of a preset that works on sharper pictures are those of the pictures at the common size.
-TEST(ScoreView, LargerPicturesAreScoredAtTheCommonSize) {
+TEST(ScoreView, ReducesLargePicturesToTheCommonSize) {
   const Image truth = LabFromSrgb(Stripes(2 * kScoreSidePx, 0.0f));
   const Image wrong = LabFromSrgb(Stripes(2 * kScoreSidePx, 0.1f));
   const Scores large = ScoreView(SrgbFromLab(truth), wrong, ChromaOfLab(wrong));
@@ -52,7 +52,7 @@ TEST(ScoreView, LargerPicturesAreScoredAtTheCommonSize) {
 }
 
 // The scores of a half are those of the cropped pictures, whatever the other half shows.
-TEST(ScoreView, OnlyWhatTheMaskLeavesCounts) {
+TEST(ScoreView, CountsUnmaskedPixelsOnly) {
   const Image truth = Stripes(96, 0.0f), drawn = LabFromSrgb(Stripes(96, 0.1f));
   Image mask(96, 72, 1), spoilt = drawn;
   const auto left = [](const Image& image) {
@@ -84,7 +84,7 @@ TEST(ScoreView, OnlyWhatTheMaskLeavesCounts) {
   EXPECT_TRUE(ScoreView(truth, drawn, ChromaOfLab(drawn), &nothing).empty());
 }
 
-TEST(SourceErrors, ConfidenceThatKnowsTheErrorsCorrelatesWithThem) {
+TEST(SourceErrors, GoodConfidenceCorrelatesWithErrors) {
   const Image truth(48, 32, 3, 0.5f);
   Image ab(48, 32, 2);
   for (int y = 0; y < 32; ++y) {
@@ -99,7 +99,7 @@ TEST(SourceErrors, ConfidenceThatKnowsTheErrorsCorrelatesWithThem) {
   EXPECT_NEAR(wrong.Result().at("confidence_rank_correlation"), 1.0, 1e-6);
 }
 
-TEST(SourceErrors, ManyViewsDoNotChangeWhatIsSaid) {
+TEST(SourceErrors, ManyViewsGiveTheSameResult) {
   const int side = 400;
   const Image truth(side, side, 3, 0.5f);
   Image ab(side, side, 2), shares(side, side, 3);

@@ -27,12 +27,12 @@ constexpr DrawColor kInk{0.13f, 0.13f, 0.14f};
 constexpr DrawColor kFaint{0.45f, 0.45f, 0.47f};
 constexpr DrawColor kChosen{0.93f, 0.55f, 0.05f};
 
-// Rows of equal cells over the sheet's width: a picture and two lines of text each.
+// Rows of equal cells, each with a picture and two lines of text.
 struct Grid {
   int columns = 1;
   int count = 0;
   int cell_px = 0;     // width
-  int picture_px = 0;  // height of the picture's place
+  int picture_px = 0;  // height of the picture area
 
   int RowHeight() const { return picture_px + 2 * kLinePx + 2 * kGapPx; }
   int Height() const { return (count + columns - 1) / columns * RowHeight(); }

@@ -34,7 +34,7 @@ constexpr size_t kPrefix = sizeof(double) + sizeof(uint64_t);
   throw Error(ErrorCode::kDataLoss, "the checkpoint of {} is damaged", stage);
 }
 
-// Seconds and the length of the CSV behind them. `bytes`: at least kPrefix.
+// Seconds and the length of the CSV. Requires: `bytes` has at least kPrefix bytes.
 std::pair<double, uint64_t> PrefixOf(std::string_view bytes, const std::string& stage) {
   double seconds = 0.0;
   uint64_t length = 0;
@@ -116,8 +116,8 @@ std::vector<CurvePoint> CurveRecorder::points() const {
   return points_;
 }
 
-// Seconds (float64), length of the CSV (uint64), CSV: before a state in memory, and behind one in a
-// file, there with its own length (uint64) last.
+// Seconds (float64), length of the CSV (uint64), CSV. Precedes a state in memory; follows a state
+// in a file, with its own length (uint64) at the end.
 std::string CurveRecorder::Facts() const {
   const double seconds = Seconds();
   const std::string csv = CurvesToCsv(points());

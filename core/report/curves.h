@@ -1,4 +1,4 @@
-// Error-against-time curves: every stage that iterates leaves (seconds, iteration, error) points.
+// Error curves over time: points (seconds, iteration, error) of the stages that iterate.
 #pragma once
 
 #include <chrono>
@@ -14,7 +14,7 @@ namespace color3d {
 
 struct CurvePoint {
   std::string stage;
-  double seconds = 0.0;  // of computing since the stage began, over all attempts
+  double seconds = 0.0;  // of computing since the start of the stage, over all attempts
   int64_t iteration = 0;
   std::string error_name;
   double value = 0.0;
@@ -22,15 +22,15 @@ struct CurvePoint {
 
 // "stage,seconds,iteration,error_name,value" with one header line.
 std::string CurvesToCsv(const std::vector<CurvePoint>& points);
-// Throws Error{kInvalidArgument} naming the line.
+// Throws Error{kInvalidArgument} with the line.
 std::vector<CurvePoint> CurvesFromCsv(std::string_view csv);
 
-// Sits between a stage and the outer observer: stamps errors with the time and keeps them. Also
-// wraps the checkpoints, so that a resumed stage's curve and clock go on where they stopped.
-// Thread-safe for OnProgress/OnError/OnWarning.
+// Observer of a stage that records its errors with their time and passes all calls on. Also wraps
+// the checkpoints, so that the curve and the clock of a resumed stage continue. OnProgress, OnError
+// and OnWarning are thread-safe.
 class CurveRecorder : public ProgressObserver, public CheckpointStore {
  public:
-  // Both references must outlive the recorder.
+  // Requires: both references outlive the recorder.
   CurveRecorder(std::string stage, ProgressObserver& outer, CheckpointStore& checkpoints);
 
   void OnProgress(int64_t step, int64_t total_steps, const std::string& message) override;
@@ -47,7 +47,7 @@ class CurveRecorder : public ProgressObserver, public CheckpointStore {
   std::vector<CurvePoint> points() const;
 
  private:
-  // What a checkpoint holds beside the stage's own state.
+  // The part of a checkpoint beside the state of the stage.
   std::string Facts() const;
   void TakeFacts(double seconds, std::string_view csv);
 

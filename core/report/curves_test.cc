@@ -52,7 +52,7 @@ TEST(CurveRecorder, ResumesPointsAndClock) {
   EXPECT_GE(points[1].seconds, points[0].seconds);
 }
 
-TEST(CurveRecorder, ResumesStatesInFilesToo) {
+TEST(CurveRecorder, ResumesStatesInFiles) {
   MemoryCheckpoints checkpoints;
   NullObserver outer;
   const ScratchFolder scratch;

@@ -1,10 +1,10 @@
-// Style and script of the report's page. For report_page.cc only.
+// Style and script of the report page. For report_page.cc only.
 #pragma once
 
 namespace color3d {
 
-// Two columns of pictures at most on a phone of 320 px; nothing is wider than the window: tables
-// and long words scroll or break inside of their own box.
+// At most two columns of pictures on a phone of 320 px. Nothing is wider than the window: tables
+// and long words scroll or break within their box.
 inline constexpr char kReportStyle[] = R"css(
 :root{color-scheme:light dark;--page:#fbfaf8;--card:#fff;--text:#1d1f21;--soft:#5b6166;--line:#dcdad5;
 --accent:#1f5fa8;--seen:#8a8f94;--inferred:#3f7fd0;--guessed:#d9821a}
@@ -63,7 +63,7 @@ white-space:pre-wrap;font-size:.875rem}
 [hidden]{display:none!important}
 )css";
 
-// The slider takes its pictures from the chapter of the views, so that each is in the file once.
+// The slider uses the pictures in the chapter of the views, so that each is in the file once.
 inline constexpr char kReportScript[] = R"js(
 (() => {
 const by = (id) => document.getElementById(id), box = by('compare');

@@ -15,7 +15,7 @@ constexpr double kRight = 12.0;
 constexpr double kTop = 28.0;
 constexpr double kBottom = 34.0;
 constexpr int kColors = 6;
-constexpr size_t kColumns = 4;  // of a figure
+constexpr size_t kColumns = 4;  // of a file
 
 std::string Format(const char* format, double value) {
   char buffer[64];
@@ -23,7 +23,7 @@ std::string Format(const char* format, double value) {
   return buffer;
 }
 
-// 1, 2 or 5 times a power of ten, giving at most about four intervals.
+// Returns 1, 2 or 5 times a power of ten, for at most about four intervals.
 double TickStep(double span) {
   const double raw = span / 4.0;
   const double power = std::pow(10.0, std::floor(std::log10(raw)));
@@ -33,7 +33,7 @@ double TickStep(double span) {
   return 10.0 * power;
 }
 
-// From seconds or values to pixels, with round ticks.
+// Maps seconds or values to pixels, with round ticks.
 class Axis {
  public:
   Axis(double low, double high, double first_px, double last_px, bool logarithmic)
@@ -80,9 +80,9 @@ class Axis {
   bool logarithmic_;
 };
 
-constexpr size_t kMaxMarkers = 12;  // lines of more points need no dots
+constexpr size_t kMaxMarkers = 12;  // lines with more points have no dots
 
-// A mark at each point, so that a line of one point is seen.
+// A dot at each point, so that a line of one point is visible.
 std::string Markers(const PlotSeries& series,
                     const std::string& color,
                     const Axis& x_axis,
@@ -98,7 +98,7 @@ std::string Markers(const PlotSeries& series,
   return svg;
 }
 
-// The legend goes where the lines do not end: errors fall to the lower right, qualities rise.
+// Places the legend away from the ends of the lines.
 bool LegendAtTop(const Plot& plot, const Axis& y_axis) {
   double sum = 0.0;
   int count = 0;
@@ -130,7 +130,7 @@ std::string Grid(const Axis& x_axis, const Axis& y_axis) {
   return svg + TextAt(kWidth - kRight, kHeight - 6, "end", "n", "seconds");
 }
 
-// The plot's elements, without the <svg> around them.
+// The elements of a plot, without the enclosing <svg>.
 std::string PlotElements(const Plot& plot) {
   const auto shown = [&](const CurvePoint& p) { return !plot.log_seconds || p.seconds > 0.0; };
   double min_x = plot.log_seconds ? 1e30 : 0.0, max_x = 0.0, min_y = 1e30, max_y = -1e30;

@@ -1,4 +1,4 @@
-// Small line plots as SVG: error against seconds.
+// Small line plots as SVG: errors over seconds. Pure functions.
 #pragma once
 
 #include <string>
@@ -8,27 +8,26 @@
 
 namespace color3d {
 
-// Lines that share a pair of axes.
+// One line of a plot.
 struct PlotSeries {
   std::string name;
-  std::vector<CurvePoint> points;  // their stage and error_name are not looked at
+  std::vector<CurvePoint> points;  // stage and error_name are ignored
 };
 struct Plot {
   std::string title;
-  std::vector<PlotSeries> series;  // at most 6 colours; a legend when there are several
-  bool log_seconds = false;        // points at 0 s are left out then
-  bool log_values = false;         // unless a value is not positive
+  std::vector<PlotSeries> series;  // in at most 6 colours, with a legend if there are several
+  bool log_seconds = false;        // leaves out points at 0 s
+  bool log_values = false;         // ignored if a value is not positive
 };
 
-// A file of its own: the plots in rows of four, with their styles.
+// A complete file: the plots in rows of four, with their styles.
 std::string FigureSvg(const std::vector<Plot>& plots);
 
-// For a page that brings the styles: one plot for each (stage, error_name) among `points`, in order
-// of first appearance; single points are no curve and are left out. Those of residuals have a
-// logarithmic axis.
+// For a page that has the styles: one plot for each (stage, error_name) of `points`, in the order
+// of first appearance. Single points are left out. Plots of residuals have a logarithmic axis.
 std::string PlotsSvg(const std::vector<CurvePoint>& points);
 
-// The five characters that HTML gives a meaning, replaced by entities.
+// Replaces the five special characters of HTML by entities.
 std::string EscapeHtml(const std::string& text);
 
 }  // namespace color3d

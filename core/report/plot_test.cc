@@ -20,7 +20,7 @@ TEST(Plot, FigureDrawsEverySeriesOnItsAxes) {
   EXPECT_EQ(std::count(first.begin(), first.end(), ','), 2);
 }
 
-TEST(Plot, ALineOfOnePointIsSeenAndTheLegendIsWhereNoLineEnds) {
+TEST(Plot, ShowsSinglePointsAndPlacesTheLegend) {
   Plot falling{"error", {{"x", {{"", 1.0, 0, "", 9.0}, {"", 9.0, 0, "", 1.0}}}, {"y", {}}}};
   falling.series[1].points = {{"", 5.0, 0, "", 2.0}};
   const std::string low = FigureSvg({falling});

@@ -43,7 +43,7 @@ ReportData WidePage() {
   return data;
 }
 
-TEST(ReportBrowserTest, FitsPhoneAndDesktopInLightAndDarkAndItsSliderMoves) {
+TEST(ReportBrowserTest, FitsPhoneAndDesktop) {
   std::string chromium;
   for (const char* name : {"chromium", "chromium-browser", "google-chrome"}) {
     if (chromium.empty() && Runs(name)) chromium = name;

@@ -61,7 +61,7 @@ std::string Dimensions(const ReportView::Picture& picture) {
          std::to_string(picture.height) + "\"";
 }
 
-// What the page shows first is inside of the slider; the script takes the others from ViewsHtml.
+// Holds the pictures shown first; the script takes the others from ViewsHtml.
 std::string SliderHtml(const std::vector<ReportView>& views) {
   const auto first = std::find_if(views.begin(), views.end(), CanBeCompared);
   if (first == views.end()) return "";
@@ -169,7 +169,7 @@ std::string SectionHtml(const ReportSection& section) {
 
 std::string Seconds(double seconds) { return seconds > 0.0 ? Number(seconds) : std::string(); }
 
-// What was left out first: that is what nobody sees elsewhere.
+// Steps left out come first: no other chapter shows them.
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
   double saved = 0.0;
   for (const PlanStep& step : plan) saved += step.needed ? 0.0 : step.estimated_seconds;

@@ -1,6 +1,5 @@
-// The report: one self-contained HTML file, at home on a phone and a desktop, light and dark.
-// Pictures and a small script are inside, nothing is fetched; without scripts only the slider does
-// not move.
+// The report: one self-contained HTML file for phones and desktops, light and dark. Pictures and a
+// small script are embedded, nothing is fetched; without scripts only the slider does not work.
 #pragma once
 
 #include <string>
@@ -18,21 +17,21 @@ struct ReportPicture {
   std::string bytes;
 };
 
-// One view as it can be compared: its render, and what to hold beside it.
+// A view with the pictures that can be compared.
 struct ReportView {
-  // `role`: "render", "gray", "truth" or "direct"; one of each at most.
+  // `role`: "render", "gray", "truth" or "direct"; at most one of each.
   struct Picture {
     std::string role;
-    std::string short_name;  // a word or two, on the picture
+    std::string short_name;  // label on the picture
     std::string caption;
     std::string bytes;
     int width = 0, height = 0;  // px
   };
-  std::string name;  // for people, e.g. "a.jpg (held out)"
+  std::string name;  // label, e.g. "a.jpg (held out)"
   std::vector<Picture> pictures;
 };
 
-// A shade of an overlay: "seen", "inferred" or "guessed".
+// Legend of a shade of an overlay: "seen", "inferred" or "guessed".
 struct ReportShade {
   std::string kind;
   std::string text;
@@ -62,7 +61,7 @@ struct ReportTable {
   std::vector<std::vector<std::string>> rows;  // the first column is a name, the others numbers
 };
 
-// A chapter of any content; what is empty is left out.
+// A chapter. Empty parts are left out.
 struct ReportSection {
   std::string title;
   std::vector<std::string> notes;  // paragraphs of plain text
@@ -78,19 +77,20 @@ struct ReportData {
   std::string summary;    // one paragraph of plain text
   std::string view_page;  // file beside the report that shows the scene in 3D; empty: none
   ReportKeyView key_view;
-  std::vector<ReportKeyView> additional_key_views;  // a chapter each behind it
+  std::vector<ReportKeyView> additional_key_views;  // a chapter each, after the key view
   std::vector<ReportSection> sections;              // between the key view and the views
-  // Those with a render and something beside it can be chosen in the slider, the first one first.
+  // The slider offers the views with a render and another picture, and starts with the first one.
   std::vector<ReportView> views;
-  std::vector<std::pair<std::string, std::string>> headline;  // a few figures, for people
+  std::vector<std::pair<std::string, std::string>>
+      headline;  // the most important metrics, in words
   std::vector<std::pair<std::string, double>> metrics;
   std::vector<CurvePoint> curves;
   std::vector<PlanStep> plan;
-  std::vector<ReportStage> stages;  // that have computed something
+  std::vector<ReportStage> stages;  // stages that ran
   std::vector<std::string> warnings;
   std::vector<std::pair<std::string, std::string>> facts;  // versions, seeds, digests, licences
   std::vector<std::string> repeat_notes;
-  std::vector<std::string> repeat;  // commands for a shell
+  std::vector<std::string> repeat;  // shell commands
 };
 
 std::string RenderReport(const ReportData& data);

@@ -21,7 +21,7 @@ TEST(Report, EscapesTextAndPlotsConstantCurves) {
   EXPECT_NE(html.find("polyline"), std::string::npos);
 }
 
-TEST(Report, SectionsShowWhatTheyHave) {
+TEST(Report, SectionsShowTheirParts) {
   ReportData data;
   data.sections.push_back(
       {"Where <colour> comes from",
@@ -41,7 +41,7 @@ TEST(Report, SectionsShowWhatTheyHave) {
   EXPECT_TRUE(html.find("<h2>Empty one</h2></section></main></body>") != std::string::npos) << html;
 }
 
-TEST(Report, SliderStartsAtTheFirstViewThatCanBeCompared) {
+TEST(Report, SliderStartsAtFirstComparableView) {
   ReportData data;
   data.views = {{"alone.jpg", {{"render", "ours", "rendered", "\xff\xd8r", 4, 3}}},
                 {"both.jpg",
@@ -55,7 +55,7 @@ TEST(Report, SliderStartsAtTheFirstViewThatCanBeCompared) {
   EXPECT_NE(html.find("<script>"), std::string::npos);
 }
 
-TEST(Report, TellsWhatWasLeftOutHowLongItTookAndHowToRepeatIt) {
+TEST(Report, ShowsPlanTimesAndCommands) {
   ReportData data;
   data.plan = {{"key_view_selection", false, "the key view was given", 1.25, -1.0, ""},
                {"luminance_geometry", true, "every scene needs it", 0.0, 14.0, ""}};
@@ -71,7 +71,7 @@ TEST(Report, TellsWhatWasLeftOutHowLongItTookAndHowToRepeatIt) {
   EXPECT_EQ(RenderReport({}).find("To repeat it"), std::string::npos);
 }
 
-TEST(Report, KeyViewSectionTellsChoiceAndColour) {
+TEST(Report, KeyViewChapterTellsChoiceAndColour) {
   ReportData data;
   data.key_view.pictures = {"a.jpg", {{"as captured", "\x89PNG"}}};
   data.key_view.notes = {"Best of 5 views, narrowly ahead of <b>."};

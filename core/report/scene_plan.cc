@@ -2,40 +2,31 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
+#include "core/catalogue/estimates.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d {
 namespace {
 
-// Rough costs measured on two cores (seconds); the report sets measured ones beside them.
-constexpr double kSecondsPerSfmPair = 0.1;
+// Measured on two cores. The report shows measured seconds beside these estimates.
 constexpr double kSecondsPerRemapMegapixel = 0.01;
 constexpr double kSecondsPerFeatureMegapixel = 0.5;
 constexpr double kFullyDynamic = 0.5;  // motion energy
 
-double SfmSeconds(const PlanFacts& f) {
-  // Planned pairs: about six a photo, or all of a small set.
-  const double pairs = std::min(f.views * (f.views - 1) / 2.0, 6.0 * f.views);
-  return 0.3 * f.views + kSecondsPerSfmPair * pairs;
-}
+constexpr char kNothingReconstructed[] = "nothing is reconstructed of a film";
 
-PlanStep Step(
-    std::string name, bool needed, std::string reason, double seconds, std::string stage = "") {
-  return {std::move(name), needed, std::move(reason), seconds, -1.0, std::move(stage)};
-}
-
-std::string WhyTime(const PlanFacts& f) {
-  if (f.is_film) return "nothing is reconstructed of a film";
-  if (!f.is_dynamic) return "all photos show one moment";
-  std::string why = fmt::format("the views show {} moments, seen by {} camera{}",
+std::string MotionReason(const PlanFacts& f) {
+  if (f.is_film) return kNothingReconstructed;
+  if (!f.is_dynamic) return "all photos show one time";
+  std::string why = fmt::format("the views show {} time steps, seen by {} camera{}",
                                 f.time_steps,
                                 f.cameras,
                                 f.cameras == 1 ? "" : "s");
   if (!f.motion) return why;
-  const std::string found = ClassOf(*f.motion);
+  const std::string found = MotionClass(*f.motion);
   if (!f.motion->moves) return why + "; " + found + ": nothing moves in their geometry";
   if (!f.motion->share) return why + "; something moves in their geometry";
   return why + fmt::format("; {}: {:.1f} % of the pixels move", found, 100.0 * *f.motion->share);
@@ -43,81 +34,103 @@ std::string WhyTime(const PlanFacts& f) {
 
 PlanStep TimeStep(const PlanFacts& f) {
   const bool needed = f.is_dynamic && !f.is_film && (!f.motion || f.motion->moves);
-  PlanStep step = Step("deformation_over_time", needed, WhyTime(f), 0.0);
-  step.motion = f.motion;
-  return step;
+  return {.step = "deformation_over_time",
+          .needed = needed,
+          .reason = MotionReason(f),
+          .motion = f.motion};
+}
+
+// Adapts the step of a stage, as the catalogue has it, to the scene.
+void Decide(const PlanFacts& f, PlanStep* step) {
+  const auto leave_out = [step](const char* reason) {
+    step->needed = false;
+    step->reason = reason;
+  };
+  if (step->stage == kind::kImportScene) {
+    step->estimated_seconds = kPosesSecondsPerPhoto * f.views;
+    if (f.has_poses) leave_out("the scene comes with camera poses");
+    if (f.is_film) leave_out("frames of a film are coloured along the optical flow");
+  } else if (step->stage == kind::kSelectKeyView) {
+    step->estimated_seconds = kSecondsPerFeatureMegapixel * f.views * f.megapixels_per_view;
+    if (!f.key_view_strategy.empty()) {
+      step->reason = "the key view is chosen by " + f.key_view_strategy;
+    }
+    if (f.key_view_given) leave_out("the key view was given");
+  } else if (step->stage == kind::kReconstructGeometry) {
+    if (f.geometry_given) leave_out("the scene's Gaussians were given");
+    if (f.is_film) leave_out(kNothingReconstructed);
+  } else if (step->stage == kind::kCarryColor) {
+    if (f.is_film) step->reason = "colours are carried along the optical flow";
+  } else if (step->stage == kind::kGenerateAugmentations) {
+    if (!f.has_augmentations) leave_out("the colorizer learns from the key views alone");
+  } else if (step->stage == kind::kCorrectColors) {
+    if (!f.has_corrections) leave_out("nothing is to be corrected");
+  } else if (step->stage == kind::kSolveChroma || step->stage == kind::kExport) {
+    if (f.is_film) leave_out(kNothingReconstructed);
+  } else if (step->stage == kind::kRender) {
+    if (f.is_film) step->reason = "the coloured frames become a film";
+  } else if (step->stage == kind::kEvaluate) {
+    step->reason = f.has_truth
+                       ? "true colours of held-out views were given"
+                       : "no true colours were given: the views are compared with each other only";
+  }
+}
+
+// Parts of the stage that may be left out.
+void AddParts(const PlanFacts& f, const std::string& stage, std::vector<PlanStep>* plan) {
+  const auto add = [plan](const char* step, bool needed, const char* reason, double seconds = 0.0) {
+    plan->push_back(
+        {.step = step, .needed = needed, .reason = reason, .estimated_seconds = seconds});
+  };
+  if (stage == kind::kImportScene) {
+    add("undistortion",
+        f.has_distortion,
+        f.has_distortion ? "the cameras have lens distortion" : "no camera has lens distortion",
+        kSecondsPerRemapMegapixel * f.views * f.megapixels_per_view);
+    add("random_points",
+        !f.has_sparse_points && !f.is_film,
+        f.is_film             ? kNothingReconstructed
+        : f.has_sparse_points ? "the scene has sparse points to start from"
+                              : "the scene has no sparse points to start from",
+        0.1);
+  } else if (stage == kind::kReconstructGeometry) {
+    add("warm_up_in_three_channels",
+        false,
+        "three equal luminance channels are one channel: one is rasterised");
+    plan->push_back(TimeStep(f));
+  } else if (stage == kind::kSolveChroma) {
+    add("view_dependent_chroma",
+        false,
+        "chroma hardly depends on the direction: degree 0 suffices unless another is asked for");
+  }
 }
 
 }  // namespace
 
-std::string ClassOf(const SceneMotion& motion) {
+std::string MotionClass(const SceneMotion& motion) {
   if (!motion.moves) return "static";
   if (!motion.share) return "";
   return *motion.share < kFullyDynamic ? "partly dynamic" : "fully dynamic";
 }
 
 std::vector<PlanStep> PlanScene(const PlanFacts& f) {
-  const double megapixels = f.views * f.megapixels_per_view;
   std::vector<PlanStep> plan;
-  plan.push_back(Step("structure_from_motion",
-                      !f.has_poses && !f.is_film,
-                      f.is_film     ? "frames of a film are coloured by motion"
-                      : f.has_poses ? "the scene comes with camera poses"
-                                    : "the photos come without camera poses",
-                      SfmSeconds(f),
-                      kind::kImportScene));
-  plan.push_back(
-      Step("undistortion",
-           f.has_distortion,
-           f.has_distortion ? "the cameras have lens distortion" : "no camera has lens distortion",
-           kSecondsPerRemapMegapixel * megapixels));
-  plan.push_back(Step("random_points",
-                      !f.has_sparse_points && !f.is_film,
-                      f.is_film             ? "nothing is reconstructed of a film"
-                      : f.has_sparse_points ? "the scene has sparse points to start from"
-                                            : "the scene has no sparse points to start from",
-                      0.1));
-  plan.push_back(Step(
-      "key_view_selection",
-      !f.key_view_given,
-      f.key_view_given ? "the key view was given" : "the key view is chosen by feature coverage",
-      kSecondsPerFeatureMegapixel * megapixels,
-      kind::kSelectKeyView));
-  plan.push_back(Step("luminance_geometry",
-                      !f.geometry_given && !f.is_film,
-                      f.is_film          ? "nothing is reconstructed of a film"
-                      : f.geometry_given ? "the scene's Gaussians were given"
-                                         : "every scene needs geometry",
-                      0.0,
-                      kind::kReconstructGeometry));
-  plan.push_back(Step("personalization",
-                      true,
-                      "the key view's colours must reach every view",
-                      0.0,
-                      kind::kPersonalize));
-  plan.push_back(Step("chroma",
-                      !f.is_film,
-                      f.is_film ? "nothing is reconstructed of a film"
-                                : "a and b are fitted on the finished geometry",
-                      0.0,
-                      kind::kSolveChroma));
-  plan.push_back(Step("warm_up_in_three_channels",
-                      false,
-                      "three identical luminance channels are one channel: one is rasterised",
-                      0.0));
-  plan.push_back(Step("view_dependent_chroma",
-                      false,
-                      "chroma is low-frequency in angle: degree 0 suffices unless asked for",
-                      0.0));
-  plan.push_back(TimeStep(f));
-  plan.push_back(
-      Step("evaluation",
-           true,
-           f.has_truth ? "true colours of held-out views were given"
-                       : "no true colours were given: the views are compared with each other only",
-           0.0,
-           kind::kEvaluate));
+  for (const Stage& stage : StageCatalogue()) {
+    if (stage.step == nullptr) continue;
+    PlanStep step{.step = stage.step, .reason = stage.purpose, .stage = stage.kind};
+    Decide(f, &step);
+    plan.push_back(std::move(step));
+    AddParts(f, stage.kind, &plan);
+  }
   return plan;
+}
+
+void SkipStep(const std::string& stage, const std::string& reason, std::vector<PlanStep>* plan) {
+  for (PlanStep& step : *plan) {
+    if (step.stage != stage) continue;
+    step.needed = false;
+    step.reason = reason;
+  }
 }
 
 std::string PlanToJson(const std::vector<PlanStep>& steps) {
@@ -128,7 +141,7 @@ std::string PlanToJson(const std::vector<PlanStep>& steps) {
                                  {"reason", s.reason},
                                  {"estimated_seconds", s.estimated_seconds}};
     if (s.measured_seconds >= 0.0) entry["measured_seconds"] = s.measured_seconds;
-    if (s.motion && !ClassOf(*s.motion).empty()) entry["motion"] = ClassOf(*s.motion);
+    if (s.motion && !MotionClass(*s.motion).empty()) entry["motion"] = MotionClass(*s.motion);
     if (s.motion && s.motion->share) entry["moving_share"] = *s.motion->share;
     array.push_back(std::move(entry));
   }

@@ -1,5 +1,5 @@
-// The scene plan: every step of the method, needed or left out, with the reason and the cost. Made
-// before work starts, completed with measured seconds afterwards.
+// The plan of a scene: every step of the method, needed or left out, with reason and cost. Pure
+// functions and values.
 #pragma once
 
 #include <optional>
@@ -8,29 +8,26 @@
 
 namespace color3d {
 
-// What the geometry of a scene with times and poses has found.
+// Motion that the geometry stage found in a scene with times and poses.
 struct SceneMotion {
-  bool moves = false;           // else it was reconstructed as one that stands still
-  std::optional<double> share;  // the motion energy: of all pixels, those that move, 0..1
+  bool moves = false;           // false: reconstructed as a static scene
+  std::optional<double> share;  // motion energy: share of the pixels that move, 0..1
 };
-// "static", "partly dynamic" or, where half of the pixels move, "fully dynamic"; empty where
-// something moves and nobody has measured how much.
-std::string ClassOf(const SceneMotion& motion);
+// "static", "partly dynamic" or, if half of the pixels move, "fully dynamic"; empty if something
+// moves and the share was not measured.
+std::string MotionClass(const SceneMotion& motion);
 
 struct PlanStep {
   std::string step;  // e.g. "structure_from_motion"
   bool needed = true;
-  std::string reason;  // one sentence
-  // On this machine's threads; of a step that is left out: what that saves.
-  double estimated_seconds = 0.0;
+  std::string reason;              // one sentence
+  double estimated_seconds = 0.0;  // on two cores; for steps that are left out, the time saved
   double measured_seconds = -1.0;  // < 0: not run, or not measured on its own
-  // Kind of the stage whose time the step takes; empty when it is only a part of one. Not in the
-  // file.
+  // Kind of the stage that the step is; empty if it is a part of one. Not in the file.
   std::string stage = {};
-  std::optional<SceneMotion> motion = {};  // that `needed` goes by
+  std::optional<SceneMotion> motion = {};  // that decides on `needed`
 };
 
-// What the plan depends on.
 struct PlanFacts {
   bool has_poses = false;
   bool has_distortion = false;
@@ -38,16 +35,24 @@ struct PlanFacts {
   bool geometry_given = false;             // the scene is a splat
   bool is_film = false;                    // frames without poses: nothing is reconstructed
   bool is_dynamic = false;                 // several times with poses
-  int time_steps = 0;                      // of a dynamic scene
-  int cameras = 0;                         // of a dynamic scene
-  std::optional<SceneMotion> motion = {};  // of a dynamic scene, once there is geometry
+  int time_steps = 0;                      // dynamic scenes only
+  int cameras = 0;                         // dynamic scenes only
+  std::optional<SceneMotion> motion = {};  // dynamic scenes only, once there is geometry
   bool has_truth = false;
+  bool has_augmentations = false;
+  bool has_corrections = false;
   bool key_view_given = false;
+  std::string key_view_strategy = {};  // in words, e.g. "feature coverage"; empty: unknown
   int views = 0;
   double megapixels_per_view = 0.0;  // at working size
 };
 
+// In the order of the pipeline; every stage of core/catalogue/stages.h is a step, but not the kinds
+// that are graphs of others.
 std::vector<PlanStep> PlanScene(const PlanFacts& facts);
+
+// Leaves out the step of a stage that the planner skipped.
+void SkipStep(const std::string& stage, const std::string& reason, std::vector<PlanStep>* plan);
 
 std::string PlanToJson(const std::vector<PlanStep>& steps);
 

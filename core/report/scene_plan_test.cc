@@ -2,12 +2,16 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+
+#include "core/catalogue/estimates.h"
+#include "core/catalogue/stages.h"
 
 namespace color3d {
 namespace {
 
-TEST(ScenePlan, LeavesOutWhatTheSceneDoesNotNeed) {
+TEST(ScenePlan, LeavesOutStepsThatAreNotNeeded) {
   PlanFacts facts;
   facts.has_poses = true;
   facts.views = 20;
@@ -30,6 +34,51 @@ TEST(ScenePlan, LeavesOutWhatTheSceneDoesNotNeed) {
   EXPECT_TRUE(PlanScene(facts)[0].needed);
 }
 
+TEST(ScenePlan, EveryStageIsAStep) {
+  const auto plan = PlanScene({});
+  for (const Stage& stage : StageCatalogue()) {
+    const std::string kind = stage.kind;
+    if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
+    EXPECT_EQ(
+        std::count_if(
+            plan.begin(), plan.end(), [&](const PlanStep& step) { return step.stage == kind; }),
+        1)
+        << kind;
+  }
+}
+
+TEST(ScenePlan, NamesTheStrategyOfTheKeyView) {
+  const auto selection = [](const PlanFacts& facts) {
+    for (const PlanStep& step : PlanScene(facts)) {
+      if (step.step == "key_view_selection") return step;
+    }
+    return PlanStep{};
+  };
+  const PlanStep step = selection({.key_view_strategy = "the entropy of its similarities"});
+  EXPECT_TRUE(step.needed);
+  EXPECT_EQ(step.reason, "the key view is chosen by the entropy of its similarities");
+  EXPECT_EQ(selection({}).reason, "the key view is chosen among the views");
+  EXPECT_FALSE(selection({.key_view_given = true}).needed);
+}
+
+TEST(ScenePlan, PosesCostWhatTheTimeBudgetAllows) {
+  const auto plan = PlanScene({.views = 50});
+  EXPECT_EQ(plan[0].step, "structure_from_motion");
+  EXPECT_DOUBLE_EQ(plan[0].estimated_seconds, 50 * kPosesSecondsPerPhoto);
+}
+
+TEST(ScenePlan, SkippedStagesAreLeftOut) {
+  auto plan = PlanScene({});
+  const size_t steps = plan.size();
+  SkipStep(kind::kCarryColor, "carry_color.skip is set", &plan);
+  EXPECT_EQ(plan.size(), steps);
+  for (const PlanStep& step : plan) {
+    if (step.stage != kind::kCarryColor) continue;
+    EXPECT_FALSE(step.needed);
+    EXPECT_EQ(step.reason, "carry_color.skip is set");
+  }
+}
+
 TEST(ScenePlan, TellsOfTime) {
   const auto told = [](const PlanFacts& facts) {
     for (const PlanStep& step : PlanScene(facts)) {
@@ -40,11 +89,11 @@ TEST(ScenePlan, TellsOfTime) {
   EXPECT_FALSE(told({}).needed);
   const PlanStep step = told({.is_dynamic = true, .time_steps = 25, .cameras = 4});
   EXPECT_TRUE(step.needed);
-  EXPECT_EQ(step.reason, "the views show 25 moments, seen by 4 cameras");
+  EXPECT_EQ(step.reason, "the views show 25 time steps, seen by 4 cameras");
   EXPECT_FALSE(told({.is_film = true, .is_dynamic = true}).needed);
 }
 
-TEST(ScenePlan, TellsWhatTheGeometryHasDecided) {
+TEST(ScenePlan, TellsTheMotionThatGeometryFound) {
   const auto told = [](const SceneMotion& motion) {
     for (auto& step : nlohmann::json::parse(PlanToJson(
              PlanScene({.is_dynamic = true, .time_steps = 9, .cameras = 1, .motion = motion})))) {
@@ -56,13 +105,15 @@ TEST(ScenePlan, TellsWhatTheGeometryHasDecided) {
   EXPECT_EQ(still.at("needed"), false);
   EXPECT_EQ(still.at("motion"), "static");
   EXPECT_EQ(still.at("moving_share"), 0.001);
-  EXPECT_EQ(still.at("reason"),
-            "the views show 9 moments, seen by 1 camera; static: nothing moves in their geometry");
+  EXPECT_EQ(
+      still.at("reason"),
+      "the views show 9 time steps, seen by 1 camera; static: nothing moves in their geometry");
   const auto partly = told({true, 0.031});
   EXPECT_EQ(partly.at("needed"), true);
   EXPECT_EQ(partly.at("motion"), "partly dynamic");
-  EXPECT_EQ(partly.at("reason"),
-            "the views show 9 moments, seen by 1 camera; partly dynamic: 3.1 % of the pixels move");
+  EXPECT_EQ(
+      partly.at("reason"),
+      "the views show 9 time steps, seen by 1 camera; partly dynamic: 3.1 % of the pixels move");
   EXPECT_EQ(told({true, 0.5}).at("motion"), "fully dynamic");
   const auto unmeasured = told({true, {}});
   EXPECT_EQ(unmeasured.at("needed"), true);

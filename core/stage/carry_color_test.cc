@@ -1,4 +1,4 @@
-// The stage carry_color on a painted wall whose geometry is known, and what comes of it.
+// The stage carry_color on a painted wall of known geometry, and ViewPositions.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -100,7 +100,7 @@ class CarryStageTest : public StageTest {
   CarryColorOptions options_;
 };
 
-TEST_F(CarryStageTest, EveryViewGetsWhatTheKeyViewShowsOfIt) {
+TEST_F(CarryStageTest, CarriesKeyViewIntoEveryView) {
   const nlohmann::json facts = Run();
   // Neighbours share about 74 % of the key view's width, the next ones 48 % and 22 %.
   const double expected[] = {0.74, 1.0, 0.74, 0.48, 0.22};
@@ -121,7 +121,7 @@ TEST_F(CarryStageTest, EveryViewGetsWhatTheKeyViewShowsOfIt) {
   EXPECT_EQ(observer_.text, "");
 }
 
-TEST_F(CarryStageTest, AFilmOfWhatStandsStillIsCarriedAsPhotosAre) {
+TEST_F(CarryStageTest, CarriesStaticFilmLikePhotos) {
   Run();
   std::vector<Image> of_photos;
   for (int i = 0; i < 5; ++i) of_photos.push_back(Carried(i).ab);
@@ -131,7 +131,7 @@ TEST_F(CarryStageTest, AFilmOfWhatStandsStillIsCarriedAsPhotosAre) {
   for (int i = 0; i < 5; ++i) EXPECT_EQ(Carried(i).ab.data, of_photos[i].data) << i;
 }
 
-TEST_F(CarryStageTest, NothingIsCarriedFromOrToWhatIsMaskedOut) {
+TEST_F(CarryStageTest, CarriesNothingFromOrToMaskedPixels) {
   Image mask(kWidth, kHeight, 1, 1.0f);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth / 2; ++x) mask.At(0, y, x) = 0.0f;
@@ -155,12 +155,12 @@ TEST_F(CarryStageTest, NothingIsCarriedFromOrToWhatIsMaskedOut) {
   EXPECT_GT(carried_of_half(Carried(1), kWidth / 2), 0.9);
   EXPECT_LT(carried_of_half(Carried(2), 0), 1e-6) << "to it";
   EXPECT_NEAR(carried_of_half(Carried(2), kWidth / 2), right_of_next, 0.02);
-  // What the photo before the key view shows of it is mostly the masked half.
+  // The first photo overlaps mostly with the masked half of the key view.
   EXPECT_LT(carried_of_half(Carried(0), kWidth / 2), 0.6) << "from it";
 }
 
 TEST_F(CarryStageTest, AdditionalKeyViewFillsWhatIsOpen) {
-  // A second key view in another colour: only what the first does not show may be its.
+  // A second key view in another colour: it may colour only what the first one does not show.
   Image other = truth_[4];
   for (size_t i = 0; i < other.PlaneSize(); ++i) {
     other.Plane(1)[i] = -20.0f;
@@ -195,7 +195,7 @@ TEST_F(CarryStageTest, RefusesUnfitAdditionalKeyViews) {
   EXPECT_THAT(Complaint(), HasSubstr("at most 16"));
 }
 
-TEST_F(CarryStageTest, AKeyViewThatShowsNothingOfTheOthersIsSaid) {
+TEST_F(CarryStageTest, WarnsWhenKeyViewOverlapsWithNoOther) {
   scene_.views[1].cam_from_world.translation = {40.0, 0.0, 0.0};
   AddInput(artifact::kScene, SceneToJson(scene_));
   const nlohmann::json facts = Run();
@@ -203,14 +203,14 @@ TEST_F(CarryStageTest, AKeyViewThatShowsNothingOfTheOthersIsSaid) {
   EXPECT_THAT(observer_.text, HasSubstr("0.0 % of what the other views show"));
 }
 
-TEST_F(CarryStageTest, TheSameBytesAgain) {
+TEST_F(CarryStageTest, GivesTheSameBytesAgain) {
   Run();
   const std::string first = ReadFile(scratch_.path() / "out" / "carried/p2.png");
   Run();
   EXPECT_EQ(first, ReadFile(scratch_.path() / "out" / "carried/p2.png"));
 }
 
-// Keeps every state that it is given; the worker loses its lease at the third.
+// Keeps every state that is saved, and loses the lease at the third.
 class Dying : public CheckpointStore {
  public:
   std::optional<std::string> Load() override {
@@ -224,7 +224,7 @@ class Dying : public CheckpointStore {
   std::vector<std::string> states;
 };
 
-TEST_F(CarryStageTest, AnotherWorkerGoesOnAndGivesTheSame) {
+TEST_F(CarryStageTest, ResumesWithTheSameResult) {
   const nlohmann::json facts = Run();
   std::vector<std::string> files;
   const auto file = [&](int i) {
@@ -242,7 +242,7 @@ TEST_F(CarryStageTest, AnotherWorkerGoesOnAndGivesTheSame) {
   for (int i = 0; i < 5; ++i) EXPECT_EQ(ReadFile(file(i)), files[i]) << i;
 }
 
-TEST_F(CarryStageTest, ADamagedCheckpointIsSaidAndIgnored) {
+TEST_F(CarryStageTest, IgnoresDamagedCheckpointWithWarning) {
   const nlohmann::json facts = Run();
   // No CBOR; a view whose value is a number; nothing at all.
   for (const char* state : {"nonsense", "\xa1\x66p2.png\x01", ""}) {
@@ -255,8 +255,7 @@ TEST_F(CarryStageTest, ADamagedCheckpointIsSaidAndIgnored) {
   }
 }
 
-// The wall is a plane: the same place of it has the same position in all views, and half a picture
-// further is as far in units of the median distance of the Gaussians.
+// A place on the wall has the same position in all views.
 TEST_F(CarryStageTest, PositionsAgreeBetweenViews) {
   const StageContext context = MakeContext();
   const ViewPositions positions(scene_, context);
@@ -281,7 +280,7 @@ TEST_F(CarryStageTest, PositionsAgreeBetweenViews) {
   // Columns of Gaussians reach from -3.6 to 8.4, rows from -2.4 to 2.4: bounded, and not small.
   EXPECT_GT(std::abs(first.At(0, 48, 100) - first.At(0, 48, 10)), 0.3f);
   for (float value : first.data) EXPECT_LE(std::abs(value), 3.0f);
-  // Where the photo shows something else.
+  // A photo that shows something else in its left half.
   Image other = shown(1);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth / 2; ++x) other.At(0, y, x) += 40.0f;
@@ -297,7 +296,7 @@ TEST_F(CarryStageTest, PositionsAgreeBetweenViews) {
   EXPECT_EQ(half.At(3, kHeight / 2, 3 * kWidth / 4), 1.0f);
 }
 
-TEST_F(CarryStageTest, WithoutGeometryNoPositionIsKnown) {
+TEST_F(CarryStageTest, PositionsAreUnknownWithoutGeometry) {
   inputs_.erase(artifact::kGeometry);
   const StageContext context = MakeContext();
   EXPECT_TRUE(ViewPositions(scene_, context)

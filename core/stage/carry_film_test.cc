@@ -1,4 +1,4 @@
-// The stage carry_color on a film: what it leaves, and that it goes on where it was interrupted.
+// The stage carry_color on a film: results, resuming and returning shots.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kWidth = 96, kHeight = 64, kFrames = 12, kKey = 5;
 
-// Told each frame; cancels the work at one of them.
+// Cancels the work at one of the frames.
 class FrameCounter : public NullObserver {
  public:
   void OnProgress(int64_t step, int64_t total, const std::string&) override {
@@ -88,7 +88,7 @@ class CarryFilmTest : public StageTest {
   int threads_ = 1;
 };
 
-TEST_F(CarryFilmTest, AnotherWorkerGoesOnAndGivesTheSame) {
+TEST_F(CarryFilmTest, ResumesWithTheSameResult) {
   const nlohmann::json facts = Run();
   EXPECT_GT(facts.at("coverage"), 0.5);
   const std::vector<std::string> files = Carried();
@@ -112,7 +112,7 @@ TEST_F(CarryFilmTest, AnotherWorkerGoesOnAndGivesTheSame) {
   }
 }
 
-TEST_F(CarryFilmTest, ACheckpointOfAnotherFilmIsNotTakenUp) {
+TEST_F(CarryFilmTest, IgnoresCheckpointOfOtherFilm) {
   const nlohmann::json facts = Run();
   DyingCheckpoints store;
   store.states = {"carry 3\nand then nonsense"};
@@ -120,7 +120,7 @@ TEST_F(CarryFilmTest, ACheckpointOfAnotherFilmIsNotTakenUp) {
   EXPECT_EQ(Run(), facts);
 }
 
-TEST_F(CarryFilmTest, CancelStopsBeforeTheNextFrame) {
+TEST_F(CarryFilmTest, StopsBeforeNextFrameWhenCancelled) {
   frames_.cancel = &cancel_;
   frames_.cancel_at = 3;
   try {
@@ -132,7 +132,7 @@ TEST_F(CarryFilmTest, CancelStopsBeforeTheNextFrame) {
   EXPECT_EQ(frames_.steps.back(), 3);
 }
 
-// There, elsewhere, and back again.
+// A place, another place, and the first one again.
 class ReturningShotTest : public StageTest {
  protected:
   static constexpr int kSideX = 176, kSideY = 132;
@@ -164,7 +164,7 @@ class ReturningShotTest : public StageTest {
   Scene scene_;
 };
 
-TEST_F(ReturningShotTest, TakesTheColorsOfTheShotThatItReturnsTo) {
+TEST_F(ReturningShotTest, TakesColorsOfTheFirstShot) {
   const std::string facts = Run();
   EXPECT_EQ(nlohmann::json::parse(facts).at("key_views"), nlohmann::json({"f101.png"}));
   std::vector<std::string> files;

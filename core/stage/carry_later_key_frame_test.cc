@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kWidth = 96, kHeight = 72, kFrames = 16;
 
-// A camera pans over a wall: red on the left, green on the right of the film's first frame.
+// A pan along a wall, red on the left and green on the right of the first frame.
 Image LabOf(int frame) {
   Image lab(kWidth, kHeight, 3);
   for (int y = 0; y < kHeight; ++y) {
@@ -54,7 +54,7 @@ class AdditionalKeyFrameTest : public StageTest {
     std::copy_n(truth.Plane(1), ab.data.size(), ab.data.begin());
     AddInput(artifact::kKeyColor, EncodeAbPng(ab));
   }
-  // All frames' files.
+  // Carries, and returns the files of all frames.
   std::vector<std::string> Run(const CarryColorOptions& options) {
     StageContext context = MakeContext();
     RunCarryColor(options, context);
@@ -65,7 +65,7 @@ class AdditionalKeyFrameTest : public StageTest {
     }
     return files;
   }
-  // The frame in one other colour, of which the columns from `begin` to `end` are painted.
+  // Adds a key view that is painted in one other colour in the columns from `begin` to `end`.
   std::string AddPainted(int view, int begin, int end) {
     Image lab = LabOf(view);
     std::fill_n(lab.Plane(1), lab.PlaneSize(), -25.0f);

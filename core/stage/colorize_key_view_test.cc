@@ -12,7 +12,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, KeyColourKeepsTheCapturedLuminanceAndTheGivenChroma) {
+TEST_F(StageTest, KeepsCapturedLuminanceAndGivenChroma) {
   const Scene scene = RampScene(scratch_.path(), 48, 32);
   AddInput(artifact::kScene, SceneToJson(scene));
   AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
@@ -36,7 +36,7 @@ TEST_F(StageTest, KeyColourKeepsTheCapturedLuminanceAndTheGivenChroma) {
   EXPECT_NEAR(map.ab.At(1, 16, 24), -6.0f, 0.1f);
 }
 
-TEST_F(StageTest, WhatIsTransparentInThePictureIsNotKnown) {
+TEST_F(StageTest, TransparentPixelsHaveNoConfidence) {
   AddInput(artifact::kScene, SceneToJson(RampScene(scratch_.path(), 48, 32)));
   AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
   const Image luminance = LuminanceFromSrgb(ReadImage(scratch_.path() / "p1.png"));
@@ -58,7 +58,7 @@ TEST_F(StageTest, WhatIsTransparentInThePictureIsNotKnown) {
   EXPECT_NEAR(facts.at("painted").get<double>(), 0.5, 1e-6);
 }
 
-// Sepia, and brighter than what it was sent.
+// Returns the picture in sepia, and brighter.
 class SepiaBackend : public RemoteColorizer {
  public:
   RemoteInfo GetInfo(ProgressObserver&, const CancellationToken&) override {
@@ -73,7 +73,7 @@ class SepiaBackend : public RemoteColorizer {
   }
 };
 
-TEST_F(StageTest, TheBackendsFactsAndWarningsReachTheUser) {
+TEST_F(StageTest, PassesOnFactsAndWarningsOfBackend) {
   AddInput(artifact::kScene, SceneToJson(RampScene(scratch_.path(), 48, 32)));
   AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
   remote_ = [](const std::string& name) {
@@ -97,7 +97,7 @@ TEST_F(StageTest, TheBackendsFactsAndWarningsReachTheUser) {
       << "the photo's own luminance was not put back";
 }
 
-TEST_F(StageTest, EverySourceOfKeyColourHasItsPlaceInTheTable) {
+TEST_F(StageTest, EverySourceOfKeyColorHasARow) {
   using Source = ColorizeKeyViewOptions::Source;
   for (int i = 0; i <= static_cast<int>(Source::kEdit); ++i) {
     EXPECT_NE(std::string(KeyColorSourceName(static_cast<Source>(i))), "") << i;

@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "core/catalogue/metrics.h"
 #include "core/catalogue/stages.h"
 #include "core/image/codec.h"
 #include "core/report/curves.h"
@@ -13,6 +14,7 @@
 #include "core/report/scene_plan.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/key_view_ranking.h"
 #include "core/stage/report/color_sections.h"
 #include "core/stage/report/key_view_section.h"
 #include "core/stage/report/repeat_section.h"
@@ -26,24 +28,32 @@ using nlohmann::ordered_json;
 
 constexpr int kReportSidePx = 540;
 
-// A picture for the page: small enough to embed many.
+// A picture for the page, small enough to embed many.
 ReportPicture Picture(const StageContext& context, const std::string& name, std::string caption) {
   const Image image = DecodeImage(context.ReadInput(name), name);
   return {std::move(caption), EncodeJpeg(FitWithin(image, kReportSidePx), 88)};
 }
 
-// The means by how views are held out, where that is more than one way.
+std::vector<std::string> KeysInOrder(const ordered_json& object) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : object.items()) keys.push_back(key);
+  return InMetricOrder(std::move(keys));
+}
+
+// The means for each way in which views are held out, if there are several.
 void AddByHeldOut(const ordered_json& scores, ordered_json* metrics) {
   if (!scores.contains("held_out") || scores.at("held_out").size() < 2) return;
   for (const auto& [how, means] : scores.at("held_out").items()) {
-    for (const char* name :
-         {"views", "psnr_rgb", "psnr_l", "delta_e00_chroma", "delta_e00_chroma_2d"}) {
-      if (means.contains(name)) (*metrics)[fmt::format("{}_{}", name, how)] = means.at(name);
+    (*metrics)[fmt::format("views_{}", how)] = means.at("views");
+    for (const std::string& key : KeysInOrder(means)) {
+      const Metric* metric = FindMetric(key).metric;
+      if (key == "views" || (metric != nullptr && !metric->by_held_out)) continue;
+      (*metrics)[fmt::format("{}_{}", key, how)] = means.at(key);
     }
   }
 }
 
-// Keys in the order in which people read them.
+// metrics.json, in the order in which it is read.
 ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
                             const std::vector<std::string>& keys,
                             const std::optional<NextKeyViewFacts>& next,
@@ -54,22 +64,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
   if (context.HasInput(artifact::kScores)) {
     const auto scores = ReadJson(context, artifact::kScores);
     const auto& mean = scores.at("mean");
-    for (const char* name : {"psnr_rgb",
-                             "ssim_rgb",
-                             "psnr_l",
-                             "ab_rmse",
-                             "delta_e00",
-                             "delta_e00_chroma",
-                             "delta_e00_chroma_2d",
-                             "delta_e00_chroma_bound",
-                             "delta_e00_gray",
-                             "colorfulness",
-                             "colorfulness_truth",
-                             "colorfulness_ratio",
-                             "colorfulness_ratio_2d",
-                             "colorfulness_ratio_bound"}) {
-      if (mean.contains(name)) metrics[name] = mean.at(name);
-    }
+    for (const std::string& key : KeysInOrder(mean)) metrics[key] = mean.at(key);
     AddByHeldOut(scores, &metrics);
   }
   metrics["key_views"] = keys;
@@ -91,7 +86,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
     const size_t count = ParseGaussians(context.ReadInput(artifact::kModel)).size();
     if (count > 0) metrics["gaussians"] = count;
   }
-  if (motion && !ClassOf(*motion).empty()) metrics["motion"] = ClassOf(*motion);
+  if (motion && !MotionClass(*motion).empty()) metrics["motion"] = MotionClass(*motion);
   if (motion && motion->share) metrics["moving_share"] = *motion->share;
   double total = 0.0;
   int64_t peak = 0;
@@ -103,7 +98,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
   for (const StageSummary& s : stages) {
     if (s.state != "SUCCEEDED") continue;
     const std::string name = "seconds_" + s.kind;
-    metrics[name] = metrics.value(name, 0.0) + s.seconds;  // several key views are jobs of one kind
+    metrics[name] = metrics.value(name, 0.0) + s.seconds;  // key views are several jobs of one kind
   }
   if (peak > 0) metrics["peak_memory_bytes"] = peak;
   return metrics;
@@ -118,7 +113,7 @@ std::vector<CurvePoint> CollectCurves(const StageContext& context) {
   return curves;
 }
 
-// Nothing of photos, nor before there is geometry.
+// nullopt for photos, and without geometry.
 std::optional<SceneMotion> MotionOf(const Scene& scene,
                                     const std::vector<CurvePoint>& curves,
                                     const StageContext& context) {
@@ -134,20 +129,22 @@ std::optional<SceneMotion> MotionOf(const Scene& scene,
   return motion;
 }
 
+// Negative if no stage of the kind has run.
 double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kind) {
+  double seconds = -1.0;
   for (const StageSummary& s : stages) {
-    if (s.kind == kind && s.state == "SUCCEEDED") return s.seconds;
+    if (s.kind == kind && s.state == "SUCCEEDED") seconds = std::max(seconds, 0.0) + s.seconds;
   }
-  return -1.0;
+  return seconds;
 }
 
-std::string OfMotion(const FilmFindings& film, const Scene& scene) {
-  std::string text = scene.relief       ? "the camera stands still, which tells no depth"
+std::string DescribeMotion(const FilmFindings& film, const Scene& scene) {
+  std::string text = scene.relief       ? "the camera stands still, so that depth is unknown"
                      : film.poses_found ? fmt::format("{} frames have poses", film.frames_placed)
                      : film.camera_stands_still ? "the camera stands still"
                                                 : "no poses were found";
   if (film.motion_energy >= 0.0) {
-    text += fmt::format("; {:.1f} % of the picture moves on its own", 100.0 * film.motion_energy);
+    text += fmt::format("; {:.1f} % of the picture is moving objects", 100.0 * film.motion_energy);
   }
   return text;
 }
@@ -170,7 +167,8 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
                                   const std::optional<SceneMotion>& motion,
                                   bool has_truth,
                                   const StageContext& context) {
-  if (!context.HasInput(artifact::kImportFacts)) return {};  // nobody knows what was planned
+  if (!context.HasInput(artifact::kImportFacts))
+    return {};  // the facts that the plan depends on are unknown
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
   PlanFacts plan_facts;
   plan_facts.is_film = IsColoredAsFilm(context, scene);
@@ -181,12 +179,20 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
   plan_facts.has_distortion = facts.undistorted;
   plan_facts.has_sparse_points = !facts.random_points;
   plan_facts.has_truth = has_truth;
-  plan_facts.key_view_given = context.HasInput(artifact::kKeyView) &&
-                              ReadJson(context, artifact::kKeyView).at("strategy") == "manual";
+  plan_facts.has_augmentations = context.HasInput(artifact::kAugmentationFacts);
+  plan_facts.has_corrections = context.HasInput(artifact::kCorrections);
+  if (context.HasInput(artifact::kKeyView)) {
+    const std::string strategy = ReadJson(context, artifact::kKeyView).at("strategy");
+    plan_facts.key_view_given = strategy == "manual";
+    plan_facts.key_view_strategy = StrategyInWords(strategy);
+  }
   plan_facts.views = static_cast<int>(scene.views.size());
   const Camera camera = scene.views.at(0).camera.FitWithin(kReportSidePx);
   plan_facts.megapixels_per_view = 1e-6 * camera.width * camera.height;
   std::vector<PlanStep> plan = PlanScene(plan_facts);
+  for (const StageSummary& s : stages) {
+    if (s.state == "SKIPPED") SkipStep(s.kind, s.skip_reason, &plan);
+  }
   for (PlanStep& step : plan) {
     if (step.needed && !step.stage.empty()) step.measured_seconds = SecondsOf(stages, step.stage);
   }
@@ -196,7 +202,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     }
   };
   add_reason(kind::kImportScene, facts.sfm_plan);
-  if (facts.film) add_reason(kind::kImportScene, OfMotion(*facts.film, scene));
+  if (facts.film) add_reason(kind::kImportScene, DescribeMotion(*facts.film, scene));
   if (scene.relief) {
     add_reason(kind::kReconstructGeometry,
                "2.5D: depth is assumed, ground in front of an upright backdrop");
@@ -213,11 +219,6 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
                       .reason = left_out.at("reason")});
     }
   }
-  for (const StageSummary& s : stages) {
-    if (s.state == "SKIPPED") {
-      plan.push_back({.step = s.kind, .needed = false, .reason = s.skip_reason});
-    }
-  }
   return plan;
 }
 
@@ -225,50 +226,43 @@ std::string Summary(const Scene& scene,
                     bool is_film,
                     const ordered_json& metrics,
                     const std::vector<std::string>& keys) {
-  const std::string of_model =
+  const std::string result =
       is_film ? "Coloured" : fmt::format("{} Gaussians", metrics.value("gaussians", 0));
   PlanFacts time;
   AddTime(scene, &time);
   return fmt::format("{} {}{} ({} held out){}. {} in {} s of computing.",
                      scene.views.size(),
                      is_film ? "frames" : "views",
-                     time.is_dynamic ? fmt::format(" of {} moments", time.time_steps) : "",
+                     time.is_dynamic ? fmt::format(" of {} times", time.time_steps) : "",
                      scene.HeldOutViews().size(),
                      keys.empty() ? std::string()
                                   : fmt::format(", all colours from the key {} {}",
                                                 keys.size() == 1 ? "view" : "views",
                                                 fmt::join(keys, ", ")),
-                     of_model,
+                     result,
                      static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
 }
 
-// The few figures that people ask for first.
+// The most important metrics, in words.
 std::vector<std::pair<std::string, std::string>> Headline(const ordered_json& metrics) {
   std::vector<std::pair<std::string, std::string>> headline;
-  const auto add = [&](const char* name, const char* label, const char* form, double scale) {
-    if (!metrics.contains(name) || !metrics.at(name).is_number()) return;
-    headline.emplace_back(label,
-                          fmt::format(fmt::runtime(form), scale * metrics.at(name).get<double>()));
-  };
-  add("delta_e00_chroma", "colour error, CIEDE2000", "{:.2f}", 1.0);
-  add("delta_e00_gray", "... if left grey", "{:.2f}", 1.0);
-  add("psnr_rgb", "PSNR of held-out views", "{:.1f} dB", 1.0);
-  add("share_seen", "seen in a key view", "{:.0f} %", 100.0);
-  add("share_guessed", "guessed", "{:.0f} %", 100.0);
-  add("gaussians", "Gaussians", "{:.0f}", 1.0);
-  add("seconds_total", "computing", "{:.0f} s", 1.0);
+  for (const Metric& metric : MetricCatalogue()) {
+    const auto found = metrics.find(metric.key);
+    if (!metric.in_headline || found == metrics.end() || !found->is_number()) continue;
+    headline.emplace_back(metric.label, MetricText(metric.key, found->get<double>()));
+  }
   return headline;
 }
 
-// What there is of the key view's pictures.
+// The pictures of the key view that there are.
 ReportRow KeyPictures(const std::string& name, const StageContext& context) {
   ReportRow row{name, {}};
   if (context.HasInput(artifact::kKeyViewGray)) {
     row.pictures.push_back(Picture(context, artifact::kKeyViewGray, "as captured"));
   }
   if (context.HasInput(artifact::kKeyViewColored)) {
-    row.pictures.push_back(
-        Picture(context, artifact::kKeyViewColored, "coloured: all colours come from here"));
+    row.pictures.push_back(Picture(
+        context, artifact::kKeyViewColored, "coloured: all colours of the scene come from here"));
   }
   return row;
 }
@@ -301,8 +295,8 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
   data.summary = Summary(scene, IsColoredAsFilm(context, scene), metrics, keys);
   if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
-  data.key_view = ReportOfKeyView(KeyPictures(key ? scene.views[*key].name : "", context), context);
-  data.additional_key_views = ReportOfAdditionalKeyViews(scene, kReportSidePx, context);
+  data.key_view = KeyViewChapter(KeyPictures(key ? scene.views[*key].name : "", context), context);
+  data.additional_key_views = AdditionalKeyViewChapters(scene, kReportSidePx, context);
   std::vector<CurvePoint> personalization;
   std::partition_copy(curves.begin(),
                       curves.end(),

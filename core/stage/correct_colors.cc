@@ -26,10 +26,10 @@ namespace {
 
 constexpr size_t kMaxCorrections = 64;
 constexpr int kMaxProposals = 16;
-constexpr size_t kPlacesOfAllViews = 3000;  // that proposals are chosen from
-constexpr double kHardlyKnown = 0.2;        // share of a stroke that lies on the geometry
+constexpr size_t kPlacesOfAllViews = 3000;  // candidates of proposals
+constexpr double kHardlyKnown = 0.2;        // least share of a stroke that lies on the geometry
 
-// What is masked out colours nothing, so that no stroke is proposed for its sake.
+// Marks masked pixels as seen, so that no stroke is proposed for them.
 void SetSeenWhereMasked(const Image& mask, PlacedPicture* picture) {
   if (picture->seen.Empty()) picture->seen = Image(mask.width, mask.height, 1);
   for (size_t i = 0; i < mask.data.size(); ++i) {
@@ -37,7 +37,7 @@ void SetSeenWhereMasked(const Image& mask, PlacedPicture* picture) {
   }
 }
 
-// The scene's pictures in the colours that they have without corrections.
+// The scene's pictures in their colours without corrections.
 class ColoredViews {
  public:
   explicit ColoredViews(StageContext& context)
@@ -83,7 +83,7 @@ class ColoredViews {
   const ViewPositions positions_;
 };
 
-// A correction on the grid of the working pictures.
+// A correction at the size of the working pictures.
 struct Painted {
   int view;
   Correction correction;
@@ -113,10 +113,9 @@ void WarnIfOffTheGeometry(const Painted& painted, const std::string& name, Stage
     if (!position.Empty()) known += weight * position.Plane(3)[i];
   }
   if (known >= kHardlyKnown * all) return;
-  context.progress().OnWarning(
-      "the correction of " + name +
-      " lies where the 3D scene shows nothing of the photo, e.g. on sky: it "
-      "reaches other views by looks alone");
+  context.progress().OnWarning("the correction of " + name +
+                               " lies where the 3D scene does not show the photo, e.g. on sky; it "
+                               "reaches other views by similarity alone");
 }
 
 Painted ReadCorrection(const ColorCorrection& wanted,
@@ -140,7 +139,7 @@ Painted ReadCorrection(const ColorCorrection& wanted,
   if (const auto mask = views.images().Mask(index)) {
     ClearMasked(mask.get(), &correction.painted);
     if (Mean(correction.painted) == 0.0) {
-      throw InvalidArgument("all that it paints is masked out; paint what the mask leaves");
+      throw InvalidArgument("all that it paints is masked out; paint other pixels");
     }
   }
   WarnIfOffTheGeometry(painted, view.name, context);
@@ -167,7 +166,7 @@ std::vector<Painted> ReadCorrections(const std::vector<ColorCorrection>& wanted,
   return painted;
 }
 
-// What was corrected is the user's: seen.
+// Counts corrected pixels as seen.
 void CountAsSeen(const Image& share, Image* provenance) {
   for (size_t i = 0; i < share.data.size(); ++i) {
     for (int c = 0; c < kProvenancePlanes; ++c) provenance->Plane(c)[i] *= 1.0f - share.data[i];
@@ -175,7 +174,7 @@ void CountAsSeen(const Image& share, Image* provenance) {
   }
 }
 
-// A view as the corrections change it.
+// A view with the corrections applied.
 struct CorrectedView {
   CorrectedColor answer;
   Image ab;  // 2 channels, Lab units
@@ -200,7 +199,8 @@ CorrectedView CorrectView(int number,
   return corrected;
 }
 
-// The places worth a stroke as JSON, and their views, which have `colors`, as pictures to paint on.
+// Writes the views of the proposed places in their `colors` for the user to paint on, and returns
+// the places as JSON.
 nlohmann::ordered_json WriteProposals(const std::vector<ProposedPlace>& proposed,
                                       const std::vector<int>& view_of_sample,
                                       const std::function<Image(int view)>& colors,
@@ -252,7 +252,7 @@ void RunCorrectColors(const CorrectColorsOptions& options,
   const std::vector<Painted> painted = ReadCorrections(options.corrections, views, context);
   std::vector<Correction> corrections;
   for (const Painted& one : painted) corrections.push_back(one.correction);
-  // Views are corrected side by side, each on one thread.
+  // Views are corrected in parallel, each on one thread.
   const auto colorizer = LoadColorizer(context.ReadInput(artifact::kColorizer),
                                        context.LoadEncoder(encoder),
                                        /*threads=*/1);
@@ -289,7 +289,7 @@ void RunCorrectColors(const CorrectColorsOptions& options,
   const std::vector<int> training = scene.TrainingViews();
   std::vector<PlaceSample> places;
   for (const int view : training) places.push_back(std::move(samples_of[view]));
-  // Few are proposed: theirs are made again, so that memory does not grow with the number of views.
+  // The colours of the few proposed views are computed again, which bounds memory.
   const auto colors = [&](int view) {
     return CorrectView(view, views.Picture(view), painted, *corrector, 0).ab;
   };

@@ -45,7 +45,8 @@ TruthFiles FilesByView(const std::vector<TruthFile>& truth, bool held_out, const
   return files;
 }
 
-// The curves of the bound's fit would stand among those of the scene's own chroma.
+// Passes on progress but no errors, because the curves of the bound would mix with those of the
+// chroma of the scene.
 class WithoutCurves : public ProgressObserver {
  public:
   explicit WithoutCurves(ProgressObserver& outer) : outer_(outer) {}
@@ -59,8 +60,8 @@ class WithoutCurves : public ProgressObserver {
   ProgressObserver& outer_;
 };
 
-// The same geometry under the true colours of the training views: what the reconstruction itself
-// costs. Throws Error{kInvalidArgument} naming a training view without truth.
+// Fits the true colours of the training views on the same geometry. Throws Error{kInvalidArgument}
+// with the name of a training view without truth.
 GaussianModel FitTrueChroma(const GaussianModel& geometry,
                             const Scene& scene,
                             const TruthFiles& truth,
@@ -89,8 +90,8 @@ GaussianModel FitTrueChroma(const GaussianModel& geometry,
                    {context.pool(), none, progress, context.cancel()});
 }
 
-// In order of time: cameras of one moment, since between moments things move. Of photos, and where
-// one camera took all, neighbours of all.
+// Sizes of the groups of views to compare, in the order of time: the cameras of each time, because
+// objects move in between. For photos and for a single camera, one group of all views.
 std::vector<int> GroupsToCompare(const Scene& scene) {
   std::map<double, int> moments;
   for (const View& view : scene.views) ++moments[view.time_s()];
@@ -114,7 +115,7 @@ SceneConsistency CompareViews(const Scene& scene,
     const Camera camera = images.WorkingCamera(view);
     RenderedView rendered =
         RenderView(model, camera, pose, context.pool(), 0.0f, scene.views[view].time_s());
-    ClearMasked(images.Mask(view).get(), &rendered.depth);  // nothing matches there
+    ClearMasked(images.Mask(view).get(), &rendered.depth);  // no matches there
     return ConsistencySource::Rendered{{camera, pose, std::move(rendered.depth)},
                                        std::move(rendered.lab)};
   };
@@ -131,10 +132,10 @@ SceneConsistency CompareViews(const Scene& scene,
   return MeasureConsistency(source, context.pool(), context.cancel());
 }
 
-// Scores of all held-out views that have a truth, as they come.
+// Scores of the held-out views that have a truth.
 class HeldOutScores {
  public:
-  // Without a model what is delivered, and scored as rendered, are the coloured frames.
+  // Without a model, the coloured frames are scored in place of renders.
   HeldOutScores(const Scene& scene,
                 const std::optional<GaussianModel>& model,
                 const std::optional<GaussianModel>& bound,
@@ -147,14 +148,15 @@ class HeldOutScores {
     const Image ab = DecodeAbPng(context_.ReadInput(ab_name), ab_name).ab;
     const ViewImages images(scene_, context_.scene_folder(), std::max(ab.width, ab.height), 0);
     const Image true_srgb = images.UndistortFile(index, truth);
-    if (true_srgb.channels != 3) throw InvalidArgument("the truth of {} is grey", view.name);
+    if (true_srgb.channels != 3)
+      throw InvalidArgument("the truth of {} is grey; give the photo in colour", view.name);
     const Camera camera = images.WorkingCamera(index);
     const Image delivered = model_ ? Rendered(*model_, camera, view)
                                    : ColoredFrame(view, index, /*is_key=*/false, images, context_);
     const auto mask = images.Mask(index);
     Scores scores = ScoreView(true_srgb, delivered, ab, mask.get());
     if (scores.empty()) {
-      context_.progress().OnWarning(view.name + " is not scored: its mask leaves nothing of it");
+      context_.progress().OnWarning(view.name + " is not scored: no pixel of it is unmasked");
       return;
     }
     if (bound_) {
@@ -180,9 +182,9 @@ class HeldOutScores {
     context_.WriteOutput(ViewArtifact(artifact::kColored2d, view, ".jpg"), EncodeJpeg(colored));
   }
 
-  // Empty when nothing was added.
+  // Empty if no view was added.
   Scores Mean() const { return MeanOf(all_); }
-  // By how the views are held out; empty for photos.
+  // Means for each way in which views are held out; empty for photos.
   ordered_json MeanByHow() const {
     ordered_json json = ordered_json::object();
     for (const auto& [how, sum] : by_how_) {
@@ -232,13 +234,9 @@ class HeldOutScores {
 };
 
 ordered_json JsonOf(const Consistency& c) {
-  return {{"pairs", c.pairs},
-          {"matches", c.matches},
-          {"me", c.me},
-          {"me_de00", c.me_de00},
-          {"tc_short", c.tc_short},
-          {"tc_long", c.tc_long},
-          {"tc", c.tc}};
+  ordered_json json{{"pairs", c.pairs}, {"matches", c.matches}};
+  for (const auto& [name, value] : c.Figures()) json[name] = value;
+  return json;
 }
 
 ordered_json JsonOf(const SceneConsistency& scores) {

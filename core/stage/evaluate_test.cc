@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/catalogue/metrics.h"
 #include "core/stage/run_stages.h"
 #include "tests/support/stages/evaluated_scene.h"
 
@@ -19,7 +20,7 @@ class EvaluateTest : public EvaluatedSceneTest {
   }
 };
 
-TEST_F(EvaluateTest, WithoutTruthTheViewsAreStillCompared) {
+TEST_F(EvaluateTest, ComparesViewsWithoutTruth) {
   const json scores = Evaluated({});
   EXPECT_TRUE(scores.at("views").empty());
   const json& consistency = scores.at("consistency");
@@ -31,7 +32,7 @@ TEST_F(EvaluateTest, WithoutTruthTheViewsAreStillCompared) {
   EXPECT_FALSE(consistency.contains("truth"));
 }
 
-TEST_F(EvaluateTest, TheTruthOfAllViewsIsTheFloorAndBoundsTheReconstruction) {
+TEST_F(EvaluateTest, ScoresTheBoundOfTheReconstruction) {
   EvaluateOptions options;
   options.truth = {TruthOf("p0.png")};
   options.training_truth = {TruthOf("p1.png")};
@@ -47,11 +48,17 @@ TEST_F(EvaluateTest, TheTruthOfAllViewsIsTheFloorAndBoundsTheReconstruction) {
   EXPECT_LT(scores.at("consistency").at("truth").at("me_de00"),
             scores.at("consistency").at("colored_views").at("me_de00"));
   EXPECT_FALSE(scores.contains("sources"));
+  for (const json& metrics : {mean, scores.at("consistency").at("rendered")}) {
+    for (const auto& [key, value] : metrics.items()) {
+      EXPECT_NE(FindMetric(key).metric, nullptr)
+          << key << " has no row in core/catalogue/metrics.cc";
+    }
+  }
   options.training_truth.clear();
   EXPECT_THROW(Evaluated(options), Error);
 }
 
-TEST_F(EvaluateTest, OfASceneThatMovesCamerasOfOneMomentAreComparedAndGapsAreTold) {
+TEST_F(EvaluateTest, ComparesCamerasOfOneTimeInDynamicScenes) {
   scene_.views[0].moment = Moment{0.0, 1};  // its camera is held out
   scene_.views[1].moment = Moment{0.0, 0};
   scene_.views[2].moment = Moment{0.5, 0};
@@ -69,7 +76,7 @@ TEST_F(EvaluateTest, OfASceneThatMovesCamerasOfOneMomentAreComparedAndGapsAreTol
   EXPECT_EQ(camera.at("delta_e00_chroma"), scores.at("mean").at("delta_e00_chroma"));
 }
 
-TEST_F(EvaluateTest, ErrorsAreToldBySource) {
+TEST_F(EvaluateTest, ReportsErrorsBySource) {
   AddProvenance("p0.png", Halves({0.0f, 1.0f, 0.0f}, {1.0f, 0.0f, 0.0f}));
   EvaluateOptions options;
   options.truth = {TruthOf("p0.png")};
@@ -79,7 +86,7 @@ TEST_F(EvaluateTest, ErrorsAreToldBySource) {
   EXPECT_FALSE(sources.contains("delta_e00_inferred"));
 }
 
-TEST_F(EvaluateTest, WhatIsMaskedOutIsNotScored) {
+TEST_F(EvaluateTest, DoesNotScoreMaskedPixels) {
   EvaluateOptions options;
   options.truth = {TruthOf("p0.png")};
   Image truth = ReadImage(options.truth[0].file);

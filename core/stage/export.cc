@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "core/base/range_check.h"
 #include "core/splat/export/glb/glb.h"
@@ -19,8 +21,8 @@
 namespace color3d {
 namespace {
 
-constexpr int kSidePx = 500;      // of the pictures that colours are refined on
-constexpr size_t kMaxViews = 32;  // of them, spread evenly
+constexpr int kSidePx = 500;      // longer side of the renders that colours are refined on
+constexpr size_t kMaxViews = 32;  // number of these renders, evenly spread
 
 std::vector<RgbView> ViewsToCompare(const Scene& scene, std::vector<std::string>* names) {
   std::vector<RgbView> views;
@@ -43,62 +45,170 @@ nlohmann::ordered_json ScoresOf(const RgbRefinement& refinement,
           {"unrefined_worst_psnr_db_vs_lab", refinement.before.worst_psnr_db}};
 }
 
-// Returns the smaller of the files that browsers show.
-ExportedFile WriteWithHarmonics(const ExportOptions& options,
-                                const GaussianModel& model,
-                                const RgbHarmonics& rgb,
-                                const ExportFrame& frame,
-                                bool with_confidence,
-                                StageContext& context) {
-  ExportedFile smaller;
-  if (options.ply) {
-    smaller = {artifact::kPly,
-               EncodeGaussianPly(model, rgb, frame, context.pool(), with_confidence)};
-    context.WriteOutput(smaller.name, smaller.bytes);
+// Writes the formats one by one. Data that several formats need is computed once.
+class Exporter {
+ public:
+  Exporter(const ExportOptions& options, const Scene& scene, StageContext& context)
+      : options_(options),
+        scene_(scene),
+        context_(context),
+        in_time_(ParseGaussians(context.ReadInput(artifact::kModel))),
+        shown_(context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : 0),
+        model_(ModelAt(in_time_, scene.views.at(shown_).time_s(), context.pool())),
+        frame_(ExportFrameOf(scene)),
+        with_confidence_(options.confidence && !model_.confidence.empty()),
+        views_(ViewsToCompare(scene, &view_names_)) {
+    if (options.confidence && !with_confidence_) {
+      Warn("the model has no provenance: {} has no confidence", artifact::kPly);
+    }
+    if (!frame_.left_out.isZero(0.0)) {
+      Warn(
+          "the scene lies too far from the origin for 32-bit positions: they are relative to the "
+          "offset in the header of {}",
+          artifact::kPly);
+    }
   }
-  if (!options.sog && !options.spz && !options.glb) return smaller;
-  const ViewerGaussians gaussians = ForViewers(model, rgb, frame, context.pool());
-  if (options.sog) {
-    smaller = {artifact::kSog, EncodeSog(gaussians, context.pool())};
-    context.WriteOutput(smaller.name, smaller.bytes);
-  }
-  if (options.spz) {
-    const SpzVersion version = options.spz_version == 2 ? SpzVersion::k2 : SpzVersion::k4;
-    context.WriteOutput(artifact::kSpz, EncodeSpz(gaussians, version, context.pool()));
-  }
-  if (options.glb) context.WriteOutput(artifact::kGlb, EncodeGlb(gaussians));
-  return smaller;
-}
 
-void WriteMoments(const ExportOptions& options,
-                  const GaussianModel& model,
-                  const ExportFrame& frame,
-                  StageContext& context) {
-  if (options.moments == 0) return;
-  if (model.motion.size() == 0) {
-    context.progress().OnWarning("nothing moves in this scene: there are no moments to export");
-    return;
+  void Run() {
+    for (const ExportFormatInfo& info : kExportFormats) {
+      if (!options_.formats.contains(info.format)) continue;
+      context_.cancel().ThrowIfCancelled();
+      if (!info.needs_motion || in_time_.motion.size() > 0) {
+        Write(info.format);
+      } else if (info.by_default == ExportDefault::kOff || options_.formats.size() == 1) {
+        Warn("nothing moves in this scene: {} is not written", info.artifact);
+      }
+    }
+    if (context_.HasInput(artifact::kKeyView)) {
+      WriteViewPage(scene_, shown_, model_, in_time_.motion.size() > 0, page_file_, context_);
+    }
+    context_.WriteOutput(artifact::kExportScores, scores_.dump(1) + "\n");
   }
-  const double span = model.motion.end_s - model.motion.begin_s;
-  for (int i = 0; i < options.moments; ++i) {
-    context.cancel().ThrowIfCancelled();
-    const double share = options.moments > 1 ? static_cast<double>(i) / (options.moments - 1) : 0.5;
-    const GaussianModel at = ModelAt(model, model.motion.begin_s + share * span, context.pool());
-    context.WriteOutput(
-        fmt::format("{}{:05}.ply", artifact::kMoments, i + 1),
-        EncodeGaussianPly(at, FitRgbHarmonics(at, context.pool()), frame, context.pool()));
-    context.progress().OnProgress(i + 1, options.moments, "writing moments");
+
+ private:
+  template <typename... Values>
+  void Warn(fmt::format_string<Values...> text, Values&&... values) {
+    context_.progress().OnWarning(fmt::format(text, std::forward<Values>(values)...));
   }
-}
+
+  // The one list of writers.
+  void Write(ExportFormat format) {
+    switch (format) {
+      case ExportFormat::kPly:
+        return WriteForPage(
+            artifact::kPly,
+            EncodeGaussianPly(model_, Harmonics(), frame_, context_.pool(), with_confidence_));
+      case ExportFormat::kSog:
+        return WriteForPage(artifact::kSog, EncodeSog(Gaussians(), context_.pool()));
+      case ExportFormat::kSpz:
+        return WriteBytes(format,
+                          EncodeSpz(Gaussians(),
+                                    options_.spz_version == 2 ? SpzVersion::k2 : SpzVersion::k4,
+                                    context_.pool()));
+      case ExportFormat::kGlb:
+        return WriteBytes(format, EncodeGlb(Gaussians()));
+      case ExportFormat::kSplat:
+        return WriteBytes(format, Splat());
+      case ExportFormat::kSplat4d:
+        return WriteBytes(format, Splat4d());
+      case ExportFormat::kMoments:
+        return WriteMoments();
+    }
+  }
+
+  void WriteBytes(ExportFormat format, const std::string& bytes) {
+    context_.WriteOutput(InfoOf(format).artifact, bytes);
+  }
+
+  // The view page shows the last of these files, which is the smaller one.
+  void WriteForPage(const char* name, std::string bytes) {
+    context_.WriteOutput(name, bytes);
+    page_file_ = {name, std::move(bytes)};
+  }
+
+  RgbRefinement Refine(RgbHarmonics start) {
+    RgbRefineOptions options;
+    options.seed = context_.seed();
+    return RefineRgbHarmonics(model_, std::move(start), views_, options, context_.control());
+  }
+
+  const RgbHarmonics& Fitted() {
+    if (!fitted_) fitted_ = FitRgbHarmonics(model_, context_.pool());
+    return *fitted_;
+  }
+
+  // With view dependence, refined against our own renders.
+  const RgbHarmonics& Harmonics() {
+    if (!harmonics_) {
+      RgbRefinement rgb = Refine(Fitted());
+      context_.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
+      context_.progress().OnError(RgbRefineOptions().epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
+      scores_["ply"] = ScoresOf(rgb, view_names_);
+      harmonics_ = std::move(rgb.harmonics);
+    }
+    return *harmonics_;
+  }
+
+  const ViewerGaussians& Gaussians() {
+    if (!gaussians_) gaussians_ = ForViewers(model_, Harmonics(), frame_, context_.pool());
+    return *gaussians_;
+  }
+
+  std::string Splat() {
+    const RgbRefinement rgb = Refine(DegreeZero(Fitted()));
+    scores_["splat"] = ScoresOf(rgb, view_names_);
+    return EncodeSplat(model_, rgb.harmonics, frame_, context_.pool());
+  }
+
+  std::string Splat4d() {
+    const int frames = std::min<int>(scene_.Times().size(), kMaxSplat4dFrames);
+    const RgbHarmonics rgb = DegreeZero(FitRgbHarmonics(in_time_, context_.pool()));
+    return EncodeSplat4d(in_time_, rgb, frame_, frames, context_.pool());
+  }
+
+  void WriteMoments() {
+    const double span = in_time_.motion.end_s - in_time_.motion.begin_s;
+    for (int i = 0; i < options_.moments; ++i) {
+      context_.cancel().ThrowIfCancelled();
+      const double share =
+          options_.moments > 1 ? static_cast<double>(i) / (options_.moments - 1) : 0.5;
+      const GaussianModel at =
+          ModelAt(in_time_, in_time_.motion.begin_s + share * span, context_.pool());
+      context_.WriteOutput(
+          fmt::format("{}{:05}.ply", artifact::kMoments, i + 1),
+          EncodeGaussianPly(at, FitRgbHarmonics(at, context_.pool()), frame_, context_.pool()));
+      context_.progress().OnProgress(i + 1, options_.moments, "writing moments");
+    }
+  }
+
+  const ExportOptions& options_;
+  const Scene& scene_;
+  StageContext& context_;
+  const GaussianModel in_time_;
+  const int shown_;            // view; files of a single time show that of this view
+  const GaussianModel model_;  // at this time
+  const ExportFrame frame_;
+  const bool with_confidence_;
+  std::vector<std::string> view_names_;
+  const std::vector<RgbView> views_;
+  std::optional<RgbHarmonics> fitted_;
+  std::optional<RgbHarmonics> harmonics_;
+  std::optional<ViewerGaussians> gaussians_;
+  ExportedFile page_file_;
+  nlohmann::ordered_json scores_ = nlohmann::ordered_json::object();
+};
 
 }  // namespace
 
 void ExportOptions::Validate() const {
-  RangeCheck("export option")("moments", moments, 0, 1000);
-  if (!ply && !sog && !spz && !glb && !splat) {
-    throw InvalidArgument("the export has nothing to write; ask for ply, sog, spz, glb or splat");
+  RangeCheck("export option")(
+      "moments", moments, formats.contains(ExportFormat::kMoments) ? 1 : 0, 1000);
+  if (formats.empty()) {
+    throw InvalidArgument("the export has nothing to write; ask for {}", ExportFormatNames());
   }
-  if (confidence && !ply) {
+  if (confidence && std::none_of(formats.begin(), formats.end(), [](ExportFormat format) {
+        return InfoOf(format).carries_confidence;
+      })) {
     throw InvalidArgument("only a PLY can carry confidence; ask for ply too");
   }
   if (spz_version != 2 && spz_version != 4) {
@@ -113,55 +223,7 @@ void RunExport(const ExportOptions& options, StageContext& context) {
     context.WriteOutput(artifact::kExportScores, "{}\n");
     return;
   }
-  const GaussianModel in_time = ParseGaussians(context.ReadInput(artifact::kModel));
-  const int shown = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : 0;
-  const GaussianModel model = ModelAt(in_time, scene.views.at(shown).time_s(), context.pool());
-  const bool with_confidence = options.confidence && !model.confidence.empty();
-  if (options.confidence && !with_confidence) {
-    context.progress().OnWarning(
-        fmt::format("the model does not know where its colours come from: {} has no confidence",
-                    artifact::kPly));
-  }
-  const ExportFrame frame = ExportFrameOf(scene);
-  if (!frame.left_out.isZero(0.0)) {
-    context.progress().OnWarning(fmt::format(
-        "the scene lies so far from the origin that the 32-bit numbers of its files cannot say "
-        "where: positions are relative to the offset in the header of {}",
-        artifact::kPly));
-  }
-  std::vector<std::string> names;
-  const std::vector<RgbView> views = ViewsToCompare(scene, &names);
-  RgbRefineOptions refine;
-  refine.seed = context.seed();
-  const auto refined = [&](RgbHarmonics start) {
-    return RefineRgbHarmonics(model, std::move(start), views, refine, context.control());
-  };
-  const RgbHarmonics fitted = FitRgbHarmonics(model, context.pool());
-  nlohmann::ordered_json scores;
-  if (options.ply || options.sog || options.spz || options.glb) {
-    const RgbRefinement rgb = refined(fitted);
-    context.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
-    context.progress().OnError(refine.epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
-    scores["ply"] = ScoresOf(rgb, names);
-    const ExportedFile file =
-        WriteWithHarmonics(options, model, rgb.harmonics, frame, with_confidence, context);
-    if (context.HasInput(artifact::kKeyView)) {
-      WriteViewPage(scene, shown, model, in_time.motion.size() > 0, file, context);
-    }
-  }
-  if (options.splat) {
-    const RgbRefinement rgb = refined(DegreeZero(fitted));
-    scores["splat"] = ScoresOf(rgb, names);
-    context.WriteOutput(artifact::kSplat, EncodeSplat(model, rgb.harmonics, frame, context.pool()));
-  }
-  if (options.splat4d && in_time.motion.size() > 0) {
-    const int frames = std::min<int>(scene.Times().size(), kMaxSplat4dFrames);
-    const RgbHarmonics rgb = DegreeZero(FitRgbHarmonics(in_time, context.pool()));
-    context.WriteOutput(artifact::kSplat4d,
-                        EncodeSplat4d(in_time, rgb, frame, frames, context.pool()));
-  }
-  WriteMoments(options, in_time, frame, context);
-  context.WriteOutput(artifact::kExportScores, scores.dump(1) + "\n");
+  Exporter(options, scene, context).Run();
 }
 
 }  // namespace color3d

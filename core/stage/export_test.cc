@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, ExportWritesItsFilesInTheWorldsFrameAndSaysWhatTheyLose) {
+TEST_F(StageTest, ExportWritesFilesInTheFrameOfTheWorld) {
   Scene scene = RampScene(scratch_.path(), 48, 32);
   scene.world_from_scene_scale = 0.001;
   scene.world_offset = {1e6, 0.0, 0.0};
@@ -48,13 +48,13 @@ TEST_F(StageTest, ExportWritesItsFilesInTheWorldsFrameAndSaysWhatTheyLose) {
   EXPECT_GE(after, before);
   EXPECT_EQ(scores.at("ply").at("worst_view").get<std::string>().substr(0, 1), "p");
   StageContext again = MakeContext();
-  EXPECT_THROW(RunExport({.ply = false, .sog = false}, again), Error);
-  EXPECT_THROW(RunExport({.spz = true, .spz_version = 3}, again), Error);
-  RunExport({.ply = false, .sog = false, .splat = true}, again);
+  EXPECT_THROW(RunExport({.formats = {}}, again), Error);
+  EXPECT_THROW(RunExport({.formats = {ExportFormat::kSpz}, .spz_version = 3}, again), Error);
+  RunExport({.formats = {ExportFormat::kSplat}}, again);
   EXPECT_EQ(again.outputs(), (std::vector<std::string>{"scene.splat", "export.json"}));
   EXPECT_EQ(ReadFile(scratch_.path() / "out/scene.splat").size(), 9u * 32);
   StageContext others = MakeContext();
-  RunExport({.ply = false, .sog = false, .spz = true, .spz_version = 2, .glb = true}, others);
+  RunExport({.formats = {ExportFormat::kSpz, ExportFormat::kGlb}, .spz_version = 2}, others);
   EXPECT_EQ(others.outputs(), (std::vector<std::string>{"scene.spz", "scene.glb", "export.json"}));
   EXPECT_EQ(ReadSpz(ReadFile(scratch_.path() / "out/scene.spz")).size(), 9u);
   EXPECT_EQ(ReadGlb(ReadFile(scratch_.path() / "out/scene.glb")).position, from_ply.position);
@@ -76,9 +76,9 @@ class ExportInTime : public StageTest {
   }
 };
 
-TEST_F(ExportInTime, EveryMomentIsAPly) {
+TEST_F(ExportInTime, WritesAPlyForEachTime) {
   StageContext context = MakeContext();
-  RunExport({.sog = false, .splat4d = false, .moments = 5}, context);
+  RunExport({.formats = {ExportFormat::kPly, ExportFormat::kMoments}, .moments = 5}, context);
   for (int i = 0; i < 5; ++i) {
     const auto file = scratch_.path() / ("out/moments/0000" + std::to_string(i + 1) + ".ply");
     const ViewerGaussians at = ReadPly(ReadFile(file));
@@ -93,14 +93,15 @@ TEST_F(ExportInTime, EveryMomentIsAPly) {
   const ViewerGaussians key = ReadPly(ReadFile(scratch_.path() / "out/scene.ply"));
   EXPECT_NEAR(BallX({key.position.begin(), key.position.end()}), 0.0, 1e-5);
   StageContext one = MakeContext();
-  RunExport({.sog = false, .splat4d = false, .moments = 1}, one);
+  RunExport({.formats = {ExportFormat::kMoments}, .moments = 1}, one);
+  EXPECT_EQ(one.outputs(), (std::vector<std::string>{"moments/00001.ply", "export.json"}));
   const ViewerGaussians middle = ReadPly(ReadFile(scratch_.path() / "out/moments/00001.ply"));
   EXPECT_NEAR(BallX({middle.position.begin(), middle.position.end()}), 0.0, 1e-5);
 }
 
-TEST_F(ExportInTime, PlayersGetAFrameForEachTime) {
+TEST_F(ExportInTime, Splat4dHasAFrameForEachTime) {
   StageContext context = MakeContext();
-  RunExport({.sog = false}, context);
+  RunExport({.formats = {ExportFormat::kSplat4d}}, context);
   const Splat4dFile file = ReadSplat4d(ReadFile(scratch_.path() / "out/scene.splat4d"));
   ASSERT_EQ(file.frames.size(), 3u);
   EXPECT_EQ(file.moving, 1u);
@@ -108,15 +109,34 @@ TEST_F(ExportInTime, PlayersGetAFrameForEachTime) {
     EXPECT_NEAR(BallX(file.frames[i].position), -0.4 + 0.4 * i, 2.0 * file.position_bound) << i;
   }
   StageContext without = MakeContext();
-  RunExport({.sog = false, .splat4d = false}, without);
+  RunExport({.formats = {ExportFormat::kPly}}, without);
   EXPECT_EQ(std::count(without.outputs().begin(), without.outputs().end(), "scene.splat4d"), 0);
 }
 
-TEST_F(ExportInTime, WhereNothingMovesThereAreNoMoments) {
+TEST_F(ExportInTime, WritesEveryFormatAlone) {
+  for (const ExportFormatInfo& info : kExportFormats) {
+    SCOPED_TRACE(info.option);
+    std::filesystem::remove_all(scratch_.path() / "out");
+    StageContext context = MakeContext();
+    const int moments = info.format == ExportFormat::kMoments ? 2 : 0;
+    RunExport({.formats = {info.format}, .moments = moments}, context);
+    EXPECT_TRUE(std::filesystem::exists(scratch_.path() / "out" / info.artifact));
+  }
+}
+
+TEST_F(ExportInTime, WarnsWhenTheOnlyFormatNeedsMotion) {
   AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
   StageContext context = MakeContext();
-  RunExport({.sog = false, .moments = 3}, context);
-  EXPECT_NE(observer_.text.find("there are no moments to export"), std::string::npos);
+  RunExport({.formats = {ExportFormat::kSplat4d}}, context);
+  EXPECT_NE(observer_.text.find("scene.splat4d is not written"), std::string::npos);
+}
+
+TEST_F(ExportInTime, WritesNoMomentsOfAStaticScene) {
+  AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
+  StageContext context = MakeContext();
+  RunExport({.formats = {ExportFormat::kPly, ExportFormat::kMoments}, .moments = 3}, context);
+  EXPECT_NE(observer_.text.find("nothing moves in this scene: moments/ is not written"),
+            std::string::npos);
   for (const std::string& name : context.outputs()) {
     EXPECT_FALSE(name.starts_with("moments/") || name == "scene.splat4d") << name;
   }

@@ -61,7 +61,7 @@ void ImportSplatScene(const std::string& file,
     context.WriteOutput(view.image_file, PhotoOf(splat.geometry, view, context.pool()));
   }
   ImportFacts facts;
-  facts.layout = "splat";
+  facts.layout = CaptureLayout::kSplat;
   facts.photos_found = facts.photos_registered = static_cast<int>(count);
   context.WriteOutput(artifact::kGivenGeometry, SerializeGaussians(splat.geometry));
   context.WriteOutput(artifact::kScene, SceneToJson(scene));

@@ -26,19 +26,19 @@ std::vector<int> ViewsToRender(const RenderOptions& options, const Scene& scene)
   return EvenlyOf(std::move(views), static_cast<size_t>(options.max_views));
 }
 
-// A model may come without the frames' colours, too.
+// False for a model that came without the colours of the frames.
 bool HasColors(const StageContext& context, const Scene& scene) {
   return context.HasInput(artifact::kKeyView) && context.HasInput(artifact::kKeyColor) &&
          context.HasInput(ViewAbArtifact(context, scene.views.front()));
 }
 
-// Frames without poses were coloured, not reconstructed: there is nothing to move through.
-void RefuseWayThroughFilm(const RenderOptions& options) {
+// Films without poses cannot be rendered along a camera path: they have no geometry.
+void RefusePathThroughFilm(const RenderOptions& options) {
   if (options.path == RenderOptions::Path::kViews && !options.time_s) return;
   throw InvalidArgument(
       "this film has no poses, so no camera can move through it; its coloured frames are {} of the "
-      "job that coloured it. For a scene to move through, colour the film with poses "
-      "(film_poses: auto), where one moving camera took it",
+      "job that coloured it. For a scene to move through, colour a film of one moving camera with "
+      "poses (film_poses: auto)",
       artifact::kMovie);
 }
 
@@ -52,11 +52,13 @@ void RenderOptions::Validate() const {
   check("frames_per_second", frames_per_second, 1, 120);
   if (time_s) check("time_s", *time_s, 0, 86400);
   if (path != Path::kViews && !video && !pictures) {
-    throw InvalidArgument("a path without video and without pictures leaves nothing");
+    throw InvalidArgument(
+        "a path without video and without pictures writes nothing; ask for one of them");
   }
   if ((path == Path::kCameras) != !cameras.empty()) {
-    throw InvalidArgument(cameras.empty() ? "a path by cameras needs a file of them"
-                                          : "a file of cameras is of use for no other path");
+    throw InvalidArgument(
+        cameras.empty() ? "the path by cameras needs a file of cameras"
+                        : "the file of cameras is used by the path by cameras only; leave it out");
   }
 }
 
@@ -64,28 +66,29 @@ void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   if (IsColoredAsFilm(context, scene)) {
-    RefuseWayThroughFilm(options);
+    RefusePathThroughFilm(options);
     return RenderFilm(options, scene, ViewsToRender(options, scene), context);
   }
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
-  if (model.size() == 0) throw InvalidArgument("the model has no Gaussians: nothing is to be seen");
+  if (model.size() == 0)
+    throw InvalidArgument("the model has no Gaussians: there is nothing to render");
   if (options.path != RenderOptions::Path::kViews) {
     return RenderMovie(options, scene, model, context);
   }
   const std::vector<int> views = ViewsToRender(options, scene);
-  if (model.motion.size() > 0) {  // as the key view's camera saw it
+  if (model.motion.size() > 0) {  // seen by the camera of the key view
     RenderOptions movie = options;
     movie.views.clear();
     movie.path = RenderOptions::Path::kPhotos;
-    movie.pictures = false;  // those of the cameras' own films are asked for
+    movie.pictures = false;  // `pictures` means those of the films of the cameras
     RenderMovie(movie, scene, model, context);
   }
-  if (scene.IsDynamic()) {  // whether something moves in it or not
+  if (scene.IsDynamic()) {  // moving or static
     if (HasColors(context, scene)) WriteFilmsOfCameras(scene, options.pictures, context);
   } else if (options.pictures) {
     context.progress().OnWarning(
-        "pictures is left aside: it is for the frames of films and of cameras that filmed a scene, "
-        "and these are photos");
+        "pictures is ignored: it is for the frames of films and of dynamic scenes, and these are "
+        "photos");
   }
   for (size_t i = 0; i < views.size(); ++i) {
     context.cancel().ThrowIfCancelled();

@@ -28,69 +28,71 @@
 
 namespace color3d {
 
-// The scene's files as views with poses; structure-from-motion where they have none. A scene of one
-// splat (.ply, .sog, .spz) and no photos: views chosen around it and drawn in grey, and its
-// Gaussians, which are the geometry. A film: its frames, without poses.
+// Makes views with poses from the files of the scene, by structure-from-motion if they come without
+// poses. From a splat (.ply, .sog, .spz) without photos: grey renders of views around it, and its
+// Gaussians as the geometry. From a film: its frames, without poses.
 void RunImportScene(const ImportOptions& options,
                     StageContext& context,
                     const SplatViewOptions& splat_views = {},
                     const FilmOptions& film = {});
 
-// The photo that the user should colour, or several. Only training views can win. Features of
-// photos that were seen before come from the context's cache folder.
+// Selects the photo that the user should colour, or several, among the training views. Features of
+// photos are cached in the cache folder of the context.
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context);
 
-// The key view in colour, and what its source tells of that.
+// Colours a key view. Writes its colours, a picture for people and facts about the source.
 void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& context);
 
-// The key views' own colours in every view, as far as it shows the same, and how much that is.
+// Carries the colours of the key views into every view, and measures how much of each they cover.
 void RunCarryColor(const CarryColorOptions& options, StageContext& context);
 
-// Training pictures beside the key view: the files below augment/ of the scene's folder if they are
-// asked for, a generator's, and ours. Novel views need the geometry among the inputs.
+// Makes training pictures beside the key view: the files in augment/ if requested, pictures of a
+// generator, and our own. Novel views need the geometry among the inputs.
 void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& context);
 
-// The scene's colorizer, trained on the key view, what was carried and what was generated. Warns
-// when the key view has no colour. `encoder`: as SelectKeyViewOptions.
+// Trains the colorizer of the scene on the key view, carried colours and generated pictures. Warns
+// if the key view has no colour. `encoder`: as in SelectKeyViewOptions.
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
                     const std::string& encoder = "");
 
-// The colour of every view and where it comes from, at max_side_px (64..4096). `encoder`: the one
+// Colours every view, with the sources of the colour, at max_side_px (64..4096). `encoder`: the one
 // that the colorizer was trained with.
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
-// Whom it asks for colours: the scene's colorizer, which must outlive the answer, and the embedded
-// automatic one. `position` gives PictureFacts' of the luminance; asked for with the colour.
+// Sources of colour for views: the colorizer of the scene and the embedded automatic one.
+// `position` returns that of PictureFacts for a luminance. Requires: `colorizer` outlives the
+// result.
 ColorSources SourcesOf(const Colorizer& colorizer,
                        std::function<Image(const Image& luminance)> position = {});
 
-// The colours of every view, corrected: where the user says so, and in whatever is like that and
-// near it (METHOD.md "Corrections"). `encoder`: as RunColorizeViews'.
+// Corrects the colours of every view where the user painted and in similar places near that
+// (METHOD.md "Corrections"), or recolours ranges of time of a film. `encoder`: as in
+// RunColorizeViews.
 void RunCorrectColors(const CorrectColorsOptions& options,
                       StageContext& context,
                       const std::string& encoder = "");
 
-// Gaussians of luminance, trained at max_side_px (64..4096). With little memory the size and the
-// number of Gaussians are smaller, and a warning says so. Gaussians that came with the scene are
-// handed on as they are.
+// Trains Gaussians of luminance at max_side_px (64..4096). With little memory, size and number of
+// Gaussians are reduced with a warning. Gaussians that came with the scene are kept as they are.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
 
-// The views' chroma on the geometry, with confidence when every training view has its provenance.
+// Fits the chroma of the views on the geometry, with confidence if every training view has its
+// provenance.
 void RunSolveChroma(const ChromaOptions& options, StageContext& context);
 
-// The model for viewers in RGB, and what that loses against our renders. Of a scene that moves it
-// is that of the key view's moment.
+// Writes the model in RGB formats for viewers, and their difference from our renders. For dynamic
+// scenes, formats of a single time have that of the key view.
 void RunExport(const ExportOptions& options, StageContext& context);
 
-// Pictures of the model, or a movie.
+// Renders pictures of the model, or a movie.
 void RunRender(const RenderOptions& options, StageContext& context);
 
-// Scores, with the pictures that were compared. Without any truth only the consistency between
+// Scores the colours, with the compared pictures. Without true colours only the consistency of the
 // views (ME, TC) is scored.
 void RunEvaluate(const EvaluateOptions& options, StageContext& context);
 
-// The report on a coloured scene, its metrics, curves and plan; results of the other stages are
-// passed on.
+// Writes the report on a coloured scene with metrics, curves and plan, and passes on the results of
+// the other stages.
 void RunReport(const std::vector<StageSummary>& stages, StageContext& context);
 
 }  // namespace color3d

@@ -26,7 +26,7 @@ class ConfidenceTest : public EvaluatedSceneTest {
   std::string ExportedPly() {
     inputs_[artifact::kModel] = scratch_.path() / "out/model.c3g";
     StageContext context = MakeContext();
-    RunExport({.ply = true, .sog = false, .confidence = true}, context);
+    RunExport({.formats = {ExportFormat::kPly}, .confidence = true}, context);
     return ReadFile(scratch_.path() / "out/scene.ply");
   }
 };
@@ -47,7 +47,7 @@ TEST_F(ConfidenceTest, ReachesTheModelAndThePly) {
 }
 
 // The two training views disagree: p1 says a = 5, p2 says 25.
-TEST_F(ConfidenceTest, MaskedPartsOfPhotosDoNotColourTheModel) {
+TEST_F(ConfidenceTest, MaskedPartsDoNotColorTheModel) {
   Image mask(48, 32, 1);
   for (int y = 0; y < 32; ++y) mask.At(0, y, 0) = 1.0f;
   WriteFileAtomic(scratch_.path() / "m.png", EncodePng8(mask));
@@ -63,12 +63,12 @@ TEST_F(ConfidenceTest, MaskedPartsOfPhotosDoNotColourTheModel) {
   EXPECT_NEAR(redness(1), 25.0, 5.0);
 }
 
-TEST_F(ConfidenceTest, JobsWithoutProvenanceHaveNone) {
+TEST_F(ConfidenceTest, NeedsProvenance) {
   EXPECT_TRUE(Solved().confidence.empty());
   EXPECT_THAT(ExportedPly(), testing::Not(testing::HasSubstr("confidence")));
   EXPECT_THAT(observer_.text, testing::HasSubstr("has no confidence"));
   StageContext context = MakeContext();
-  EXPECT_THROW(RunExport({.ply = false, .splat = true, .confidence = true}, context), Error);
+  EXPECT_THROW(RunExport({.formats = {ExportFormat::kSplat}, .confidence = true}, context), Error);
 }
 
 }  // namespace

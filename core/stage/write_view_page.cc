@@ -19,12 +19,13 @@
 namespace color3d {
 namespace {
 
-constexpr int kPosterPx = 900;       // longer side of the picture that is there first
-constexpr int kPhotoPx = 480;        // longer side of the photos
-constexpr int kPhotoQuality = 80;    // of their JPEG
-constexpr size_t kMaxPictures = 48;  // with more photos, the others are a name and a camera
+constexpr int kPosterPx = 900;     // longer side of the picture that is shown first
+constexpr int kPhotoPx = 480;      // longer side of the photos
+constexpr int kPhotoQuality = 80;  // of their JPEG
+constexpr size_t kMaxPictures =
+    48;  // photos with a picture; the others have a name and a camera only
 
-// The exported file, and the sureness of its Gaussians in its order.
+// Adds the exported file and the confidence of its Gaussians in the same order.
 void TakeScene(const GaussianModel& model,
                const ExportFrame& frame,
                const ExportedFile& file,
@@ -43,7 +44,7 @@ void TakeScene(const GaussianModel& model,
   for (size_t i = 0; i < order.size(); ++i) page->confidence[i] = model.confidence[order[i]];
 }
 
-// Of a scene that moves those of the key view's moment: the page shows it as it was then.
+// The photos; for dynamic scenes those of the time of the key view.
 std::vector<ViewPagePhoto> PhotosOf(const Scene& scene,
                                     int key_view,
                                     bool moves,
@@ -79,7 +80,7 @@ bool WriteViewPage(const Scene& scene,
   if (file.name.empty()) return false;
   if (!HasViewer()) {
     context.progress().OnWarning(fmt::format(
-        "this build has no viewer, so there is no {}: build again where npm reaches its registry",
+        "this build has no viewer, so {} is not written; build it where npm reaches its registry",
         artifact::kViewPage));
     return false;
   }

@@ -1,4 +1,4 @@
-// The page to look at the scene in a browser. For the export stage only.
+// The page that shows the scene in a browser. For the export stage only.
 #pragma once
 
 #include <string>
@@ -14,10 +14,10 @@ struct ExportedFile {
   std::string bytes;
 };
 
-// Leaves artifact::kViewPage with that file of the model in it; it opens at the key view. `moves`:
-// the model is one of the key view's moment, so that only the photos of that moment are there.
-// False, and nothing is left, without a file or without a viewer in this build, which is told as a
-// warning. Throws Error{kCancelled} and what reading the photos throws.
+// Writes artifact::kViewPage, which contains `file` and opens at the key view. `moves`: the model
+// is that of the time of the key view, and the page has the photos of this time only. Returns false
+// and writes nothing if there is no file or, with a warning, if this build has no viewer. Throws
+// Error{kCancelled} and the errors of reading the photos.
 bool WriteViewPage(const Scene& scene,
                    int key_view,
                    const GaussianModel& model,

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, ThePageIsMadeFromTheExportedSceneAndTheModel) {
+TEST_F(StageTest, ViewPageHasTheExportedFile) {
   const Scene scene = RampScene(scratch_.path(), 48, 32);
   GaussianModel model = SmallModel();
   model.confidence.assign(model.size(), 0.5f);
@@ -35,7 +35,7 @@ TEST_F(StageTest, ThePageIsMadeFromTheExportedSceneAndTheModel) {
   }
 }
 
-TEST_F(StageTest, ThePageOfASceneThatMovesHasThePhotosOfItsMoment) {
+TEST_F(StageTest, ViewPageHasPhotosOfItsTimeOnly) {
   if (!HasViewer())
     GTEST_SKIP() << "skipped, because the viewer was left out of this build (no npm)";
   Scene scene = RampScene(scratch_.path(), 48, 32);

@@ -24,7 +24,7 @@ class KeepingTest : public ::testing::Test {
     scene.files = {{"a.jpg", photo_}};
     store_ = Open(paths_.root, StoreRole::kServer);
     store_->CreateScene(scene, {}, {});
-    store_->ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+    store_->ActivateScene(scene.name, CaptureLayout::kPhotos, 1, {});
     job_ = Run("result");
     blobs_.PutBytes("named by nothing");
   }

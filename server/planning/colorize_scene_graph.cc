@@ -8,6 +8,7 @@
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
+#include "server/planning/key_view_jobs.h"
 #include "server/planning/presets.h"
 
 namespace color3d {
@@ -16,8 +17,8 @@ namespace {
 using v1::ColorizeSceneSpec;
 using v1::JobSpec;
 
-// The stages whose jobs a colorize_scene job may be given, in the order of the pipeline, and
-// whether its options ask for the stage as well.
+// A stage whose job may be an input of a colorize_scene job, and whether its options request the
+// stage as well.
 struct GivenStage {
   const char* kind;
   bool asked_for;
@@ -33,7 +34,7 @@ void CheckGivenJob(const JobRecord& job, bool asked_for, const std::string& miss
   }
   if (!missing.empty()) {
     throw InvalidArgument(
-        "the input {} ({}) comes without the {} job that it read; add that to spec.inputs",
+        "the input {} ({}) comes without its own input, the {} job; add it to spec.inputs",
         job.name,
         job.kind,
         missing);
@@ -46,7 +47,7 @@ void CheckGivenJob(const JobRecord& job, bool asked_for, const std::string& miss
   }
 }
 
-// What a colorize_scene job may be given, and that its options do not ask for something else.
+// Checks that the inputs are allowed and that the options do not request the same stages.
 void CheckGiven(const std::map<std::string, JobRecord>& given, const ColorizeSceneSpec& options) {
   const bool colors_key_view = options.has_key_color() ||
                                options.colorize_key_view().has_source() ||
@@ -68,23 +69,22 @@ void CheckGiven(const std::map<std::string, JobRecord>& given, const ColorizeSce
     const JobRecord& job = entry.second;
     const auto is_its_kind = [&](const GivenStage& stage) { return job.kind == stage.kind; };
     if (std::any_of(std::begin(stages), std::end(stages), is_its_kind)) continue;
-    throw InvalidArgument(
-        "the input {} is a {} job; {} takes {}, {} and {} jobs and makes the rest itself",
-        job.name,
-        job.kind,
-        kind::kColorizeScene,
-        kind::kImportScene,
-        kind::kSelectKeyView,
-        kind::kColorizeKeyView);
+    throw InvalidArgument("the input {} is a {} job; {} takes {}, {} and {} jobs only",
+                          job.name,
+                          job.kind,
+                          kind::kColorizeScene,
+                          kind::kImportScene,
+                          kind::kSelectKeyView,
+                          kind::kColorizeKeyView);
   }
   if (!given.contains(kind::kColorizeKeyView) && !colors_key_view) {
-    throw InvalidArgument("key_color is required: no input is a {} job that would give it",
+    throw InvalidArgument("key_color is required, because no input is a {} job",
                           kind::kColorizeKeyView);
   }
 }
 
-// What the scene's options say of a stage outside of the field of its name.
-void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
+// Copies options of the scene that belong to the stage but stand outside the field of its name.
+void CopySceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
   switch (spec->stage_case()) {
     case JobSpec::kSelectKeyView:
       if (options.key_view().empty()) return;
@@ -100,7 +100,7 @@ void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
           options.has_generate_augmentations() ? SamplesOf(options.generate_augmentations()) : 0);
       return;
     case JobSpec::kColorizeViews:
-      // The colorizer runs on the encoder that it was trained with.
+      // A colorizer needs the encoder that it was trained with.
       spec->mutable_colorize_views()->set_encoder(options.personalize().encoder());
       return;
     case JobSpec::kCorrectColors:
@@ -118,14 +118,15 @@ void TakeSceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
   }
 }
 
-// Why no colour is carried; empty when it is. `scene`: `given` over its preset.
+// Reason for carrying no colour; empty if colour is carried. `scene`: `given` over its preset.
 std::string WhyNothingIsCarried(const ColorizeSceneSpec& given, const ColorizeSceneSpec& scene) {
   if (!scene.carry_color().skip()) return "";
   return given.carry_color().has_skip() ? "carry_color.skip is set"
-                                        : "the preset carries no colour through geometry";
+                                        : "the preset carries no colour";
 }
 
-// Why no pictures are generated; empty when they are. What lies in augment/ has to be asked for.
+// Reason for generating no pictures; empty if they are generated. Files in augment/ are used on
+// request only.
 std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   const auto& spec = scene.generate_augmentations();
   if (spec.files() && facts.augment_files == 0) {
@@ -135,14 +136,14 @@ std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts&
   }
   if (spec.files()) return "";
   const std::string unused =
-      facts.augment_files > 0 ? "; augment/ holds " + std::to_string(facts.augment_files) +
-                                    " files, which count where generate_augmentations.files is true"
+      facts.augment_files > 0 ? "; augment/ has " + std::to_string(facts.augment_files) +
+                                    " files, which are used if generate_augmentations.files is true"
                               : "";
   if (!scene.has_generate_augmentations()) {
-    return "the preset learns from the key view alone" + unused;
+    return "the preset trains on the key view alone" + unused;
   }
-  // Whoever writes options wants the stage, unless they say 0.
-  return SamplesOf(spec) == 0 ? "no samples are asked for" + unused : "";
+  // Options request the stage unless the number of samples is 0.
+  return SamplesOf(spec) == 0 ? "no samples are requested" + unused : "";
 }
 
 // Why a stage has nothing to do for a film; empty when it has. Where poses are looked for, the
@@ -155,17 +156,18 @@ std::string WhyNotForFilm(const std::string& kind, const ColorizeSceneSpec& scen
   return "";
 }
 
-// `scene`: as BuildColorizeSceneGraph takes it.
+// `scene`: as in BuildColorizeSceneGraph.
 void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   const bool has_poses =
       facts.is_film && scene.import_scene().film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO;
   for (const v1::FurtherKeyView& correction : scene.correct_colors().corrections()) {
-    const bool has_range = correction.has_begin_s() || correction.has_end_s();
+    const bool has_range = HasRange(correction);
     if (facts.is_film && !has_range) {
       throw InvalidArgument(
-          "corrections are for places that are reconstructed; colour further frames of the film as "
-          "key views instead (carry_color.further_key_views), or give them the range of time that "
-          "they count in (begin_s, end_s)");
+          "corrections of places need a reconstructed scene; for a film colour additional key "
+          "views "
+          "instead (carry_color.further_key_views), or give each correction a range of time "
+          "(begin_s, end_s)");
     }
     if (has_range && (!facts.is_film || has_poses)) {
       throw InvalidArgument(
@@ -197,10 +199,10 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     const std::string kind = stage.kind;
     if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
     JobSpec spec = builder->StageSpec(kind);
-    TakeSceneOptions(scene, &spec);
+    CopySceneOptions(scene, &spec);
     if (kind == kind::kPersonalize && facts.is_film) {
       *spec.mutable_personalize() = scene.personalize();
-      LearnAtTheSizeOfFrames(scene.max_side_px(), spec.mutable_personalize());
+      TrainAtFrameSize(scene.max_side_px(), spec.mutable_personalize());
     }
     std::string skip_reason;
     if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);

@@ -1,5 +1,4 @@
-// The graph of a colorize_scene job: every stage of the pipeline, with what the scene's options say
-// of each.
+// The graph of a colorize_scene job: every stage of the pipeline, with its options. Pure functions.
 #pragma once
 
 #include "color3d/v1/job.pb.h"
@@ -8,17 +7,17 @@
 
 namespace color3d {
 
-// Of generate_augmentations, where somebody asks for it without a number.
+// generate_augmentations.samples if the stage is requested without a number.
 inline constexpr int kDefaultSamples = 8;
-// What unset samples mean: who asks for pictures of their own wants those alone.
+// Number of samples. Unset: none beside pictures of the user, else the default.
 inline int SamplesOf(const v1::GenerateAugmentationsSpec& spec) {
   if (spec.has_samples()) return spec.samples();
   return spec.files() ? 0 : kDefaultSamples;
 }
 
-// Adds all jobs to the builder, which fills in the options of each stage from `scene`: what was
-// submitted, over its preset, with the options of the import that is given, if one is. Throws Error
-// for inputs that the submitted options contradict, or that lack a job which they read.
+// Adds all jobs to the builder. `scene`: the submitted options over their preset, with the options
+// of the import if one is among the inputs. Throws Error for inputs that contradict the submitted
+// options or whose own inputs are missing.
 void BuildColorizeSceneGraph(const v1::JobSpec& submitted,
                              const v1::ColorizeSceneSpec& scene,
                              const SceneFacts& facts,

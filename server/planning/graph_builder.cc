@@ -19,12 +19,12 @@ std::string ProviderOf(const std::string& artifact) {
   return stage->kind;
 }
 
-// Equal submissions plan equal work.
+// A fixed default, so that equal submissions have equal stage keys.
 uint64_t SeedOf(const v1::JobSpec& submitted) {
   return submitted.seed() != 0 ? submitted.seed() : 1;
 }
 
-// Nothing follows from it, so that what comes after is found done already.
+// Later stages do not depend on a job that only proposes corrections: they stay cached.
 bool OnlyProposes(const NewJob& job) {
   return job.kind == kind::kCorrectColors &&
          ParseSpec(job.spec, job.kind).correct_colors().corrections().empty();
@@ -73,7 +73,7 @@ void GraphBuilder::Provide(const std::string& artifact, const std::string& for_k
   const std::string provider = ProviderOf(artifact);
   const auto planned = planned_.find(provider);
   if (planned != planned_.end()) {
-    // What this scene does not need is left out; nothing is to be waited for.
+    // A skipped job is no dependency.
     if (graph_.jobs[static_cast<size_t>(planned->second)].skip_reason.empty()) {
       job->inputs.push_back(planned->second);
     }
@@ -136,7 +136,7 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   if (submitted_.has_colorize_scene() && given_.contains(job.kind)) return;
   job.skip_reason = skip_reason;
   const Stage& stage = StageOf(job.kind);
-  std::set<std::string> linked;  // a stage may read several artifacts of one other
+  std::set<std::string> linked;  // a stage may read several artifacts of another
   for (const char* artifact : stage.needs) {
     if (linked.insert(ProviderOf(artifact)).second) Provide(artifact, job.kind, &job);
   }

@@ -1,5 +1,5 @@
-// Puts the jobs of one submission together into a graph: each depends on the jobs whose artifacts
-// its stage reads, as the catalogue of stages says. Pure: no store, no clock.
+// Builds the graph of jobs of one submission: each job depends on the jobs whose artifacts its
+// stage reads (core/catalogue/stages.h). Uses no store and no clock. Not thread-safe.
 #pragma once
 
 #include <functional>
@@ -14,30 +14,31 @@ namespace color3d {
 
 class GraphBuilder {
  public:
-  // Fills in what the user left open in a stage's options.
+  // Sets options of a stage that the user left unset.
   using FillUnset = std::function<void(v1::JobSpec*)>;
 
-  // `submitted` must outlive the builder. `inputs`: the jobs that it names, with their children;
-  // jobs that coloured additional key views are passed over. Throws Error{kInvalidArgument} for
-  // inputs of another scene and for two jobs of one kind.
+  // `inputs`: the jobs that `submitted` names, with their children; jobs that coloured additional
+  // key views are ignored. Requires: `submitted` outlives the builder. Throws
+  // Error{kInvalidArgument} for inputs of another scene and for two jobs of one kind.
   GraphBuilder(const v1::JobSpec& submitted,
                const std::vector<JobRecord>& inputs,
                FillUnset fill_unset);
 
-  // A spec with the submitted job's scene, seed and cache policy, and this stage without options.
+  // Returns a spec with the scene, the seed and the cache policy of the submitted job, and this
+  // stage without options.
   v1::JobSpec StageSpec(const std::string& kind) const;
 
   // The inputs by kind.
   const std::map<std::string, JobRecord>& given() const { return given_; }
 
-  // Appends the job, skipped when there is a reason to. What its stage needs comes from earlier
-  // jobs of the graph, then from given inputs, then, where the submitted stage may bring them
-  // along, from jobs that are added for it; what it only reads when it is there, from the first
-  // two. Each additional key view in its options is coloured by a job that is appended before it.
-  // Throws ServiceError INPUT_MISSING naming an artifact that nothing provides.
+  // Appends a job, skipped if there is a reason. Artifacts that its stage needs come from earlier
+  // jobs of the graph, else from inputs, else, if the submitted stage brings prerequisites, from
+  // jobs that are added; artifacts that it only reads, from the first two. A job is appended before
+  // it for each additional key view in its options. Throws ServiceError INPUT_MISSING with an
+  // artifact that nothing provides.
   void Add(v1::JobSpec spec, const std::string& skip_reason = "");
 
-  // Appends the submitted job as the parent of all others: it waits for them and for the inputs.
+  // Appends the submitted job as the parent of all others. It depends on them and on the inputs.
   void AddParent();
 
   NewGraph Take() { return std::move(graph_); }

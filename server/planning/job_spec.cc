@@ -14,7 +14,7 @@ std::string DeterministicBytes(const google::protobuf::Message& message) {
     google::protobuf::io::CodedOutputStream coded(&stream);
     coded.SetSerializationDeterministic(true);
     message.SerializeToCodedStream(&coded);
-  }  // the stream cuts the string to its length
+  }  // the destructor of the stream sets the length of the string
   return bytes;
 }
 

@@ -1,4 +1,4 @@
-// The options of a job as the store keeps them, and its stage's by name.
+// Serialised options of jobs, and the options of a stage by its name. Stateless.
 #pragma once
 
 #include <google/protobuf/message.h>
@@ -9,13 +9,13 @@
 
 namespace color3d {
 
-// Equal messages give equal bytes.
+// Returns equal bytes for equal messages.
 std::string DeterministicBytes(const google::protobuf::Message& message);
 
-// Throws Error{kDataLoss} naming the job when the bytes are no JobSpec.
+// Throws Error{kDataLoss} with the name of the job if the bytes are not a JobSpec.
 v1::JobSpec ParseSpec(const std::string& bytes, const std::string& job_name);
 
-// The options of the stage `kind`, which becomes the job's stage if it was not.
+// Returns the options of the stage `kind`, which becomes the stage of the job.
 google::protobuf::Message* MutableStage(v1::JobSpec* spec, const std::string& kind);
 
 }  // namespace color3d

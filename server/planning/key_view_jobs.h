@@ -1,5 +1,5 @@
-// Additional key views in the options of stages: the planner makes a colorize_key_view job of each.
-// Stateless.
+// Additional key views in the options of stages, each of which the planner turns into a
+// colorize_key_view job. Stateless.
 #pragma once
 
 #include <vector>
@@ -8,14 +8,14 @@
 
 namespace color3d {
 
-// Whether the key view counts in a range of time only.
+// Returns true if the key view applies to a range of time only.
 inline bool HasRange(const v1::FurtherKeyView& key) { return key.has_begin_s() || key.has_end_s(); }
 
-// The additional key views in the options of the spec's stage: all of a carry_color job, and the
-// corrections of a correct_colors job that have a range of time. The pointers are into the spec.
+// Returns pointers into the spec to its additional key views: all of a carry_color job, and the
+// corrections with a range of time of a correct_colors job.
 std::vector<v1::FurtherKeyView*> AdditionalKeyViews(v1::JobSpec* spec);
 
-// Whether it is a colorize_key_view job of an additional key view.
+// Returns true for a colorize_key_view job of an additional key view.
 inline bool ColorsAdditionalKeyView(const v1::JobSpec& spec) {
   return !spec.colorize_key_view().view().empty();
 }

@@ -1,5 +1,5 @@
-// The graph of a personalize_scenes job: one personalize job for each scene under one parent. Pure:
-// no store, no clock.
+// The graph of a personalize_scenes job: one personalize job for each scene under one parent. Uses
+// no store and no clock.
 #pragma once
 
 #include <vector>
@@ -8,7 +8,7 @@
 
 namespace color3d {
 
-// A route's colorize_key_view job and the jobs that it read.
+// The colorize_key_view job of a route and its inputs.
 struct SceneRouteInputs {
   std::vector<JobRecord> jobs;
   SceneFacts facts;

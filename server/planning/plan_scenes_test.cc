@@ -36,7 +36,7 @@ v1::JobSpec SpecOf(const std::vector<std::string>& scenes) {
   return spec;
 }
 
-TEST(PlanScenes, EachSceneGetsAPersonalizeJobThatReadsItsOwn) {
+TEST(PlanScenes, EachSceneHasItsPersonalizeJob) {
   const NewGraph graph = PlanPersonalizeScenes(SpecOf({"scenes/a", "scenes/b"}),
                                                {RouteInputs("scenes/a"), RouteInputs("scenes/b")});
   ASSERT_EQ(graph.jobs.size(), 3u);
@@ -57,7 +57,7 @@ TEST(PlanScenes, EachSceneGetsAPersonalizeJobThatReadsItsOwn) {
   EXPECT_EQ(graph.jobs[2].inputs, (std::vector<int>{0, 1}));
 }
 
-TEST(PlanScenes, NoSceneOrOneTwiceIsRefused) {
+TEST(PlanScenes, RefusesNoSceneAndRepeatedScenes) {
   const auto message = [](const std::vector<std::string>& scenes) -> std::string {
     try {
       PlanPersonalizeScenes(SpecOf(scenes), {RouteInputs("scenes/a"), RouteInputs("scenes/a")});
@@ -67,10 +67,10 @@ TEST(PlanScenes, NoSceneOrOneTwiceIsRefused) {
     return "";
   };
   EXPECT_THAT(message({}), HasSubstr("routes is empty"));
-  EXPECT_THAT(message({"scenes/a", "scenes/a"}), HasSubstr("there already"));
+  EXPECT_THAT(message({"scenes/a", "scenes/a"}), HasSubstr("again"));
 }
 
-TEST(PlanScenes, AFailedKeyColorIsRefused) {
+TEST(PlanScenes, RefusesAFailedKeyColor) {
   SceneRouteInputs inputs = RouteInputs("scenes/a");
   inputs.jobs[2].state = JobState::kFailed;
   EXPECT_THROW(PlanPersonalizeScenes(SpecOf({"scenes/a"}), {inputs}), Error);

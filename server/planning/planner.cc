@@ -1,9 +1,11 @@
 #include "server/planning/planner.h"
 
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "core/catalogue/stages.h"
+#include "server/planning/asked_formats.h"
 #include "server/planning/colorize_scene_graph.h"
 #include "server/planning/graph_builder.h"
 #include "server/planning/job_spec.h"
@@ -14,9 +16,9 @@
 namespace color3d {
 namespace {
 
-// A colorize_views or correct_colors job that names no encoder works with that of the given
+// Sets the encoder of a colorize_views or correct_colors job, if it is unset, to that of the input
 // personalize job.
-void TakeEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
+void SetEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
   std::string* encoder = nullptr;
   if (spec->has_colorize_views()) encoder = spec->mutable_colorize_views()->mutable_encoder();
   if (spec->has_correct_colors()) encoder = spec->mutable_correct_colors()->mutable_encoder();
@@ -33,19 +35,16 @@ void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {
   if (spec.has_generate_augmentations()) {
     spec.mutable_generate_augmentations()->set_samples(SamplesOf(spec.generate_augmentations()));
   }
-  TakeEncoderOfColorizer(*builder, &spec);
-  const v1::ExportSpec& files = spec.export_();
-  const bool nothing_to_do = spec.has_export_() && files.has_ply() && !files.ply() &&
-                             !files.sog() && !files.spz() && !files.glb() && !files.splat();
-  builder->Add(
-      std::move(spec),
-      nothing_to_do
-          ? "export.ply is false and no other file is asked for: there is nothing to export"
-          : "");
+  SetEncoderOfColorizer(*builder, &spec);
+  std::string skip_reason;
+  if (spec.has_export_() && AskedFormats(spec.export_()).empty()) {
+    skip_reason = "there is nothing to export; ask for " + ExportFormatNames();
+  }
+  builder->Add(std::move(spec), skip_reason);
 }
 
-// What was submitted over its preset. A given import has settled what a new one would be asked for:
-// a film's poses, its part and its stride.
+// The submitted options over their preset, with the options of the import among the inputs: poses,
+// range and stride of a film are fixed by it.
 v1::ColorizeSceneSpec SceneOf(const v1::JobSpec& submitted, const std::vector<JobRecord>& inputs) {
   v1::ColorizeSceneSpec scene = WithPreset(submitted.colorize_scene());
   for (const JobRecord& input : inputs) {

@@ -1,4 +1,4 @@
-// From a job's spec to the graph of jobs that does it. Pure: no store, no clock.
+// Plans the graph of jobs for a submitted spec. Uses no store and no clock.
 #pragma once
 
 #include <vector>
@@ -9,10 +9,10 @@
 
 namespace color3d {
 
-// `inputs`: the jobs that spec.inputs names, with their children. The last job of the graph is the
-// one that was asked for. Throws what CheckSpec throws; kFailedPrecondition (INPUT_MISSING) naming
-// an artifact that nothing provides; kInvalidArgument for inputs of another scene or two jobs that
-// give the same artifact; what DivideTimeBudget throws for a budget that this scene cannot meet.
+// Returns the graph; its last job is the submitted one. `inputs`: the jobs in spec.inputs, with
+// their children. Throws what CheckSpec and DivideTimeBudget throw; kFailedPrecondition
+// (INPUT_MISSING) with an artifact that nothing provides; kInvalidArgument for inputs of another
+// scene and for two jobs of one kind.
 NewGraph PlanJob(const v1::JobSpec& spec,
                  const std::vector<JobRecord>& inputs,
                  const SceneFacts& facts);

@@ -13,7 +13,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(Planner, AFilmIsColoredNotReconstructed) {
+TEST(Planner, FilmIsColoredNotReconstructed) {
   v1::JobSpec spec = SceneSpec();
   const SceneFacts film{.photos = 0, .is_film = true};
   const NewGraph graph = PlanJob(spec, {}, film);
@@ -39,7 +39,7 @@ TEST(Planner, AFilmIsColoredNotReconstructed) {
   EXPECT_THROW(refused(), Error);
 }
 
-TEST(Planner, AFilmIsLearntAtTheSizeAtWhichItIsColored) {
+TEST(Planner, TrainsAtTheSizeOfFrames) {
   v1::JobSpec spec = SceneSpec();
   const auto size = [&](bool is_film) {
     const NewGraph graph = PlanJob(spec, {}, {.photos = 0, .is_film = is_film});
@@ -70,7 +70,7 @@ JobRecord GivenImport(const v1::ImportSceneSpec& options) {
   return import;
 }
 
-TEST(Planner, AGivenImportSaysWhetherPosesOfAFilmWereAskedFor) {
+TEST(Planner, TakesFilmPosesFromTheInputImport) {
   const SceneFacts film{.photos = 0, .is_film = true};
   v1::JobSpec spec = SceneSpec();
   v1::ImportSceneSpec options;
@@ -90,7 +90,7 @@ TEST(Planner, AGivenImportSaysWhetherPosesOfAFilmWereAskedFor) {
   EXPECT_THROW(PlanJob(spec, {GivenImport(options)}, film), Error) << "a range of time";
 }
 
-TEST(Planner, AKeyFrameWithARangeOfTimeCorrectsTheColoredFilm) {
+TEST(Planner, KeyViewWithRangeIsACorrection) {
   const SceneFacts film{.photos = 0, .is_film = true};
   v1::JobSpec spec = SceneSpec();
   v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();

@@ -1,10 +1,12 @@
 #include "server/planning/planner.h"
 
 #include <gmock/gmock.h>
+#include <google/protobuf/text_format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <limits>
+#include <string>
 
 #include "core/catalogue/limits.h"
 #include "core/catalogue/stages.h"
@@ -59,7 +61,7 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
             Sha256Hex("key"));
 }
 
-TEST(Planner, CorrectionsAreLeftOutProposedOrMadeBeforeTheChroma) {
+TEST(Planner, CorrectionsPrecedeChroma) {
   const NewGraph without = PlanJob(SceneSpec(), {}, kTwentyPhotos);
   EXPECT_THAT(without.jobs[IndexOf(without, "correct_colors")].skip_reason, HasSubstr("nothing"));
 
@@ -80,7 +82,7 @@ TEST(Planner, CorrectionsAreLeftOutProposedOrMadeBeforeTheChroma) {
   EXPECT_THROW(PlanJob(spec, {}, kTwentyPhotos), Error);
 }
 
-TEST(Planner, PresetsFillUnsetFieldsAndExplicitOnesWin) {
+TEST(Planner, ExplicitFieldsWinOverThePreset) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
   spec.mutable_colorize_scene()->mutable_personalize()->set_iterations(7);
@@ -128,7 +130,7 @@ TEST(Planner, TruthGoesToEvaluation) {
   EXPECT_EQ(graph.jobs.back().blobs.size(), 3u);
 }
 
-TEST(Planner, SingleStagesBringSimplePrerequisites) {
+TEST(Planner, SingleStagesBringPrerequisites) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   *spec.mutable_colorize_key_view()->mutable_source()->mutable_image() = SomeDigest("key");
@@ -182,7 +184,7 @@ TEST(Planner, OtherStagesNameTheMissingInput) {
   EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("scenes/other"));
 }
 
-TEST(Planner, AugmentationsAreLeftOutUnlessSomebodyWantsThem) {
+TEST(Planner, SkipsAugmentationsUnlessRequested) {
   v1::JobSpec spec = SceneSpec();
   NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
   EXPECT_THAT(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason,
@@ -224,7 +226,7 @@ TEST(Planner, AugmentationsAreLeftOutUnlessSomebodyWantsThem) {
   EXPECT_EQ(SpecOf(graph, "generate_augmentations").generate_augmentations().samples(), 8);
 }
 
-TEST(Planner, SeveralKeyViewsAreSelectedBeforeTheSceneIsColored) {
+TEST(Planner, RefusesToSelectSeveralKeyViews) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->mutable_select_key_view()->set_count(3);
   EXPECT_THAT(PlanError(spec).message, HasSubstr("further_key_views"));
@@ -256,7 +258,7 @@ std::vector<v1::ColorizeKeyViewSpec> KeyViewsRead(const NewGraph& graph, const s
   return read;
 }
 
-TEST(Planner, EachAdditionalKeyViewIsAJobOfItsOwn) {
+TEST(Planner, EachAdditionalKeyViewIsAJob) {
   v1::JobSpec spec = SceneSpec();
   v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
   AddKeyView("b", scene->mutable_carry_color());
@@ -340,7 +342,7 @@ TEST(Planner, AugmentationOptionsAreChecked) {
   EXPECT_THAT(PlanError(spec).message, HasSubstr("0 to 64"));
 }
 
-TEST(Planner, WhatIsNotBuiltIsRefusedByName) {
+TEST(Planner, RefusesStagesThatAreNotBuilt) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   spec.mutable_reconstruct_dense();
@@ -397,7 +399,7 @@ TEST(Planner, BadOptionsNameFieldValueAndRange) {
               HasSubstr("view is required"));
 }
 
-TEST(Planner, ExportOfNothingIsSkipped) {
+TEST(Planner, SkipsAnExportOfNothingOnly) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   spec.mutable_export_()->set_ply(false);
@@ -412,9 +414,11 @@ TEST(Planner, ExportOfNothingIsSkipped) {
               HasSubstr("ply"));
   spec.mutable_export_()->set_splat(true);
   EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
-  spec.mutable_export_()->clear_splat();
-  spec.mutable_export_()->set_sog(true);
-  EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "");
+  for (const char* option : {"sog: true", "splat4d: true", "moments: 3"}) {
+    ASSERT_TRUE(google::protobuf::TextFormat::ParseFromString(std::string("ply: false ") + option,
+                                                              spec.mutable_export_()));
+    EXPECT_EQ(PlanJob(spec, {import, model}, kTwentyPhotos).jobs.back().skip_reason, "") << option;
+  }
 }
 
 JobRecord Done(const std::string& kind) {
@@ -426,7 +430,7 @@ JobRecord Done(const std::string& kind) {
   return job;
 }
 
-TEST(PlanColorizeScene, TakesAnAcceptedKeyViewInPlaceOfMakingItsOwn) {
+TEST(PlanColorizeScene, TakesAnAcceptedKeyView) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   spec.mutable_colorize_scene();
@@ -458,6 +462,23 @@ TEST(PlanColorizeScene, TakesAnAcceptedKeyViewInPlaceOfMakingItsOwn) {
   EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("without the select_key_view"));
   EXPECT_THAT(PlanError(spec, {Done("import_scene")}).message, HasSubstr("key_color is required"));
   EXPECT_THAT(PlanError(spec, {Done("personalize")}).message, HasSubstr("personalize"));
+}
+
+TEST(PlanColorizeScene, ColorsAdditionalKeyViewsBesideAnAcceptedOne) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  AddKeyView("b", spec.mutable_colorize_scene()->mutable_carry_color());
+  spec.add_inputs("jobs/colorize_key_view");
+  const std::vector<JobRecord> inputs{
+      Done("import_scene"), Done("select_key_view"), Done("colorize_key_view")};
+  const NewGraph graph = PlanJob(spec, inputs, kTwentyPhotos);
+  const auto keys = KeyViewsRead(graph, kind::kCarryColor);
+  ASSERT_EQ(keys.size(), 1u);
+  EXPECT_EQ(keys[0].view(), "b");
+  EXPECT_THAT(graph.jobs[IndexOf(graph, kind::kColorizeKeyView)].input_jobs,
+              ElementsAre("jobs/import_scene"));
+  EXPECT_THAT(graph.jobs[IndexOf(graph, kind::kCarryColor)].input_jobs,
+              ElementsAre("jobs/import_scene", "jobs/select_key_view", "jobs/colorize_key_view"));
 }
 
 }  // namespace

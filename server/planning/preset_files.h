@@ -1,4 +1,4 @@
-// The files of the presets, compiled in (preset_files.cc is made by CMake).
+// The preset files, compiled in (CMake generates preset_files.cc).
 #pragma once
 
 #include <vector>

@@ -28,7 +28,7 @@ std::vector<Preset> ReadPresets() {
   return presets;
 }
 
-// A choice between sources is one value: parts of two of them would make a third that nobody gave.
+// True for messages that are replaced as a whole: merging two sources of colour would make a third.
 bool IsOneValue(const Message& message) {
   return message.GetDescriptor()->real_oneof_decl_count() > 0;
 }
@@ -39,7 +39,7 @@ void MergeOver(const Message& given, Message* base) {
   const Reflection* reflection = given.GetReflection();
   std::vector<const FieldDescriptor*> fields;
   reflection->ListFields(given, &fields);
-  const std::unique_ptr<Message> rest(given.New());  // what MergeFrom is right for
+  const std::unique_ptr<Message> rest(given.New());  // the fields left to MergeFrom
   rest->CopyFrom(given);
   for (const FieldDescriptor* field : fields) {
     if (field->is_repeated()) {
@@ -60,8 +60,8 @@ void MergeOver(const Message& given, Message* base) {
   base->MergeFrom(*rest);
 }
 
-// Key views that count in a range of time correct the coloured film: nothing before is made anew.
-void TakeRangesAsCorrections(v1::ColorizeSceneSpec* spec) {
+// Makes corrections of key views with a range of time: the film coloured before is reused.
+void MoveRangesToCorrections(v1::ColorizeSceneSpec* spec) {
   auto* further = spec->mutable_carry_color()->mutable_further_key_views();
   if (std::none_of(further->begin(), further->end(), HasRange)) return;
   v1::CorrectColorsSpec* corrections = spec->mutable_correct_colors();
@@ -89,8 +89,8 @@ const v1::ColorizeSceneSpec& OptionsOf(v1::Preset preset) {
 v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
   v1::ColorizeSceneSpec merged = OptionsOf(given.preset());
   MergeOver(given, &merged);
-  TakeRangesAsCorrections(&merged);
-  // A preset that carries no colour does so where additional key views need it.
+  MoveRangesToCorrections(&merged);
+  // Additional key views need carry_color, even if the preset skips it.
   if (!merged.carry_color().further_key_views().empty()) {
     merged.mutable_carry_color()->clear_skip();
   }
@@ -104,7 +104,7 @@ v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
 }
 
 void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
-  if (spec->has_colorize_views()) {  // has no options of its own in a ColorizeSceneSpec
+  if (spec->has_colorize_views()) {  // not a field of ColorizeSceneSpec
     auto* views = spec->mutable_colorize_views();
     if (!views->has_max_side_px()) views->set_max_side_px(scene.max_side_px());
     return;
@@ -120,7 +120,7 @@ void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
   MergeOver(*own, given);
 }
 
-void LearnAtTheSizeOfFrames(int frames_max_side_px, v1::PersonalizeSpec* spec) {
+void TrainAtFrameSize(int frames_max_side_px, v1::PersonalizeSpec* spec) {
   constexpr int kMostLearntAtPx = 800;
   if (spec->has_max_side_px() || spec->recipe() == v1::PersonalizeSpec::RECIPE_PAPER) return;
   spec->set_max_side_px(std::min(frames_max_side_px, kMostLearntAtPx));

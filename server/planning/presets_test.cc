@@ -18,7 +18,7 @@ v1::ColorizeSceneSpec Given(v1::Preset preset) {
   return spec;
 }
 
-TEST(Presets, EachIsInItsFileAndPassesTheCheckOfOptions) {
+TEST(Presets, EachPassesTheCheckOfOptions) {
   std::vector<std::string> names;
   for (const Preset& preset : Presets()) {
     names.push_back(preset.name);
@@ -31,7 +31,7 @@ TEST(Presets, EachIsInItsFileAndPassesTheCheckOfOptions) {
   EXPECT_EQ(&OptionsOf(v1::PRESET_UNSPECIFIED), &OptionsOf(v1::PRESET_FAST));
 }
 
-TEST(Presets, SayWhatThePlansOfEachAre) {
+TEST(Presets, HaveTheDocumentedPlans) {
   const v1::ColorizeSceneSpec fast = WithPreset({});
   EXPECT_EQ(fast.max_side_px(), 500);
   EXPECT_EQ(fast.personalize().iterations(), 100);
@@ -61,7 +61,7 @@ TEST(Presets, SayWhatThePlansOfEachAre) {
   EXPECT_EQ(paper.generate_augmentations().samples(), 8);
 }
 
-TEST(WithPreset, WhatWasGivenWinsEvenWhenItIsZero) {
+TEST(WithPreset, GivenZeroWins) {
   v1::ColorizeSceneSpec given = Given(v1::PRESET_BEST);
   given.mutable_personalize()->set_min_improvement(0.0);
   given.mutable_personalize()->set_encoder("tiny");
@@ -75,7 +75,7 @@ TEST(WithPreset, WhatWasGivenWinsEvenWhenItIsZero) {
   EXPECT_EQ(merged.solve_chroma().iterations(), 0);
 }
 
-TEST(WithPreset, AnUnspecifiedEnumIsNoValue) {
+TEST(WithPreset, UnspecifiedEnumIsUnset) {
   v1::ColorizeSceneSpec given = Given(v1::PRESET_UNSPECIFIED);
   given.mutable_select_key_view()->set_strategy(v1::SelectKeyViewSpec::STRATEGY_UNSPECIFIED);
   given.mutable_personalize()->set_recipe(v1::PersonalizeSpec::RECIPE_UNSPECIFIED);
@@ -85,7 +85,7 @@ TEST(WithPreset, AnUnspecifiedEnumIsNoValue) {
   EXPECT_EQ(merged.personalize().recipe(), v1::PersonalizeSpec::RECIPE_COLOR3D);
 }
 
-TEST(WithPreset, ASizeOfAStagesOwnWinsOverTheScenes) {
+TEST(WithPreset, SizeOfAStageWinsOverThatOfTheScene) {
   v1::ColorizeSceneSpec given;
   given.set_max_side_px(640);
   given.mutable_render()->set_max_side_px(100);
@@ -104,7 +104,7 @@ TEST(WithPreset, AdditionalKeyViewsAreCarriedInEveryPreset) {
   EXPECT_FALSE(WithPreset(given).carry_color().skip());
 }
 
-TEST(FillStage, ListsAndSourcesOfColorAreTakenWhole) {
+TEST(FillStage, ReplacesListsAndSources) {
   v1::ColorizeSceneSpec scene;
   scene.mutable_colorize_key_view()->mutable_source()->set_backend("other");
   scene.mutable_colorize_key_view()->mutable_source()->mutable_backend_input()->set_prompt("red");
@@ -121,7 +121,7 @@ TEST(FillStage, ListsAndSourcesOfColorAreTakenWhole) {
   EXPECT_THAT(spec.render().views(), ElementsAre("b"));
 }
 
-TEST(FillStage, AJobOfOneStageAloneTakesTheFastPreset) {
+TEST(FillStage, SingleStageTakesTheFastPreset) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   spec.mutable_reconstruct_geometry()->set_sh_degree(0);

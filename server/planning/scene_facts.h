@@ -1,9 +1,9 @@
-// What the planner knows of a scene before it is imported.
+// Facts about a scene that are known before its import.
 #pragma once
 
 namespace color3d {
 
-// Views that are drawn from a splat in place of photos, unless its options say otherwise.
+// Default of import_scene.splat_views.
 inline constexpr int kSplatViews = 24;
 
 struct SceneFacts {

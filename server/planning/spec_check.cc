@@ -97,7 +97,7 @@ void CheckDigest(const v1::Digest& digest, const std::string& path) {
   }
 }
 
-// Field by field, in depth; `path` is how the client would write the field.
+// Checks field by field, recursively. `path`: the field as a client writes it.
 void CheckMessage(const Message& message, const std::string& path) {
   if (const auto* digest = dynamic_cast<const v1::Digest*>(&message)) {
     return CheckDigest(*digest, path);
@@ -121,11 +121,11 @@ bool TakesModel(v1::KeyColorSource::SourceCase source) {
 
 void CheckPrompt(const std::string& prompt, const std::string& path) {
   if (prompt.find_first_not_of(" \t\r\n") == std::string::npos) {
-    Reject(path, " is empty; say what has which colour, e.g. \"red brick, green lawn\"");
+    Reject(path, " is empty; name objects with their colours, e.g. \"red brick, green lawn\"");
   }
 }
 
-// What only some sources take.
+// Options that some sources of colour take.
 void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& path) {
   if (!source.model().empty() && !TakesModel(source.source_case())) {
     Reject(
@@ -206,7 +206,7 @@ void CheckTraining(const google::protobuf::RepeatedPtrField<v1::TruthImage>& tra
                    const std::string& path) {
   CheckTruth(training, path);
   if (!training.empty() && !has_truth) {
-    Reject(path, " is given without the truth of held-out views; there is nothing to score");
+    Reject(path, " is given without the truth of held-out views, which are scored; add it");
   }
 }
 
@@ -222,7 +222,7 @@ void CheckRange(const v1::FurtherKeyView& key, const std::string& entry) {
          fmt::format(" is {}, before begin_s, {}; swap them", key.end_s(), key.begin_s()));
 }
 
-// `of_whole_scene`: the job corrects colours, too.
+// `of_whole_scene`: the job also corrects colours.
 void CheckCarryColor(const v1::CarryColorSpec& spec, bool of_whole_scene, const std::string& path) {
   for (int i = 0; i < spec.further_key_views_size(); ++i) {
     const v1::FurtherKeyView& key = spec.further_key_views(i);
@@ -259,7 +259,7 @@ void CheckCorrections(const v1::CorrectColorsSpec& spec, const std::string& path
       case v1::KeyColorSource::kPoints:
         continue;
       default:
-        Reject(entry + ".color", " must be strokes, points or image: what was painted on the view");
+        Reject(entry + ".color", " must be strokes, points or image, painted on the view");
     }
   }
 }
@@ -269,11 +269,11 @@ void CheckRender(const v1::RenderSpec& spec, bool of_whole_scene, const std::str
       spec.path() != v1::RenderSpec::PATH_UNSPECIFIED && spec.path() != v1::RenderSpec::PATH_VIEWS;
   if (moves && of_whole_scene) {
     Reject(path + ".path",
-           " is set, but the report shows pictures of views; make a movie with a job of its own "
-           "when the scene is done (`color3d turntable`, `color3d render`)");
+           " is set, but the report shows pictures of views; render a movie by a separate job when "
+           "the scene is coloured (`color3d turntable`, `color3d render`)");
   }
   if (moves && spec.has_video() && !spec.video() && !spec.pictures()) {
-    Reject(path + ".video", " is false, and so is pictures: nothing would be left");
+    Reject(path + ".video", " is false, and so is pictures: nothing would be written");
   }
   const bool by_cameras = spec.path() == v1::RenderSpec::PATH_CAMERAS;
   if (by_cameras && !spec.has_cameras()) {
@@ -293,12 +293,12 @@ void CheckRoutes(const v1::PersonalizeScenesSpec& spec) {
     const std::string& scene = spec.routes(i).scene();
     if (scene.empty()) Reject(path, " is empty; name a scene");
     if (!scenes.insert(scene).second) {
-      Reject(path, fmt::format(" is '{}', which is there already; name each scene once", scene));
+      Reject(path, fmt::format(" is '{}' again; name each scene once", scene));
     }
   }
 }
 
-// `has_inputs`: the colour may come from a job among them; the planner sees to that.
+// `has_inputs`: the colour may come from an input job, which the planner checks.
 void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
   const bool in_options = !spec.has_key_color() && spec.colorize_key_view().has_source();
   if (!has_inputs || spec.has_key_color() || in_options) {

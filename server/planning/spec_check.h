@@ -1,6 +1,5 @@
-// Checks of a job's options, before anything is planned: every enum value known, every number,
-// list and text within what the proto says of it, every digest well formed, nothing asked for that
-// is not built.
+// Checks the options of a job before planning: enum values are known, numbers, lists and texts
+// within the limits of the proto, digests well formed, and the stage is built. Stateless.
 #pragma once
 
 #include <string>
@@ -11,19 +10,18 @@
 
 namespace color3d {
 
-// Of a spec, serialised.
+// Maximum size of a serialised spec.
 constexpr size_t kMaxSpecBytes = 64 << 10;
 
-// The stage's field name in JobSpec, e.g. "personalize". Throws Error{kInvalidArgument} when the
-// spec has no stage.
+// Returns the field name of the stage in JobSpec, e.g. "personalize". Throws
+// Error{kInvalidArgument} if the spec has no stage.
 std::string KindOf(const v1::JobSpec& spec);
 
-// Throws Error: kInvalidArgument naming field, value and range; kUnimplemented naming the kind.
-// Names of models and backends are checked by CheckNames (spec_names.h), where the configuration
-// is.
+// Throws Error: kInvalidArgument with field, value and range; kUnimplemented with the kind. Names
+// of models and backends are checked by CheckNames (spec_names.h).
 void CheckSpec(const v1::JobSpec& spec);
 
-// Every digest that the spec names, without repetition.
+// Returns the digests in the spec, without repetition.
 std::vector<FileDigest> SpecBlobs(const v1::JobSpec& spec);
 
 }  // namespace color3d

@@ -63,7 +63,7 @@ TEST(KeyColorSpec, EverySourceIsAccepted) {
             "accepted");
 }
 
-TEST(KeyColorSpec, WhatASourceLacksIsNamedWithTheRemedy) {
+TEST(KeyColorSpec, NamesWhatASourceLacks) {
   EXPECT_THAT(CheckMessage([](auto* s) { s->set_prompt("red brick"); }),
               AllOf(HasSubstr("key_color.model is required"), HasSubstr("--model NAME=FILE")));
   EXPECT_THAT(CheckMessage([](auto* s) {
@@ -85,7 +85,7 @@ TEST(KeyColorSpec, WhatASourceLacksIsNamedWithTheRemedy) {
   EXPECT_THAT(CheckMessage([](auto* s) { s->mutable_edit(); }), HasSubstr("key_color.edit.image"));
 }
 
-TEST(KeyColorSpec, OptionsOfAnotherSourceAreRefused) {
+TEST(KeyColorSpec, RefusesOptionsOfOtherSources) {
   EXPECT_THAT(CheckMessage([](auto* s) {
                 s->set_script("mine");
                 s->set_model("clip");
@@ -123,7 +123,7 @@ std::string NameError(const v1::JobSpec& spec, const UserModels& models) {
   return "";
 }
 
-TEST(SpecNames, UnknownNamesAreRefusedWithThoseThatThereAre) {
+TEST(SpecNames, RefusesUnknownNames) {
   UserModels models{{{"clip", "/m/clip"}, {"tiny", "/m/tiny"}}, {{"uni", "127.0.0.1:1"}}};
   EXPECT_EQ(NameError(SpecWithNames(), models), "");
   models.files.erase("tiny");
@@ -140,7 +140,7 @@ TEST(SpecNames, UnknownNamesAreRefusedWithThoseThatThereAre) {
 }
 
 // The files' digests are added to the key by whoever knows the files.
-TEST(SpecNames, CacheKeysTellWhichFilesTheyDependOn) {
+TEST(SpecNames, CacheKeysNameTheirFiles) {
   const NewGraph graph = PlanJob(SpecWithNames(), {}, {.photos = 20, .has_poses = true});
   std::map<std::string, StageKeyPart> parts;
   for (const NewJob& job : graph.jobs) {
@@ -155,7 +155,7 @@ TEST(SpecNames, CacheKeysTellWhichFilesTheyDependOn) {
   EXPECT_TRUE(parts["solve_chroma"].models.empty());
 }
 
-TEST(SpecNames, AColorizerIsAppliedWithTheEncoderThatItWasTrainedWith) {
+TEST(SpecNames, ColorizerKeepsItsEncoder) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");
   spec.mutable_colorize_views();
@@ -190,7 +190,7 @@ std::string CheckRender(Change change, bool of_whole_scene = false) {
   return "accepted";
 }
 
-TEST(RenderSpecTest, WhatAPathNeedsAndWhatHasNoUseIsNamed) {
+TEST(RenderSpecTest, NamesMissingAndUselessOptions) {
   using Spec = v1::RenderSpec;
   EXPECT_EQ(CheckRender([](Spec* s) { s->set_path(Spec::PATH_ORBIT); }), "accepted");
   EXPECT_EQ(CheckRender([](Spec* s) {
@@ -206,7 +206,7 @@ TEST(RenderSpecTest, WhatAPathNeedsAndWhatHasNoUseIsNamed) {
                 s->set_path(Spec::PATH_PHOTOS);
                 s->set_video(false);
               }),
-              HasSubstr("nothing would be left"));
+              HasSubstr("nothing would be written"));
   EXPECT_THAT(CheckRender([](Spec* s) { s->set_frames(18'001); }), HasSubstr("1 to 18000"));
   EXPECT_THAT(CheckRender([](Spec* s) { s->set_frames(0); }), HasSubstr("1 to 18000"));
   EXPECT_THAT(CheckRender([](Spec* s) { s->set_path(Spec::PATH_ORBIT); }, true),

@@ -1,5 +1,5 @@
-// The names of models and backends in a job's options: which there are, and whether this server has
-// them.
+// Names of models and backends in the options of a job, and the check that this server has them.
+// Stateless.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 namespace color3d {
 
 struct NameUse {
-  std::string field;  // as a client would write it
+  std::string field;  // as a client writes it
   std::string name;
 };
 
@@ -23,7 +23,7 @@ struct SpecNames {
 SpecNames NamesIn(const v1::JobSpec& spec);
 
 // Throws ServiceError{kInvalidArgument, UNKNOWN_MODEL or UNKNOWN_BACKEND} with the field, the name,
-// the names that there are and how to add one.
+// the known names and the remedy.
 void CheckNames(const v1::JobSpec& spec, const UserModels& models);
 
 }  // namespace color3d

@@ -9,7 +9,7 @@ namespace color3d {
 StageKeyPart KeyPartOf(v1::JobSpec spec) {
   StageKeyPart part;
   if (spec.has_colorize_scene() || spec.has_personalize_scenes()) return part;
-  // Where the work happens is no part of what it is: equal scenes give equal results.
+  // The name of the scene does not count: equal files give equal results.
   spec.clear_scene();
   spec.clear_inputs();
   spec.clear_skip_cache();

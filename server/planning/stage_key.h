@@ -1,4 +1,4 @@
-// What a job's options contribute to the key of the stage cache.
+// The part of the key of the stage cache that depends on the options of a job. Stateless.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 namespace color3d {
 
 struct StageKeyPart {
-  // Of the kind, its options and the seed: equal bytes, equal work. Empty when the job must not be
-  // served from the cache or found in it (the report of a graph).
+  // From the kind, its options and the seed: equal bytes, equal work. Empty if the job is not
+  // cached (the report of a graph).
   std::string bytes;
-  // What the bytes name without saying what it is: the caller adds the files' digests and the
-  // backends' addresses, so that other weights under an old name are other work.
+  // Names in the options. The caller adds digests of the files and addresses of the backends, so
+  // that other weights under the same name are other work.
   std::vector<std::string> models;
   std::vector<std::string> backends;
 };

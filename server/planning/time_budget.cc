@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string>
 
+#include "core/catalogue/estimates.h"
+#include "core/catalogue/film_rate.h"
 #include "core/catalogue/stages.h"
 #include "proto/option_text.h"
 #include "server/base/service_error.h"
@@ -15,33 +17,30 @@ namespace {
 
 // Measured at 500 px on two cores (tests/bench/RESULTS.md "Scenes end to end").
 constexpr double kBaseSeconds = 6.0;
-constexpr double kSecondsPerPhoto = 1.7;  // carries into and colours one view, renders, evaluates
-// Of a film, most of whose colours go along with motion: carrying 0.1, colouring 0.3, movie and
-// figures 0.1.
+constexpr double kSecondsPerPhoto = 1.7;  // carrying, colouring, rendering and scoring one view
+// Films are coloured along the optical flow: carrying 0.1, colouring 0.3, movie and metrics 0.1.
 constexpr double kSecondsPerFrame = 0.5;
-constexpr double kPosesSecondsPerPhoto = 0.6;  // structure-from-motion
-constexpr double kMinScheduledSeconds = 15.0;  // below this the pictures are not worth having
+constexpr double kMinScheduledSeconds = 15.0;  // with less, the result is of no use
 
-// Of what is left: where the error falls fastest per second.
+// Shares of the rest, chosen by where the error falls fastest per second.
 constexpr double kGeometryShare = 0.25;
 constexpr double kPersonalizeShare = 0.70;
 constexpr double kChromaShare = 0.05;
-
-constexpr double kFramesPerSecond = 25.0;  // of pictures, unless their import is told
 
 bool FindsPoses(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   return facts.is_film ? import.film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO
                        : !facts.has_poses;
 }
 
-// Those of video files are not counted before the import.
-bool ViewsAreKnown(const SceneFacts& facts) { return facts.photos > 0; }
+// The frames of video files are not counted before the import.
+bool ViewsAreKnown(const SceneFacts& facts) { return facts.photos > 0 || facts.is_splat; }
 
-// Of a film those of its pictures that the import will take.
+// Number of views that the import will make.
 int ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  if (facts.is_splat) return import.has_splat_views() ? import.splat_views() : kSplatViews;
   if (!facts.is_film) return facts.photos;
-  const double rate =
-      import.has_film_frames_per_second() ? import.film_frames_per_second() : kFramesPerSecond;
+  const double rate = import.has_film_frames_per_second() ? import.film_frames_per_second()
+                                                          : kDefaultFramesPerSecond;
   const auto first_from = [&](double time_s) {
     return static_cast<int>(std::clamp(std::ceil(time_s * rate), 0.0, 1.0 * facts.photos));
   };
@@ -53,7 +52,7 @@ int ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
 
 std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   const double fixed = FixedSeconds(facts, import);
-  const std::string what =
+  const std::string subject =
       !ViewsAreKnown(facts)
           ? "a film takes, without its frames,"
           : fmt::format("{} {} take", ViewsOf(facts, import), facts.is_film ? "frames" : "photos");
@@ -64,7 +63,7 @@ std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSc
       "time_budget_seconds is {:.0f}, but {} about {:.0f} s in stages that cannot be shortened{}; "
       "give at least {:.0f} s{}",
       std::ceil(seconds),
-      what,
+      subject,
       std::ceil(fixed),
       ViewsAreKnown(facts) && FindsPoses(facts, import) ? " (finding their poses among them)" : "",
       std::ceil(fixed + kMinScheduledSeconds),
@@ -89,11 +88,11 @@ TimeBudget DivideTimeBudget(double seconds,
                        {{fmt::format("spec.{}.time_budget_seconds", kind::kColorizeScene),
                          "too short for this scene"}});
   }
-  if (facts.is_splat) {  // its geometry is there
+  if (facts.is_splat) {  // the geometry is given
     return {0.0, (kGeometryShare + kPersonalizeShare) * rest, kChromaShare * rest};
   }
   if (facts.is_film && !FindsPoses(facts, import)) {  // nothing is reconstructed
-    // What geometry and chroma would have is for frames that are not counted.
+    // The shares of geometry and chroma are kept for frames that are not counted yet.
     return {0.0, ViewsAreKnown(facts) ? rest : kPersonalizeShare * rest, 0.0};
   }
   return {kGeometryShare * rest, kPersonalizeShare * rest, kChromaShare * rest};

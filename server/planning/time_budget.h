@@ -1,5 +1,5 @@
-// How a time budget for a whole scene is divided among the stages whose schedules can be shortened.
-// Pure arithmetic on estimates; the stages hold themselves to their shares.
+// Divides the time budget of a scene among the stages whose schedules can be shortened. Pure
+// arithmetic on estimates; the stages keep to their shares.
 #pragma once
 
 #include "color3d/v1/job.pb.h"
@@ -13,19 +13,19 @@ struct TimeBudget {
   double chroma_seconds = 0.0;
 };
 
-// Seconds that the stages without a schedule take on two cores: poses, colouring every view,
-// export, renders, report. Without the frames of video files, which are not counted before they are
-// imported. `import`: which frames of a film are taken, and whether their poses are looked for.
+// Estimated seconds of the stages without a schedule on two cores: poses, colouring of every view,
+// export, renders, report. Frames of video files do not count: their number is unknown before the
+// import. `import`: number of views of a splat, frames of a film, search for their poses.
 double FixedSeconds(const SceneFacts& facts, const v1::ImportSceneSpec& import = {});
 
-// Throws ServiceError{kInvalidArgument, BAD_OPTION} naming the least that works when `seconds`
-// leave nothing for the rest.
+// Throws ServiceError{kInvalidArgument, BAD_OPTION} with the smallest possible budget if `seconds`
+// leaves too little for the stages with a schedule.
 TimeBudget DivideTimeBudget(double seconds,
                             const SceneFacts& facts,
                             const v1::ImportSceneSpec& import);
 
-// Writes a stage's share into its options, at most what they take as a time limit, unless they
-// have one of their own.
+// Sets the time limit of a stage to its share, at most the limit's maximum. A limit that is set is
+// kept.
 void ApplyTimeBudget(const TimeBudget& budget, v1::JobSpec* spec);
 
 }  // namespace color3d

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/catalogue/stages.h"
+#include "proto/option_text.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/spec_check.h"
 #include "tests/support/service/planned_graphs.h"
@@ -12,7 +13,7 @@ namespace color3d {
 namespace {
 using ::testing::HasSubstr;
 
-TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
+TEST(Planner, DividesTheTimeBudget) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(90);
   const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
@@ -26,21 +27,39 @@ TEST(Planner, TimeBudgetIsDividedAmongTheStagesThatCanEndEarlier) {
   EXPECT_NEAR(geometry + personalize + chroma + FixedSeconds(kTwentyPhotos), 90.0, 1e-6);
 }
 
-TEST(Planner, ASplatsGeometryTakesNoTime) {
+TEST(Planner, GeometryOfASplatTakesNoTime) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(90);
-  const SceneFacts splat = {.photos = kSplatViews, .has_poses = true, .is_splat = true};
+  const SceneFacts splat = {.has_poses = true, .is_splat = true};
   const NewGraph graph = PlanJob(spec, {}, splat);
   const double personalize = SpecOf(graph, "personalize").personalize().time_limit_seconds();
   const double chroma = SpecOf(graph, "solve_chroma").solve_chroma().time_limit_seconds();
   EXPECT_NEAR(personalize + chroma + FixedSeconds(splat), 90.0, 1e-6);
 }
 
+TEST(Planner, BudgetsAllViewsOfASplat) {
+  const SceneFacts splat = {.has_poses = true, .is_splat = true};
+  const SceneFacts photos = {.photos = 200, .has_poses = true};
+  v1::ImportSceneSpec import;
+  EXPECT_EQ(FixedSeconds(splat, import), FixedSeconds({.photos = 24, .has_poses = true}));
+  import.set_splat_views(200);
+  EXPECT_EQ(FixedSeconds(splat, import), FixedSeconds(photos));
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(90);
+  *spec.mutable_colorize_scene()->mutable_import_scene() = import;
+  EXPECT_THROW(PlanJob(spec, {}, splat), Error) << "200 views take more than 90 s";
+}
+
+TEST(Planner, DefaultSplatViewsAreThoseOfTheApi) {
+  const auto* field = v1::ImportSceneSpec::descriptor()->FindFieldByName("splat_views");
+  EXPECT_EQ(InfoOf(field).default_value(), std::to_string(kSplatViews));
+}
+
 double PersonalizeSeconds(const v1::JobSpec& spec, const SceneFacts& facts) {
   return SpecOf(PlanJob(spec, {}, facts), "personalize").personalize().time_limit_seconds();
 }
 
-TEST(Planner, AFilmsBudgetGoesToPersonalizationWhereNothingIsReconstructed) {
+TEST(Planner, BudgetOfAFilmGoesToPersonalization) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(120);
   const SceneFacts film = {.photos = 65, .is_film = true};
@@ -55,7 +74,7 @@ TEST(Planner, AFilmsBudgetGoesToPersonalizationWhereNothingIsReconstructed) {
   EXPECT_NEAR(geometry, 0.25 * (120.0 - FixedSeconds(film, *import)), 1e-6);
 }
 
-TEST(Planner, FramesOfAFilmThatAreNotTakenTakeNoTime) {
+TEST(Planner, UnusedFramesTakeNoTime) {
   const SceneFacts film = {.photos = 3000, .is_film = true};
   const auto same_as = [&](int frames, const v1::ImportSceneSpec& import) {
     EXPECT_NEAR(
@@ -74,7 +93,7 @@ TEST(Planner, FramesOfAFilmThatAreNotTakenTakeNoTime) {
   same_as(0, import);
 }
 
-TEST(Planner, AFilmWhoseFramesNobodyHasCountedIsBoundedAndNotRefused) {
+TEST(Planner, BudgetsFilmsOfUnknownLength) {
   const SceneFacts video = {.photos = 0, .is_film = true};
   const SceneFacts rig = {.photos = 0, .has_poses = true};
   v1::JobSpec spec = SceneSpec();
@@ -86,7 +105,7 @@ TEST(Planner, AFilmWhoseFramesNobodyHasCountedIsBoundedAndNotRefused) {
   }
 }
 
-TEST(Planner, AFilmsRefusalSpeaksOfItsFrames) {
+TEST(Planner, RefusalOfAFilmSpeaksOfFrames) {
   const auto complaint = [](double seconds, const SceneFacts& facts) {
     v1::JobSpec spec = SceneSpec();
     spec.mutable_colorize_scene()->set_time_budget_seconds(seconds);
@@ -104,7 +123,7 @@ TEST(Planner, AFilmsRefusalSpeaksOfItsFrames) {
               HasSubstr("a film takes, without its frames, about 6 s"));
 }
 
-TEST(Planner, AShareOfALongBudgetIsNoMoreThanAStagesLimitMayBe) {
+TEST(Planner, SharesStayWithinTheLimitOfAStage) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(604'800);
   const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
@@ -113,7 +132,7 @@ TEST(Planner, AShareOfALongBudgetIsNoMoreThanAStagesLimitMayBe) {
   }
 }
 
-TEST(Planner, ExactlyTheStagesThatKeepATimeLimitGetAShareOfTheBudget) {
+TEST(Planner, StagesWithATimeLimitGetAShare) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(90);
   const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
@@ -127,7 +146,7 @@ TEST(Planner, ExactlyTheStagesThatKeepATimeLimitGetAShareOfTheBudget) {
   }
 }
 
-TEST(Planner, AStagesOwnTimeLimitWinsOverTheBudget) {
+TEST(Planner, TimeLimitOfAStageWins) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(90);
   spec.mutable_colorize_scene()->mutable_reconstruct_geometry()->set_time_limit_seconds(3);
@@ -137,7 +156,7 @@ TEST(Planner, AStagesOwnTimeLimitWinsOverTheBudget) {
             3.0);
 }
 
-TEST(Planner, RefusesABudgetThatTheSceneCannotMeetAndNamesTheLeast) {
+TEST(Planner, RefusesATooShortBudget) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(20);
   const Thrown thrown = PlanError(spec);

@@ -10,6 +10,7 @@
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
+#include "core/catalogue/captures.h"
 #include "core/catalogue/error_reasons.h"
 
 namespace color3d {
@@ -115,17 +116,6 @@ struct Lease {
 };
 
 enum class SceneState { kUploading, kActive };
-enum class StoredLayout {
-  kUnknown,
-  kPhotos,
-  kColmap,
-  kTransforms,
-  kSplat,
-  kFilm,
-  kNerfies,
-  kPosesBounds,
-  kFilms
-};
 
 struct SceneFileRecord {
   std::string path;
@@ -138,7 +128,7 @@ struct SceneRecord {
   std::string project;
   std::string display_name;
   SceneState state = SceneState::kUploading;
-  StoredLayout layout = StoredLayout::kUnknown;
+  CaptureLayout layout = CaptureLayout::kUnknown;
   int photo_count = 0;
   std::vector<SceneFileRecord> files;  // left empty in lists
   int64_t create_ms = 0;

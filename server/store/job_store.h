@@ -163,7 +163,7 @@ class JobStore {
                                               int64_t before_id,
                                               int limit) = 0;
   virtual SceneRecord ActivateScene(const std::string& name,
-                                    StoredLayout layout,
+                                    CaptureLayout layout,
                                     int photo_count,
                                     const RequestKey& request) = 0;
   // `job`: a colorize_key_view job of this scene that has succeeded, or empty to take it back.

@@ -61,7 +61,7 @@ std::vector<SceneRecord> ProjectStore::ListScenes(int64_t before_id, int limit) 
 }
 
 SceneRecord ProjectStore::ActivateScene(const std::string& name,
-                                        StoredLayout layout,
+                                        CaptureLayout layout,
                                         int photo_count,
                                         const RequestKey& request) const {
   return AsNamed(store_->ActivateScene(Stored(name), layout, photo_count, Own(request)));

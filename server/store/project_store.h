@@ -26,7 +26,7 @@ class ProjectStore {
   SceneRecord GetScene(const std::string& name) const;
   std::vector<SceneRecord> ListScenes(int64_t before_id, int limit) const;
   SceneRecord ActivateScene(const std::string& name,
-                            StoredLayout layout,
+                            CaptureLayout layout,
                             int photo_count,
                             const RequestKey& request) const;
   SceneRecord AcceptKeyColor(const std::string& name,

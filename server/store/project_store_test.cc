@@ -16,7 +16,7 @@ class ProjectStoreTest : public JobStoreTest {
       scene.name = "scenes/house";
       scene.files = {{"a.jpg", {Sha256Hex("photo"), 5}}};
       project.CreateScene(scene, {"CreateScene", "same id", "same body"}, {});
-      project.ActivateScene("scenes/house", StoredLayout::kPhotos, 1, {});
+      project.ActivateScene("scenes/house", CaptureLayout::kPhotos, 1, {});
     }
   }
   static NewGraph Graph() {
@@ -127,8 +127,8 @@ TEST_F(ProjectStoreTest, RowsCountInWhatAProjectHas) {
   EXPECT_GE(a_.Usage().row_bytes - before, 100 * 900);
   EXPECT_EQ(a_.Usage().scenes, 2);
   EXPECT_EQ(a_.Usage().uncommitted_scenes, 1);
-  a_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
-  a_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+  a_.ActivateScene(scene.name, CaptureLayout::kPhotos, 1, {});
+  a_.ActivateScene(scene.name, CaptureLayout::kPhotos, 1, {});
   EXPECT_EQ(a_.Usage().uncommitted_scenes, 0);
   const int64_t of_others = b_.Usage().row_bytes, without_job = a_.Usage().row_bytes;
   NewGraph graph = Graph();
@@ -160,9 +160,9 @@ TEST_F(ProjectStoreTest, ScenesHaveALimitAndThoseThatAreNeverCommittedASmallerOn
   EXPECT_EQ(create(a_, "two"), "nothing");
   EXPECT_EQ(create(a_, "three"), "QUOTA_EXCEEDED") << "two are not committed";
   EXPECT_EQ(create(b_, "three"), "nothing") << "another project";
-  a_.ActivateScene("scenes/one", StoredLayout::kPhotos, 1, {});
+  a_.ActivateScene("scenes/one", CaptureLayout::kPhotos, 1, {});
   EXPECT_EQ(create(a_, "three"), "nothing");
-  a_.ActivateScene("scenes/two", StoredLayout::kPhotos, 1, {});
+  a_.ActivateScene("scenes/two", CaptureLayout::kPhotos, 1, {});
   EXPECT_EQ(create(a_, "four"), "QUOTA_EXCEEDED") << "four in all";
   a_.DeleteScene("scenes/one", {});
   EXPECT_EQ(create(a_, "four"), "nothing");

@@ -163,7 +163,7 @@ TEST_F(SqliteJobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
   NewGraph graph = PersonalizeJobs(2);
   graph.jobs[1].scene = "scenes/other";
   EXPECT_EQ(ReasonThrown([&] { store_->CreateGraph(graph, {}, kNoLimit); }), "SCENE_NOT_ACTIVE");
-  store_->ActivateScene("scenes/other", StoredLayout::kPhotos, 1, {});
+  store_->ActivateScene("scenes/other", CaptureLayout::kPhotos, 1, {});
   const JobRecord root = store_->CreateGraph(graph, {}, kNoLimit);
   const auto children = store_->ListChildren(root.name);
   EXPECT_EQ(children[0].scene, "scenes/test");

@@ -40,7 +40,7 @@ class SqliteJobStore : public JobStore {
                                       int64_t before_id,
                                       int limit) override;
   SceneRecord ActivateScene(const std::string& name,
-                            StoredLayout layout,
+                            CaptureLayout layout,
                             int photo_count,
                             const RequestKey& request) override;
   SceneRecord AcceptKeyColor(const std::string& name,

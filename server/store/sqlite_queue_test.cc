@@ -171,7 +171,7 @@ TEST_F(QueueTest, ScenesThatAreNeverCommittedGoEarlier) {
   now_ += kGrace;
   EXPECT_EQ(unused(), std::vector<std::string>{"scenes/abandoned"})
       << "not the one that is committed and has no job, nor the young one";
-  store_->ActivateScene("scenes/abandoned", StoredLayout::kPhotos, 1, {});
+  store_->ActivateScene("scenes/abandoned", CaptureLayout::kPhotos, 1, {});
   EXPECT_TRUE(unused().empty());
 }
 

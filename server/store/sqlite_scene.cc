@@ -111,7 +111,7 @@ std::vector<SceneRecord> SqliteJobStore::ListScenes(const std::optional<std::str
 }
 
 SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
-                                          StoredLayout layout,
+                                          CaptureLayout layout,
                                           int photo_count,
                                           const RequestKey& request) {
   const auto held = connections_.Write();

@@ -290,7 +290,7 @@ TEST_F(StoreCostTest, CostDoesNotGrowWithHistory) {
     SceneRecord record;
     record.name = scene;
     Mine().CreateScene(record, {}, {});
-    Mine().ActivateScene(scene, StoredLayout::kPhotos, 1, {});
+    Mine().ActivateScene(scene, CaptureLayout::kPhotos, 1, {});
   }
   AddHistory(40);
   const std::map<std::string, int64_t> few = Costs();

@@ -31,21 +31,6 @@ void LinkOrCopy(const fs::path& blob, const fs::path& target) {
   fs::copy_file(blob, target);
 }
 
-std::string MediaType(const std::string& name) {
-  static const std::map<std::string, std::string> types = {{".png", "image/png"},
-                                                           {".jpg", "image/jpeg"},
-                                                           {".jpeg", "image/jpeg"},
-                                                           {".json", "application/json"},
-                                                           {".csv", "text/csv"},
-                                                           {".txt", "text/plain"},
-                                                           {".log", "text/plain"},
-                                                           {".html", "text/html"},
-                                                           {".svg", "image/svg+xml"},
-                                                           {".mp4", "video/mp4"}};
-  const auto type = types.find(fs::path(name).extension().string());
-  return type != types.end() ? type->second : "application/octet-stream";
-}
-
 // Of a model's file and all that is read beside it.
 std::string IdentityOf(const fs::path& model) {
   std::string identity;
@@ -321,7 +306,7 @@ void Attempt::Publish(const StageOutput& output) {
                   name);
     }
     context_.blobs.RequireSpace(0);
-    publication.artifacts.push_back({name, context_.blobs.PutFile(file), MediaType(name)});
+    publication.artifacts.push_back({name, context_.blobs.PutFile(file), MediaTypeOf(name)});
     if (keeper_.stop_reason() == StopReason::kLeaseLost) keeper_.token().ThrowIfCancelled();
   }
   // Touched, so that no sweep takes them before they are named; and there, whoever made them.

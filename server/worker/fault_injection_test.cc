@@ -118,7 +118,7 @@ class World {
     scene.name = kScene;
     scene.files = {{"a.jpg", name.digest}};
     store_.CreateScene(scene, {}, {});
-    store_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+    store_.ActivateScene(scene.name, CaptureLayout::kPhotos, 1, {});
   }
 
   // A job that is submitted alone, or with one that it reads.

@@ -1,5 +1,9 @@
 #include "server/worker/stage_options.h"
 
+#include "core/base/error.h"
+#include "server/planning/asked_formats.h"
+#include "server/planning/key_view_jobs.h"
+
 namespace color3d {
 namespace {
 
@@ -12,6 +16,15 @@ ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precisi
     default:
       return ColorizerOptions::Precision::kAuto;
   }
+}
+
+// Throws when a job was planned by a version whose stages coloured additional key views themselves.
+void RequireColoredBefore(const v1::FurtherKeyView& key) {
+  if (!key.has_color()) return;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "an earlier version of the server planned this job without a job that colours the "
+              "additional key view {}; submit it again",
+              key.view());
 }
 
 }  // namespace
@@ -127,12 +140,24 @@ CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
     options.carry.luminance_tolerance = spec.luminance_tolerance();
   if (spec.has_depth_side_px()) options.depth_side_px = spec.depth_side_px();
   if (spec.has_depth_sources()) options.depth_sources = spec.depth_sources();
+  for (const v1::FurtherKeyView& key : spec.further_key_views()) {
+    RequireColoredBefore(key);
+    options.additional_key_views.push_back(key.view());
+  }
   return options;
 }
 
 CorrectColorsOptions CorrectOptionsFrom(const v1::CorrectColorsSpec& spec) {
   CorrectColorsOptions options;
   if (spec.has_proposals()) options.proposals = spec.proposals();
+  for (const v1::FurtherKeyView& correction : spec.corrections()) {
+    if (!HasRange(correction)) continue;
+    RequireColoredBefore(correction);
+    RangeKeyView& range = options.ranges.emplace_back();
+    range.view = correction.view();
+    if (correction.has_begin_s()) range.begin_s = correction.begin_s();
+    if (correction.has_end_s()) range.end_s = correction.end_s();
+  }
   return options;
 }
 
@@ -171,13 +196,8 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) 
 
 ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec) {
   ExportOptions options;
-  if (spec.has_ply()) options.ply = spec.ply();
-  options.sog = spec.has_sog() ? spec.sog() : options.ply;
-  options.spz = spec.spz();
+  options.formats = AskedFormats(spec);
   if (spec.has_spz_version()) options.spz_version = spec.spz_version();
-  options.glb = spec.glb();
-  options.splat = spec.splat();
-  if (spec.has_splat4d()) options.splat4d = spec.splat4d();
   options.confidence = spec.confidence();
   options.moments = spec.moments();
   return options;

@@ -15,9 +15,11 @@ SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec);
 HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);
 AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec& spec);
 ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t seed);
-// Additional key views are set by the caller.
+// Throws Error{kFailedPrecondition} for a job of a version that planned no jobs for additional key
+// views.
 CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec);
-// Corrections are set by the caller, which holds the blobs.
+// Corrections without a range of time are set by the caller, which holds the blobs. Throws as
+// CarryOptionsFrom.
 CorrectColorsOptions CorrectOptionsFrom(const v1::CorrectColorsSpec& spec);
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed);
 ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed);

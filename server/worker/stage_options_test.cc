@@ -21,6 +21,44 @@ using google::protobuf::Message;
 
 using Precision = ColorizerOptions::Precision;
 
+template <class Work>
+std::string Refusal(const Work& work) {
+  try {
+    work();
+  } catch (const Error& e) {
+    return e.what();
+  }
+  return "nothing was refused";
+}
+
+TEST(CarryOptionsFromTest, NamesAdditionalKeyViewsInOrder) {
+  v1::CarryColorSpec spec;
+  spec.add_further_key_views()->set_view("b");
+  spec.add_further_key_views()->set_view("a");
+  EXPECT_EQ(CarryOptionsFrom(spec).additional_key_views, (std::vector<std::string>{"b", "a"}));
+}
+
+// As planned before additional key views had jobs of their own.
+TEST(CarryOptionsFromTest, RefusesJobsOfEarlierVersions) {
+  v1::FurtherKeyView key;
+  key.set_view("b");
+  key.mutable_color()->set_automatic(true);
+  v1::CarryColorSpec carry;
+  *carry.add_further_key_views() = key;
+  EXPECT_NE(Refusal([&] { CarryOptionsFrom(carry); }).find("submit it again"), std::string::npos);
+  v1::CorrectColorsSpec correct;
+  *correct.add_corrections() = key;
+  EXPECT_NO_THROW(CorrectOptionsFrom(correct)) << "a correction by strokes has its colours";
+  correct.mutable_corrections(0)->set_begin_s(1.0);
+  EXPECT_NE(Refusal([&] { CorrectOptionsFrom(correct); }).find("submit it again"),
+            std::string::npos);
+  correct.mutable_corrections(0)->clear_color();
+  const CorrectColorsOptions options = CorrectOptionsFrom(correct);
+  ASSERT_EQ(options.ranges.size(), 1u);
+  EXPECT_EQ(options.ranges[0].begin_s, 1.0);
+  EXPECT_FALSE(options.ranges[0].end_s);
+}
+
 TEST(ColorizerOptionsFromTest, UnsetFieldsKeepTheMethodsDefaults) {
   ColorizerOptions defaults;
   defaults.seed = 17;

@@ -95,24 +95,6 @@ ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, Blob
   return options;
 }
 
-// Throws when a job was planned by a version whose stages coloured additional key views themselves.
-void RequireColoredBefore(const v1::FurtherKeyView& key) {
-  if (!key.has_color()) return;
-  throw Error(ErrorCode::kFailedPrecondition,
-              "an earlier version of the server planned this job without a job that colours the "
-              "additional key view {}; submit it again",
-              key.view());
-}
-
-CarryColorOptions CarryOptions(const v1::CarryColorSpec& spec) {
-  CarryColorOptions options = CarryOptionsFrom(spec);
-  for (const v1::FurtherKeyView& key : spec.further_key_views()) {
-    RequireColoredBefore(key);
-    options.additional_key_views.push_back(key.view());
-  }
-  return options;
-}
-
 PaintedColors PaintedFrom(const v1::KeyColorSource& source, BlobSource& blobs) {
   using Kind = PaintedColors::Kind;
   switch (source.source_case()) {
@@ -133,15 +115,8 @@ PaintedColors PaintedFrom(const v1::KeyColorSource& source, BlobSource& blobs) {
 CorrectColorsOptions CorrectOptions(const v1::CorrectColorsSpec& spec, BlobSource& blobs) {
   CorrectColorsOptions options = CorrectOptionsFrom(spec);
   for (const v1::FurtherKeyView& correction : spec.corrections()) {
-    if (!HasRange(correction)) {
-      options.corrections.push_back({correction.view(), PaintedFrom(correction.color(), blobs)});
-      continue;
-    }
-    RequireColoredBefore(correction);
-    RangeKeyView& range = options.ranges.emplace_back();
-    range.view = correction.view();
-    if (correction.has_begin_s()) range.begin_s = correction.begin_s();
-    if (correction.has_end_s()) range.end_s = correction.end_s();
+    if (HasRange(correction)) continue;
+    options.corrections.push_back({correction.view(), PaintedFrom(correction.color(), blobs)});
   }
   return options;
 }
@@ -154,7 +129,7 @@ RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
 
 ColorizerOptions PersonalizeOptions(v1::PersonalizeSpec spec, const StageContext& context) {
   // As a part of colorize_scene it has its size already.
-  if (ReadScene(context).IsFilm()) LearnAtTheSizeOfFrames(kDefaultMaxSidePx, &spec);
+  if (ReadScene(context).IsFilm()) TrainAtFrameSize(kDefaultMaxSidePx, &spec);
   return ColorizerOptionsFrom(spec, context.seed());
 }
 
@@ -233,7 +208,7 @@ class CoreStageRunner : public StageRunner {
         return RunPersonalize(
             PersonalizeOptions(spec.personalize(), context), context, spec.personalize().encoder());
       case JobSpec::kCarryColor:
-        return RunCarryColor(CarryOptions(spec.carry_color()), context);
+        return RunCarryColor(CarryOptionsFrom(spec.carry_color()), context);
       case JobSpec::kCorrectColors:
         return RunCorrectColors(
             CorrectOptions(spec.correct_colors(), blobs), context, spec.correct_colors().encoder());

@@ -36,6 +36,7 @@ class MeetingRunner : public StageRunner {
     ++running_;
     most_ = std::max(most_, running_);
     projects_[run.job_name] = run.submission;
+    for (const auto& [name, file] : run.inputs) inputs_[run.job_name].push_back(name);
     met_.notify_all();
     met_.wait_for(lock, std::chrono::seconds(3), [&] { return running_ >= wanted; });
     lock.unlock();
@@ -56,6 +57,7 @@ class MeetingRunner : public StageRunner {
   int wanted = 3;
   int most() const { return most_; }
   const std::map<std::string, std::string>& projects() const { return projects_; }
+  std::vector<std::string> InputsOf(const JobRecord& job) const { return inputs_.at(job.name); }
 
  private:
   std::mutex mutex_;
@@ -63,6 +65,7 @@ class MeetingRunner : public StageRunner {
   int running_ = 0;
   int most_ = 0;
   std::map<std::string, std::string> projects_;
+  std::map<std::string, std::vector<std::string>> inputs_;  // names, sorted
 };
 
 class WorkerLoopTest : public testing::Test {
@@ -71,7 +74,7 @@ class WorkerLoopTest : public testing::Test {
     SceneRecord scene;
     scene.name = "scenes/test";
     store_.CreateScene(scene, {}, {});
-    store_.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+    store_.ActivateScene(scene.name, CaptureLayout::kPhotos, 1, {});
     options_.data_folder = folder_.path();
     options_.code_version = "test";
     options_.poll = std::chrono::milliseconds(20);
@@ -146,6 +149,31 @@ TEST_F(WorkerLoopTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
     EXPECT_GT(job.usage.peak_memory_bytes, 0);
   }
   EXPECT_EQ(succeeded, 2);
+}
+
+TEST_F(WorkerLoopTest, ArtifactsOfAdditionalKeyViewsLieInNumberedFolders) {
+  runner_.wanted = 1;
+  NewGraph graph;
+  graph.scene = "scenes/test";
+  v1::JobSpec spec;
+  for (const char* view : {"", "b", "a"}) {
+    spec.mutable_colorize_key_view()->set_view(view);
+    NewJob job;
+    job.kind = kind::kColorizeKeyView;
+    job.spec = spec.SerializeAsString();
+    graph.jobs.push_back(job);
+  }
+  spec.mutable_carry_color();
+  NewJob carry;
+  carry.kind = kind::kCarryColor;
+  carry.spec = spec.SerializeAsString();
+  carry.inputs = {0, 1, 2};
+  graph.jobs.push_back(carry);
+  const JobRecord root = store_.CreateGraph(graph, {}, 1000);
+  Work({root});
+  const std::string name = artifact::kColorizer;  // what every job leaves here
+  EXPECT_EQ(runner_.InputsOf(root),
+            (std::vector<std::string>{name, "key_views/1/" + name, "key_views/2/" + name}));
 }
 
 TEST_F(WorkerLoopTest, NoMoreThanTheConfiguredNumberRunAtOnce) {

@@ -16,7 +16,7 @@ constexpr char kScene[] = "scenes/a";
 constexpr SceneFacts kFacts[] = {{.photos = 20, .has_poses = true},
                                  {.photos = 2, .augment_files = 3},
                                  {.photos = 90, .is_film = true},
-                                 {.photos = kSplatViews, .has_poses = true, .is_splat = true}};
+                                 {.has_poses = true, .is_splat = true}};
 
 // A job of each kind that others read.
 std::vector<JobRecord> InputsOf(const std::string& scene) {

@@ -41,7 +41,7 @@ struct Fixture {
     scene.files = {{"a.png", picture}};
     store.HoldBlob("", picture);
     store.CreateScene(scene, {}, {});
-    store.ActivateScene(scene.name, StoredLayout::kPhotos, 1, {});
+    store.ActivateScene(scene.name, CaptureLayout::kPhotos, 1, {});
     v1::JobSpec spec;
     spec.set_scene(kScene);
     spec.mutable_personalize()->set_encoder("mine");

@@ -72,6 +72,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     }
     const SceneCheck check =
         CheckScene(scene, Shared().blobs, Shared().project, limits, [] { return false; });
-    if (check.layout != DetectLayout(scene.files) || check.photo_count < 0) std::abort();
+    std::vector<std::string> paths;
+    for (const SceneFileRecord& file : scene.files) paths.push_back(file.path);
+    if (check.layout != DetectCapture(paths) || check.photo_count < 0) std::abort();
   });
 }

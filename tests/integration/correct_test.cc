@@ -135,9 +135,9 @@ TEST_F(CorrectTest, BadInputSaysWhatToDo) {
   ExpectRefused({"--view", "view002", "--at", "5000,5", "--color", "#ff0000"}, "outside");
   ExpectRefused({"--view", "view002", "--at", "5;5", "--color", "#ff0000"}, "give X,Y");
   ExpectRefused({"--view", "view002", "--at", "5,5"}, "--color");
-  ExpectRefused({"--view", "view002"}, "needs what was painted");
-  ExpectRefused({"--at", "5,5", "--color", "#ff0000"}, "--view NAME");
-  ExpectRefused({"--undo", "some"}, "give one, or all");
+  ExpectRefused({"--view", "view002"}, "needs a correction");
+  ExpectRefused({"--at", "5,5", "--color", "#ff0000"}, "--view is missing");
+  ExpectRefused({"--undo", "some"}, "give a number, or all");
   // A picture that was not painted on.
   ExpectRefused(
       {"--view", "view001", "--image", (Path("room") / "images" / "view001.png").string()},

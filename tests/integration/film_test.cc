@@ -107,7 +107,7 @@ TEST_F(FilmTest, FramesComeBackInColor) {
   EXPECT_FALSE(fs::exists(Path("out") / "scene.ply"));
   const ProcessResult turned = Client({"turntable", Path("out").string()});
   EXPECT_EQ(turned.exit_code, 2);
-  EXPECT_THAT(turned.err, HasSubstr("coloured without poses, and no camera can move through it"));
+  EXPECT_THAT(turned.err, HasSubstr("coloured without poses, so no camera can move through it"));
 }
 
 TEST_F(FilmTest, ABenchmarkTakesAFilm) {
@@ -170,7 +170,7 @@ TEST_F(FilmTest, PosesThatTheSelectionAskedForAreAskedForWhenItsKeyViewIsAccepte
       "colorize", "--scene", scene, "-o", Path("out").string()};
   const ProcessResult again = Client(colorize + std::vector<std::string>{"--poses"});
   EXPECT_EQ(again.exit_code, 2);
-  EXPECT_THAT(again.err, HasSubstr("--poses were settled when the key view was selected"));
+  EXPECT_THAT(again.err, HasSubstr("--poses were fixed when the key view was selected"));
   const ProcessResult result = Client(colorize + QuickOptions());
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.err, testing::Not(HasSubstr("frames of a film without poses")));
@@ -295,7 +295,9 @@ TEST_F(FilmTest, ARangeOfTimeIsRecoloredAndNothingElseIsMadeAnew) {
     EXPECT_THAT(artifact.name(), testing::ContainsRegex("n11[0-4].png"));
   }
   EXPECT_EQ(frames, 5);
-  EXPECT_THAT(ReadFile(Path("out") / "report.html"), HasSubstr("n112.png=COLOURED_1.png@0.4-0.56"));
+  const std::string report = ReadFile(Path("out") / "report.html");
+  EXPECT_THAT(report, HasSubstr("n112.png=COLOURED_1.png@0.4-0.56"));
+  EXPECT_THAT(report, HasSubstr("<h2>Additional key view</h2>"));
   FilmReader movie(Path("out") / "scene.mp4");
   for (int frame = 0; frame < kFrames; ++frame) {
     const Image image = movie.Read(frame);

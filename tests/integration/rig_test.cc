@@ -73,7 +73,7 @@ TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
   for (const json& step : json::parse(ReadFile(Path("out") / "plan.json"))) {
     if (step["step"] != "deformation_over_time") continue;
     EXPECT_THAT(step["reason"].get<std::string>(),
-                HasSubstr("the views show 9 moments, seen by 3 cameras; partly dynamic: "));
+                HasSubstr("the views show 9 time steps, seen by 3 cameras; partly dynamic: "));
     told = step["needed"] && step.value("motion", "") == "partly dynamic" &&
            step.value("moving_share", 0.0) > 0.0;
   }

@@ -78,15 +78,7 @@ constexpr Kind kKinds[] = {
      "pictures of other formats",
      "convert them to PNG, e.g. `mogrify -format png *`"}};
 
-// What we leave in a folder that is given with -o.
-constexpr const char* kResultPictures[] = {artifact::kKeyViewGray,
-                                           artifact::kKeyViewRanking,
-                                           artifact::kKeyViewColored,
-                                           artifact::kKeyColor,
-                                           artifact::kKeyColorRegions,
-                                           artifact::kAugmentationSheet};
-constexpr const char* kResultFilmsAndSplats[] = {
-    artifact::kMovie, artifact::kFilm, artifact::kPly, artifact::kSog, artifact::kSpz};
+// Results that show that a folder was given with -o.
 constexpr const char* kResultRecords[] = {artifact::kKeyView,
                                           artifact::kKeyColorFacts,
                                           artifact::kMetrics,
@@ -94,24 +86,6 @@ constexpr const char* kResultRecords[] = {artifact::kKeyView,
                                           artifact::kScene,
                                           artifact::kImportFacts,
                                           artifact::kReport};
-constexpr const char* kResultFolders[] = {artifact::kGivenViews,
-                                          artifact::kMovingRegions,
-                                          artifact::kCarried,
-                                          artifact::kAugmentations,
-                                          artifact::kViewsAb,
-                                          artifact::kProvenance,
-                                          artifact::kCorrectedAb,
-                                          artifact::kCorrectedProvenance,
-                                          artifact::kPaint,
-                                          artifact::kMoments,
-                                          artifact::kRenders,
-                                          artifact::kFilms,
-                                          artifact::kFilmFrames,
-                                          artifact::kFrames,
-                                          artifact::kTruths,
-                                          artifact::kColored2d,
-                                          artifact::kCurves};
-
 template <typename List>
 bool Holds(const List& list, std::string_view text) {
   return std::find(std::begin(list), std::end(list), text) != std::end(list);
@@ -224,7 +198,7 @@ class Lister {
     std::error_code none;
     if (entry.is_symlink(none)) {
       PassOver("links to folders|put the photographs themselves there", path);
-    } else if (beside_results && Holds(kResultFolders, name + "/")) {
+    } else if (beside_results && FindArtifact(name + "/") != nullptr) {
       PassOver("folders of results", path);
     } else {
       ListFolder(path + "/");
@@ -381,9 +355,10 @@ std::vector<std::string> ListPictures(const fs::path& folder,
 }
 
 bool IsResultFile(const fs::path& file) {
-  const std::string name = file.filename().string();
-  return Holds(kResultPictures, name) ||
-         (Holds(kResultFilmsAndSplats, name) && HasResultRecord(file.parent_path()));
+  const Artifact* artifact = FindArtifact(file.filename().string());
+  if (artifact == nullptr) return false;
+  const bool is_picture = std::string_view(artifact->media_type).starts_with("image/");
+  return is_picture || HasResultRecord(file.parent_path());
 }
 
 bool IsSystemFolder(std::string_view name) {

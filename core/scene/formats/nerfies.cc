@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/text/json_text.h"
+#include "core/catalogue/film_rate.h"
 #include "core/scene/formats/npy.h"
 #include "core/scene/formats/transforms_frame.h"
 #include "core/scene/formats/within_reach.h"
@@ -26,7 +27,6 @@ using nlohmann::json;
 
 constexpr char kMetadata[] = "metadata.json";
 constexpr char kPoints[] = "points.npy";
-constexpr double kStepsPerSecond = 25.0;
 constexpr size_t kMaxPoints = 500'000;
 
 json ParseObject(const fs::path& folder, const std::string& file) {
@@ -130,7 +130,7 @@ FrameTime TimeOf(const json& entry, const std::string& name, const std::string& 
   std::optional<double> step = fields.Number("time_id");
   if (!step) step = fields.Number("warp_id");
   FrameTime time{place, file, std::nullopt, ""};
-  if (step) time.time = *step / kStepsPerSecond;
+  if (step) time.time = *step / kDefaultFramesPerSecond;
   time.camera = fmt::format("{:g}", fields.NumberOr("camera_id", 0.0));
   return time;
 }

@@ -116,7 +116,7 @@ TEST_F(Nerfies, IsImportedAndPointsMayBeMissing) {
   ImportOptions options;
   options.hold_out_every_eighth = true;
   const ImportResult result = ImportScene(folder_.path(), scratch_.path(), options, run.control());
-  EXPECT_EQ(result.layout, SceneLayout::kNerfies);
+  EXPECT_EQ(result.layout, CaptureLayout::kNerfies);
   EXPECT_TRUE(result.undistorted);
   EXPECT_EQ(result.scene.points.size(), 20000u);
   EXPECT_EQ(result.scene.HeldOutViews(), (std::vector<int>{8, 9}));  // the fifth moment

@@ -175,7 +175,7 @@ TEST_F(PosesOfPhotos, OfTransformsAreUsedWhereTheyPlaceMore) {
   WriteColmapText(few, Model());
   WriteTransformsJson(scene_, folder_.path() / "transforms.json");
   const ImportResult result = Run();
-  EXPECT_EQ(result.layout, SceneLayout::kTransforms);
+  EXPECT_EQ(result.layout, CaptureLayout::kTransforms);
   EXPECT_EQ(result.scene.views.size(), 4u);
   EXPECT_THAT(result.warnings,
               Contains("transforms.json is used: it has the poses of 4 photos, the COLMAP model in "
@@ -187,7 +187,7 @@ TEST_F(PosesOfPhotos, AModelInAnyUsualPlaceIsUsed) {
     fs::remove_all(folder_.path() / "sparse");
     fs::remove_all(folder_.path() / "colmap");
     WriteColmapText(scene_, folder_.path() / place);
-    EXPECT_EQ(Run().layout, SceneLayout::kColmap) << place;
+    EXPECT_EQ(Run().layout, CaptureLayout::kColmap) << place;
   }
 }
 
@@ -199,7 +199,7 @@ TEST_F(PosesOfPhotos, BlendersFilesAreTakenTogether) {
   WriteTransformsJson(train, folder_.path() / "transforms_train.json");
   WriteTransformsJson(test, folder_.path() / "transforms_test.json");
   const ImportResult result = Run();
-  EXPECT_EQ(result.layout, SceneLayout::kTransforms);
+  EXPECT_EQ(result.layout, CaptureLayout::kTransforms);
   EXPECT_EQ(result.scene.views.size(), 4u);
   EXPECT_THAT(
       result.warnings,
@@ -226,7 +226,7 @@ TEST_F(PosesOfPhotos, PosesBoundsAreOfPhotosToo) {
   fs::remove_all(folder_.path() / "sparse");
   WriteFileAtomic(folder_.path() / "poses_bounds.npy", PosesBounds(scene_));
   const ImportResult result = Run();
-  EXPECT_EQ(result.layout, SceneLayout::kPosesBounds);
+  EXPECT_EQ(result.layout, CaptureLayout::kPosesBounds);
   EXPECT_FALSE(result.ran_structure_from_motion);
   ASSERT_EQ(result.scene.views.size(), 4u);
   for (size_t i = 0; i < 4; ++i) {

@@ -187,7 +187,7 @@ bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
     const size_t others =
         is_nerfies || transforms.empty() ? 0 : CountTransformsPhotos(transforms, scene_folder);
     if (colmap->photos >= others) {
-      result->layout = SceneLayout::kColmap;
+      result->layout = CaptureLayout::kColmap;
       result->warnings = colmap->notes;
       result->scene = ReadColmapModel(
           scene_folder / colmap->folder, scene_folder, &result->warnings, &result->cameras);
@@ -202,13 +202,13 @@ bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
                     colmap->photos));
   }
   if (is_nerfies) {
-    result->layout = SceneLayout::kNerfies;
+    result->layout = CaptureLayout::kNerfies;
     result->scene = ReadNerfies(scene_folder, &result->warnings, &result->cameras);
     result->photos_found = static_cast<int>(result->scene.views.size());
     return true;
   }
   if (!transforms.empty()) {
-    result->layout = SceneLayout::kTransforms;
+    result->layout = CaptureLayout::kTransforms;
     result->scene =
         ReadTransformsJson(transforms, scene_folder, &result->warnings, &result->cameras);
     WarnOfUnposedPhotos(scene_folder, result);
@@ -216,7 +216,7 @@ bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
   }
   std::optional<Scene> of_photos = ReadPosesOfPhotos(scene_folder, &result->warnings);
   if (!of_photos) return false;
-  result->layout = SceneLayout::kPosesBounds;
+  result->layout = CaptureLayout::kPosesBounds;
   result->scene = std::move(*of_photos);
   result->photos_found = static_cast<int>(result->scene.views.size());
   return true;
@@ -228,7 +228,7 @@ void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
   result->warnings.push_back(
       fmt::format("{} is not read: it goes with a COLMAP model{}",
                   kTimesFile,
-                  result->layout == SceneLayout::kPhotos
+                  result->layout == CaptureLayout::kPhotos
                       ? "; give one, or colour the frames of one moving camera with --film --poses"
                       : "; transforms.json and metadata.json have times of their own"));
 }
@@ -306,7 +306,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
   } else {
     ImportPhotos(scene_folder, scratch_folder, options, run, &result);
   }
-  if (result.layout != SceneLayout::kColmap) WarnOfUnreadTimes(scene_folder, &result);
+  if (result.layout != CaptureLayout::kColmap) WarnOfUnreadTimes(scene_folder, &result);
   FinishPosedScene(options, &result);
   for (std::string& note : NotesOnPictures(scene_folder, result.scene.views, run.cancel)) {
     result.warnings.push_back(std::move(note));

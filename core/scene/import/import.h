@@ -7,24 +7,15 @@
 #include <vector>
 
 #include "core/base/run_control.h"
+#include "core/catalogue/captures.h"
 #include "core/scene/import_options.h"
 #include "core/scene/scene.h"
 
 namespace color3d {
 
-enum class SceneLayout {
-  kPhotos,
-  kColmap,
-  kTransforms,
-  kNerfies,
-  kPosesBounds,
-  kPosedFilms,
-  kFilms
-};
-
 struct ImportResult {
   Scene scene;
-  SceneLayout layout = SceneLayout::kPhotos;
+  CaptureLayout layout = CaptureLayout::kPhotos;
   bool ran_structure_from_motion = false;
   SfmReport sfm;               // when it ran
   bool undistorted = false;    // some camera had lens distortion

@@ -71,11 +71,11 @@ TEST_F(Import, ColmapWinsOverTransforms) {
   WritePhotos(scene, folder_.path());
   WritePhoto("images/extra.png");
   WriteTransformsJson(scene, folder_.path() / "transforms.json");
-  EXPECT_EQ(Run().layout, SceneLayout::kTransforms);
+  EXPECT_EQ(Run().layout, CaptureLayout::kTransforms);
   for (const char* place : {"colmap/sparse/0", "sparse", "sparse/0"}) {
     WriteColmapText(scene, folder_.path() / place);
     const ImportResult result = Run();
-    EXPECT_EQ(result.layout, SceneLayout::kColmap) << place;
+    EXPECT_EQ(result.layout, CaptureLayout::kColmap) << place;
     EXPECT_EQ(result.photos_found, 10);
     EXPECT_EQ(result.photos_registered, 9);
     EXPECT_FALSE(result.undistorted);
@@ -163,7 +163,7 @@ TEST_F(Import, AColmapModelWithTimesMovesAsAnyOther) {
   options_.hold_out_every_eighth = true;
   options_.hold_out_camera = "cam1";
   const ImportResult result = Run();
-  EXPECT_EQ(result.layout, SceneLayout::kColmap);
+  EXPECT_EQ(result.layout, CaptureLayout::kColmap);
   EXPECT_TRUE(result.scene.IsDynamic());
   EXPECT_EQ(result.cameras, (std::vector<std::string>{"cam0", "cam1", "cam2"}));
   EXPECT_TRUE(result.warnings.empty());

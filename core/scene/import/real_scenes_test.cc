@@ -94,7 +94,7 @@ TEST_P(RealScenes, ImportIsQuickAndSane) {
   ImportOptions options;
   options.hold_out_every_eighth = true;
   const ImportResult result = ImportScene(folder, scratch.path(), options, run.control());
-  EXPECT_EQ(result.layout, SceneLayout::kColmap);
+  EXPECT_EQ(result.layout, CaptureLayout::kColmap);
   EXPECT_TRUE(result.undistorted);
   EXPECT_FALSE(result.ran_structure_from_motion);
   EXPECT_EQ(result.scene.HeldOutViews().size(), (result.scene.views.size() + 7) / 8);

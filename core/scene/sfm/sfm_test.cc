@@ -68,7 +68,7 @@ TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
     }
   }
   const ImportResult result = Run();
-  EXPECT_EQ(result.layout, SceneLayout::kPhotos);
+  EXPECT_EQ(result.layout, CaptureLayout::kPhotos);
   EXPECT_TRUE(result.ran_structure_from_motion);
   EXPECT_EQ(result.photos_found, 7);
   ASSERT_EQ(result.photos_registered, 7);

@@ -17,7 +17,7 @@ void CarryDynamic(const CarryInputs& inputs, StageContext& context) {
   const SceneSurfaces surfaces(
       inputs, std::min(kFramesCacheBytes, context.MemoryBytes() / 4), context);
   const std::vector<ColoredKeyView> keys = ReadColoredKeyViews(inputs, surfaces, context);
-  const FramesInColor frames(inputs.scene, surfaces.images(), keys, options.film, context);
+  const CarriedFrames frames(inputs.scene, surfaces.images(), keys, options.film, context);
   const auto carry = [&](int view) {
     const ViewSurfaces target = surfaces.Of(view);
     CarriedColor color;

@@ -107,8 +107,8 @@ void CarryFilm(const CarryInputs& inputs, StageContext& context) {
   const std::vector<int> middles = MiddlesWithoutKey(frames.shot, inputs.key_views);
   std::optional<ReturningShots> returning;
   for (size_t i = 0; i < middles.size(); ++i) {
-    done.Tell(fmt::format(
-        "looking for what key frames show in shot {} of {} that have none", i + 1, middles.size()));
+    done.ReportProgress(fmt::format(
+        "looking for places of key frames in shot {} of {} without one", i + 1, middles.size()));
     if (!returning) {
       returning.emplace(frames, keys, options.film, context.pool(), context.cancel());
     }

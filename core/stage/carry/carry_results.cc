@@ -41,7 +41,7 @@ void WriteCoverage(const CarryInputs& inputs,
   if (mean < kSmallCoverage) {
     context.progress().OnWarning(
         fmt::format("the key view shows only {:.1f} % of what the other views show; their colours "
-                    "are inferred from likeness. Colour a second key view, or choose another one",
+                    "are inferred from similarity. Colour a second key view, or choose another one",
                     100.0 * mean));
   }
   WriteCarryFacts(facts, context);

@@ -1,4 +1,4 @@
-// What carrying by depth and visibility has in common for static and dynamic scenes.
+// Carrying by depth and visibility: the parts that static and dynamic scenes share.
 #pragma once
 
 #include <functional>

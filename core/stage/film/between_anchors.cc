@@ -11,12 +11,12 @@
 namespace color3d {
 namespace {
 
-constexpr int kColorChannels = 3;  // a, b and the share that is guessed
+constexpr int kColorChannels = 3;  // a, b and the guessed share
 const float kJustFollowed = std::nextafter(kDecisiveConfidence, 1.0f);
 constexpr float kAnswerFollowed = 0.2f;  // and from which an answer goes along with it
 
-// 1 where the frame's own sources need not be asked.
-Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
+// 1 where no colour needs to be inferred.
+Image KnownPixels(const CarriedColor& of_anchors, const Image& carried_surely) {
   Image known = carried_surely;
   for (size_t i = 0; i < known.data.size(); ++i) {
     if (of_anchors.confidence.data[i] > kDecisiveConfidence) known.data[i] = 1.0f;
@@ -24,14 +24,14 @@ Image KnownOf(const CarriedColor& of_anchors, const Image& carried_surely) {
   return known;
 }
 
-// What the anchors tell of a frame stands for what its sources would.
-InferredColor AnswerOf(const CarriedColor& of_anchors,
-                       const Image& carried_surely,
-                       const Image& luminance,
-                       const ColorSources& sources) {
+// Infers the colours of a frame where the anchors are not sure, and takes theirs elsewhere.
+InferredColor InferBetweenAnchors(const CarriedColor& of_anchors,
+                                  const Image& carried_surely,
+                                  const Image& luminance,
+                                  const ColorSources& sources) {
   InferredColor answer;
-  if (ShareOpen(carried_surely, of_anchors) > kWorthAsking) {
-    answer = sources.infer(luminance, KnownOf(of_anchors, carried_surely));
+  if (ShareOpen(carried_surely, of_anchors) > kWorthInferring) {
+    answer = sources.infer(luminance, KnownPixels(of_anchors, carried_surely));
   } else {
     answer = {Image(luminance.width, luminance.height, 2),
               Image(luminance.width, luminance.height, 1)};
@@ -62,7 +62,7 @@ FilmKey AnchorAsKey(int frame, const FusedColor& color) {
   return {frame, {std::move(channels), Image(width, height, 1, 1.0f)}};
 }
 
-CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, double place) {
+CarriedColor BlendAnchors(CarriedColor before, const CarriedColor& behind, double place) {
   if (before.ab.Empty()) return behind;
   if (behind.ab.Empty()) return before;
   const auto share_behind = static_cast<float>(place);
@@ -104,7 +104,7 @@ size_t FillOpen(const CarriedColor& others, CarriedColor* color) {
   return filled;
 }
 
-void TakeAnswer(const CarriedColor& answer, CarriedColor* color) {
+void TakeNeighborsColor(const CarriedColor& answer, CarriedColor* color) {
   CarriedColor followed = answer;
   for (float& confidence : followed.confidence.data) {
     if (confidence > kAnswerFollowed) confidence = std::max(confidence, kJustFollowed);
@@ -119,11 +119,11 @@ FusedColor ColorBetweenAnchors(const Image& luminance,
                                const CancellationToken& cancel) {
   ColorSources with_anchors = sources;
   with_anchors.infer = [&](const Image& l, const Image& carried_surely) {
-    return AnswerOf(of_anchors, carried_surely, l, sources);
+    return InferBetweenAnchors(of_anchors, carried_surely, l, sources);
   };
   ThreadPool one(1);
   FusedColor fused = ColorOfView(luminance, carried, with_anchors, one, cancel);
-  // What an anchor was given as a guess is one here, too.
+  // Guessed colours of an anchor count as guessed here, too.
   for (size_t i = 0; i < fused.provenance.PlaneSize(); ++i) {
     if (of_anchors.confidence.data[i] <= kDecisiveConfidence) continue;
     float& inferred = fused.provenance.Plane(kInferredPlane)[i];

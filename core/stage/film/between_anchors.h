@@ -1,4 +1,4 @@
-// The colour of a film's frames between two anchors (core/film/anchor_frames.h). Stateless.
+// Colours of the frames between two anchors of a film (core/film/anchor_frames.h). Stateless.
 #pragma once
 
 #include "core/base/cancellation.h"
@@ -8,27 +8,27 @@
 
 namespace color3d {
 
-// An anchor's delivered colours as colours to be followed, all of them sure; a third channel has
-// the share that is guessed of what is not seen.
+// Returns an anchor's final colours for propagation, with confidence 1. A third channel holds the
+// guessed share of the colours that are not seen.
 FilmKey AnchorAsKey(int frame, const FusedColor& color);
 
-// What a frame has of the anchors before and behind it (either may be empty), of which the nearer
-// weighs more. `place`: 0..1 of the way from the one before to the one behind.
-CarriedColor OfBothAnchors(CarriedColor before, const CarriedColor& behind, double place);
+// Blends the colours propagated from the anchors before and after a frame; either may be empty. The
+// nearer anchor weighs more. `place`: 0..1 of the way from the one before to the one after.
+CarriedColor BlendAnchors(CarriedColor before, const CarriedColor& behind, double place);
 
-// Share of a frame from which its own sources are worth asking.
-inline constexpr double kWorthAsking = 0.02;
-// Share of a frame that neither what was carried into it nor the anchors tell surely.
+// Open share of a frame above which its colours are inferred.
+inline constexpr double kWorthInferring = 0.02;
+// Share of a frame that neither carried colours nor anchors cover surely.
 double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors);
-// Takes `others` where they tell surely and `color` does not; how many pixels these are.
+// Takes `others` where they are sure and `color` is not. Returns the number of these pixels.
 size_t FillOpen(const CarriedColor& others, CarriedColor* color);
-// Takes what a neighbouring frame was told by its sources where `color` tells nothing surely: an
-// answer goes on less sure ways than what was seen does, to be asked anew would not be surer.
-void TakeAnswer(const CarriedColor& answer, CarriedColor* color);
+// Takes the colours inferred for a neighbouring frame where `color` is not sure. They are
+// propagated with less confidence than seen colours, since inferring them anew would be no surer.
+void TakeNeighborsColor(const CarriedColor& answer, CarriedColor* color);
 
-// The colour of a frame: what was carried into it, as in all views; what `of_anchors` tells where
-// that is followed surely in place of what the frame's own sources would say, which are asked
-// where neither tells, if that is more than kWorthAsking.
+// Fuses the colour of a frame: carried colours; those of the anchors, where they are propagated
+// surely, in place of inferred ones; and inferred ones where neither is sure, if that is more than
+// kWorthInferring of the frame.
 FusedColor ColorBetweenAnchors(const Image& luminance,
                                const CarriedColor& carried,
                                const CarriedColor& of_anchors,

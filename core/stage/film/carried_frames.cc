@@ -11,13 +11,13 @@
 #include "core/stage/film/between_anchors.h"
 
 namespace color3d {
-FramesInColor::FramesInColor(const Scene& scene,
+CarriedFrames::CarriedFrames(const Scene& scene,
                              const ViewImages& images,
                              const std::vector<ColoredKeyView>& keys,
                              const FilmCarryOptions& options,
                              StageContext& context)
     : scene_(scene),
-      folder_(context.scratch_folder() / "frames_in_color"),
+      folder_(context.scratch_folder() / "carried_frames"),
       has_(scene.views.size(), 0) {
   std::filesystem::create_directories(folder_);
   const std::vector<int> order = scene.ViewsInOrderOfTime();
@@ -52,7 +52,7 @@ FramesInColor::FramesInColor(const Scene& scene,
       });
 }
 
-std::vector<int> FramesInColor::NearestTo(int view) const {
+std::vector<int> CarriedFrames::NearestTo(int view) const {
   std::map<int, int> nearest;  // by camera
   const auto distance = [&](int other) {
     return std::abs(scene_.views[other].time_s() - scene_.views[view].time_s());
@@ -68,13 +68,13 @@ std::vector<int> FramesInColor::NearestTo(int view) const {
   return frames;
 }
 
-CarriedColor FramesInColor::Of(int view) const {
+CarriedColor CarriedFrames::Of(int view) const {
   const std::filesystem::path file = FileOf(view);
   AbMap map = DecodeAbPng(ReadFile(file), file.filename().string());
   return {std::move(map.ab), std::move(map.confidence)};
 }
 
-std::filesystem::path FramesInColor::FileOf(int view) const {
+std::filesystem::path CarriedFrames::FileOf(int view) const {
   return folder_ / fmt::format("{}.png", view);
 }
 

@@ -1,5 +1,4 @@
-// Colours carried by motion along the cameras of a dynamic scene that have a key view. For the
-// stages of this layer only.
+// Colours carried by optical flow along the cameras of a dynamic scene that took a key view.
 #pragma once
 
 #include <filesystem>
@@ -12,20 +11,19 @@
 
 namespace color3d {
 
-// Kept in the scratch folder, so that memory does not grow with the scene's length. Thread-safe
-// after construction.
-class FramesInColor {
+// Keeps the frames in the scratch folder to bound memory. Thread-safe after construction.
+class CarriedFrames {
  public:
-  // `keys` as they are coloured. The references must outlive the object.
-  FramesInColor(const Scene& scene,
+  // `keys`: coloured key views. The references must outlive the object.
+  CarriedFrames(const Scene& scene,
                 const ViewImages& images,
                 const std::vector<ColoredKeyView>& keys,
                 const FilmCarryOptions& options,
                 StageContext& context);
 
-  // Frames of the cameras with a key view that are nearest in time to `view`, one of each camera.
+  // Frames that are nearest in time to `view`, one of each camera with a key view.
   std::vector<int> NearestTo(int view) const;
-  // A camera with a key view took it.
+  // Whether a camera with a key view took it.
   bool Has(int view) const { return has_[static_cast<size_t>(view)] != 0; }
   CarriedColor Of(int view) const;
 

@@ -22,9 +22,9 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kStretchBytes = int64_t{128} << 20;
-constexpr int64_t kBytesPerPixel = 17 * sizeof(float);  // of a frame: colours, flow, two followed
+constexpr int64_t kBytesPerPixel = 17 * sizeof(float);  // of a frame: colours, flow, two propagated
 
-// All frames of one shot, and its anchors among them: numbers of frames in order of time.
+// The frames of one shot and the anchors among them, in order of time.
 struct ShotToColor {
   std::vector<int> frames;
   std::vector<int> anchors;
@@ -32,7 +32,7 @@ struct ShotToColor {
   bool IsAnchor(int frame) const {
     return std::binary_search(anchors.begin(), anchors.end(), frame);
   }
-  // The last anchor up to a frame and the first behind it; -1 where there is none.
+  // The last anchor up to a frame and the first one after it; -1 where there is none.
   int AnchorUpTo(int frame) const {
     const auto next = std::upper_bound(anchors.begin(), anchors.end(), frame);
     return next == anchors.begin() ? -1 : *(next - 1);
@@ -43,14 +43,14 @@ struct ShotToColor {
   }
 };
 
-// A frame that has its colours, before they are steadied.
+// A coloured frame before averaging along flow.
 struct Colored {
   int frame = 0;
   FusedColor color;
   std::shared_ptr<const FlowPair> flow_from_last;
 };
 
-constexpr double kWorthGuessing = 0.02;  // share of an anchor
+constexpr double kWorthGuessing = 0.02;  // least guessed share of an anchor
 
 double ShareGuessed(const FusedColor& color) {
   const float* guessed = color.provenance.Plane(kGuessedPlane);
@@ -58,7 +58,7 @@ double ShareGuessed(const FusedColor& color) {
   return std::accumulate(guessed, guessed + pixels, 0.0) / static_cast<double>(pixels);
 }
 
-// Neighbouring frames between two anchors: indices within a stretch.
+// The frames between two anchors, as indices within a stretch.
 struct Gap {
   size_t begin = 0;
   size_t end = 0;
@@ -66,8 +66,8 @@ struct Gap {
 
 using Flow = std::function<std::shared_ptr<const FlowPair>(int earlier, int later)>;
 
-// Colours one shot, stretch by stretch: neighbouring frames, the last of which is an anchor or the
-// shot's end. What is told of a frame depends on its neighbours, not on where stretches end.
+// Colours one shot by stretches, runs of frames that end at an anchor or with the shot. Colours do
+// not depend on the length of stretches.
 class ShotColorer {
  public:
   ShotColorer(const ShotToColor& shot,
@@ -99,7 +99,7 @@ class ShotColorer {
   }
 
  private:
-  // An interrupted run goes on from the last anchor that reaches all that is left.
+  // An interrupted run resumes at the last anchor before all frames that are left.
   size_t FirstToColor() const {
     const auto begin = shot_.frames.begin();
     const auto open = std::find_if(begin, shot_.frames.end(), [&](int frame) {
@@ -164,7 +164,7 @@ class ShotColorer {
         const int owner = forward ? shot_.AnchorUpTo(frame) : shot_.AnchorBehind(frame);
         if (owner == key.frame) way.push_back(frame);
       }
-      FollowInto(key, way, flow, [&](int frame, const CarriedColor& color) {
+      Propagate(key, way, flow, [&](int frame, const CarriedColor& color) {
         (forward ? before : behind)[index_of(frame)] = color;
       });
     });
@@ -173,15 +173,15 @@ class ShotColorer {
       const int from = shot_.AnchorUpTo(stretch[i]), to = shot_.AnchorBehind(stretch[i]);
       const double place =
           from >= 0 && to >= 0 ? static_cast<double>(stretch[i] - from) / (to - from) : 0.0;
-      of_anchors[i] = OfBothAnchors(std::move(before[i]), behind[i], place);
+      of_anchors[i] = BlendAnchors(std::move(before[i]), behind[i], place);
     });
     std::vector<Gap> gaps = GapsOf(stretch);
-    // The longest first, so that threads end together.
+    // The longest gaps first, so that threads end together.
     std::stable_sort(gaps.begin(), gaps.end(), [](const Gap& x, const Gap& y) {
       return x.end - x.begin > y.end - y.begin;
     });
     pool.ForEach(static_cast<int64_t>(gaps.size()), [&](int64_t i, int) {
-      AskWhereOpen(gaps[i], stretch, flow, &of_anchors, &colored);
+      InferOpenFrames(gaps[i], stretch, flow, &of_anchors, &colored);
     });
     pool.ForEach(count, [&](int64_t i, int) {
       if (colored[i].color.ab.Empty()) colored[i].color = ColorOf(stretch[i], &of_anchors[i]);
@@ -199,11 +199,11 @@ class ShotColorer {
         FlowPair{DenseFlow(*earlier, *later), DenseFlow(*later, *earlier)});
   }
 
-  // The colours of a frame in those of `way`, which lie around it without a gap, step by step.
-  void FollowInto(const FilmKey& key,
-                  const std::vector<int>& way,
-                  const Flow& flow,
-                  const std::function<void(int frame, const CarriedColor& color)>& on_frame) const {
+  // Propagates the colours of a frame into those of `way`, which adjoin it, step by step.
+  void Propagate(const FilmKey& key,
+                 const std::vector<int>& way,
+                 const Flow& flow,
+                 const std::function<void(int frame, const CarriedColor& color)>& on_frame) const {
     if (way.empty()) return;
     FilmFrames frames = frames_;
     frames.flow = flow;
@@ -234,13 +234,13 @@ class ShotColorer {
     return gaps;
   }
 
-  // Frames of a gap that motion leaves open ask their own sources, the most open one first; what
-  // they are told fills what is open in the others, too.
-  void AskWhereOpen(const Gap& gap,
-                    const std::vector<int>& stretch,
-                    const Flow& flow,
-                    std::vector<CarriedColor>* of_anchors,
-                    std::vector<Colored>* colored) const {
+  // Infers the frames of a gap that propagation leaves open, the most open one first. Inferred
+  // colours are propagated into the other frames.
+  void InferOpenFrames(const Gap& gap,
+                       const std::vector<int>& stretch,
+                       const Flow& flow,
+                       std::vector<CarriedColor>* of_anchors,
+                       std::vector<Colored>* colored) const {
     const std::vector<int> frames(stretch.begin() + static_cast<std::ptrdiff_t>(gap.begin),
                                   stretch.begin() + static_cast<std::ptrdiff_t>(gap.end));
     std::vector<Image> carried;  // confidences
@@ -254,19 +254,19 @@ class ShotColorer {
     }
     for (size_t left = frames.size(); left > 0; --left) {
       const auto most = std::max_element(open.begin(), open.end()) - open.begin();
-      if (open[most] <= kWorthAsking) return;
+      if (open[most] <= kWorthInferring) return;
       open[most] = 0.0;
       Colored& asked = (*colored)[gap.begin + most];
       asked.color = ColorOf(asked.frame, &(*of_anchors)[gap.begin + most]);
-      FollowInto(AnchorAsKey(asked.frame, asked.color),
-                 frames,
-                 flow,
-                 [&](int frame, const CarriedColor& color) {
-                   const auto i = std::find(frames.begin(), frames.end(), frame) - frames.begin();
-                   if (open[i] == 0.0) return;
-                   TakeAnswer(color, &(*of_anchors)[gap.begin + i]);
-                   measure(i);
-                 });
+      Propagate(AnchorAsKey(asked.frame, asked.color),
+                frames,
+                flow,
+                [&](int frame, const CarriedColor& color) {
+                  const auto i = std::find(frames.begin(), frames.end(), frame) - frames.begin();
+                  if (open[i] == 0.0) return;
+                  TakeNeighborsColor(color, &(*of_anchors)[gap.begin + i]);
+                  measure(i);
+                });
     }
   }
 
@@ -276,8 +276,7 @@ class ShotColorer {
     return ReadCarried(context_, scene_.views[view], camera.width, camera.height);
   }
 
-  // `of_anchors`: null of an anchor. Where both anchors around a frame have no use for a guess,
-  // none is made.
+  // `of_anchors`: null for anchors. Nothing is guessed between two anchors without guessed colours.
   FusedColor ColorOf(int frame, const CarriedColor* of_anchors) const {
     context_.cancel().ThrowIfCancelled();
     const int view = view_of_frame_[frame];
@@ -295,12 +294,12 @@ class ShotColorer {
     return ColorOfView(*luminance, carried, sources, one, context_.cancel());
   }
 
-  // All frames whose neighbours are known; these are kept as long as others need them.
+  // Delivers the frames whose neighbours are coloured, and keeps those that later ones need.
   void Deliver(bool is_end) {
     const auto reach = static_cast<size_t>(steady_.reach);
     const size_t end =
         is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
-    // Beside a frame that another key frame is nearest to, colours may be others: no mean of both.
+    // Colours of different key frames are not averaged.
     std::vector<FrameInMotion> neighbors;
     int last_nearest = -1;
     for (const Colored& one : colored_) {
@@ -334,11 +333,11 @@ class ShotColorer {
   const ViewImages& images_;
   StageContext& context_;
   const SteadyColorsOptions steady_;
-  std::set<int> guessed_;               // anchors that a guess was of use to
+  std::set<int> guessed_;               // anchors with guessed colours
   int last_ = -1;                       // frame of the last stretch
   std::optional<FilmKey> last_anchor_;  // of the last stretch
-  std::vector<Colored> colored_;        // frames one after the other
-  size_t delivered_ = 0;                // of those
+  std::vector<Colored> colored_;        // successive frames
+  size_t delivered_ = 0;                // number of these
 };
 
 }  // namespace

@@ -1,5 +1,4 @@
-// Colours of all frames of a film, or of the cameras of a scene that moves. For the stages of this
-// layer only.
+// Colours all frames of a film, or of the cameras of a dynamic scene.
 #pragma once
 
 #include <functional>
@@ -12,23 +11,22 @@
 namespace color3d {
 
 struct FrameColoring {
-  // What a view's colour comes from beside what was carried into it. Thread-safe.
+  // Sources of a view's colour beside the carried colours. Thread-safe.
   std::function<ColorSources(int view)> sources;
-  // Takes each view's colour once, in any order, but those that were done. Thread-safe.
+  // Called once with the colour of each view that was not done, in any order. Thread-safe.
   std::function<void(int view, const FusedColor& color)> deliver;
-  // Views that an interrupted run has delivered. Thread-safe.
+  // Whether an interrupted run has delivered the view. Thread-safe.
   std::function<bool(int view)> was_done;
-  // Views whose colours are somebody's own and stay as they are, in the order in which they were
-  // given.
+  // Views that keep their given colours, in the order in which they were given.
   std::vector<int> key_views;
 };
 
-// Anchors are coloured by their sources (core/film/anchor_frames.h). A frame between them has what
-// was carried into it, as they have; where that leaves it open, the colours of the anchors before
-// and behind it, followed by motion; and where motion does not tell, its own sources are asked. In
-// the end all are steadied along motion (core/film/steady_colors.h), each with those that it shares
-// its nearest key frame with. Memory does not grow with the number of frames; what comes of an
-// interrupted run is the same to the bit.
+// Colours anchors (core/film/anchor_frames.h) from what was carried into them and their sources. A
+// frame between anchors has its carried colours; where these are open, the colours of the anchors
+// before and after it, propagated by optical flow; and where these are open, too, colours of its
+// own sources. All are then averaged along flow (core/film/steady_colors.h) among frames with the
+// same nearest key frame. Memory does not grow with the number of frames. An interrupted run gives
+// the same bits.
 void ColorFrames(const Scene& scene,
                  const ViewImages& images,
                  const FrameColoring& coloring,

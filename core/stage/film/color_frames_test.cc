@@ -19,7 +19,7 @@ namespace {
 constexpr int kWidth = 96, kHeight = 64, kFrames = 30;
 constexpr double kPanPx = 1.2;  // from frame to frame
 
-// A picture that moves to the left, with nothing carried into its frames.
+// A picture that moves to the left; nothing is carried into its frames.
 class ColorFramesTest : public StageTest {
  protected:
   void AddFrames(const std::function<float(int frame, int x, int y)>& luminance) {
@@ -49,7 +49,7 @@ class ColorFramesTest : public StageTest {
     return ab;
   }
 
-  // The colours that are delivered, by view.
+  // Delivered colours by view.
   std::map<int, FusedColor> Run(int threads) {
     StageContext context({.scene_folder = scratch_.path(),
                           .inputs = inputs_,
@@ -96,7 +96,7 @@ class ColorFramesTest : public StageTest {
     return delivered;
   }
 
-  // What the sources say of a frame.
+  // Colours that the sources give a frame.
   Image Told(int view) const {
     Image ab = TrueAb(view);
     if (flicker_) {
@@ -108,7 +108,7 @@ class ColorFramesTest : public StageTest {
   Scene scene_;
   std::vector<int> asked_;
   size_t guesses_ = 0;
-  float distance_ = 0.0f;  // of what is asked, as features go
+  float distance_ = 0.0f;  // feature distance of the inferred pixels
   bool flicker_ = false;
   std::vector<int> key_views_;
   std::set<int> done_;
@@ -122,7 +122,7 @@ float Panned(int frame, int x, int y) {
                             0.15 * std::sin(0.23 * y - 0.17 * u));
 }
 
-TEST_F(ColorFramesTest, FramesBetweenTakeTheColoursOfAnchors) {
+TEST_F(ColorFramesTest, FramesBetweenTakeColorsOfAnchors) {
   AddFrames(Panned);
   const std::map<int, FusedColor> colors = Run(2);
   EXPECT_LT(asked_.size(), static_cast<size_t>(kFrames));
@@ -139,7 +139,7 @@ TEST_F(ColorFramesTest, FramesBetweenTakeTheColoursOfAnchors) {
   for (const auto& [view, color] : colors) EXPECT_EQ(again.at(view).ab.data, color.ab.data);
 }
 
-TEST_F(ColorFramesTest, WhatStandsStillIsAskedOnceARun) {
+TEST_F(ColorFramesTest, InfersStillFramesOnce) {
   AddFrames([](int, int x, int y) {
     return static_cast<float>(0.5 + 0.2 * std::sin(0.3 * x) * std::sin(0.4 * y));
   });
@@ -152,7 +152,7 @@ TEST_F(ColorFramesTest, WhatStandsStillIsAskedOnceARun) {
   }
 }
 
-TEST_F(ColorFramesTest, GuessesAreMadeWhereTheAnchorsAroundHaveUseForOne) {
+TEST_F(ColorFramesTest, GuessesOnlyBetweenGuessedAnchors) {
   AddFrames(Panned);
   distance_ = 7.0f;  // so strange that guesses count
   Run(2);
@@ -165,7 +165,7 @@ TEST_F(ColorFramesTest, GuessesAreMadeWhereTheAnchorsAroundHaveUseForOne) {
   EXPECT_LT(guesses_, asked);
 }
 
-TEST_F(ColorFramesTest, WhatFlickersIsSteadied) {
+TEST_F(ColorFramesTest, SteadiesFlicker) {
   AddFrames(Panned);
   flicker_ = true;
   key_views_ = {12};
@@ -173,7 +173,7 @@ TEST_F(ColorFramesTest, WhatFlickersIsSteadied) {
   ASSERT_GT(asked_.size(), 2u);
   double jump = 0.0;
   for (int view = 1; view < kFrames; ++view) {
-    if (view == 12 || view == 13) continue;  // a key frame is nobody else's to change
+    if (view == 12 || view == 13) continue;  // key frames keep their colours
     jump = std::max(
         jump,
         std::abs(double{colors.at(view).ab.At(1, 30, 50)} - colors.at(view - 1).ab.At(1, 30, 50)));
@@ -181,7 +181,7 @@ TEST_F(ColorFramesTest, WhatFlickersIsSteadied) {
   EXPECT_LT(jump, 4.0) << "of 16";
 }
 
-TEST_F(ColorFramesTest, WhatTwoKeyFramesContradictEachOtherInIsNotAveraged) {
+TEST_F(ColorFramesTest, DoesNotAverageKeyFrames) {
   constexpr int kFirst = 24, kSecond = 8, kSwitch = 16;  // as near to both
   AddFrames(Panned);
   key_views_ = {kFirst, kSecond};
@@ -195,7 +195,7 @@ TEST_F(ColorFramesTest, WhatTwoKeyFramesContradictEachOtherInIsNotAveraged) {
   }
 }
 
-TEST_F(ColorFramesTest, AnotherWorkerGoesOnAndGivesTheSame) {
+TEST_F(ColorFramesTest, ResumesWithTheSameResult) {
   AddFrames(Panned);
   flicker_ = true;
   const std::map<int, FusedColor> whole = Run(2);
@@ -216,7 +216,7 @@ TEST_F(ColorFramesTest, AnotherWorkerGoesOnAndGivesTheSame) {
   }
 }
 
-TEST_F(ColorFramesTest, WhatCannotBeFollowedIsColouredByItself) {
+TEST_F(ColorFramesTest, InfersUntrackedFrames) {
   Random random(1);
   AddFrames([&](int, int, int) { return static_cast<float>(random.NextUniform()); });
   Run(2);

@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-constexpr int kReturnSidePx = 500;  // as frames are when their colours are carried
+constexpr int kReturnSidePx = 500;  // as carry_color's frames
 
 // All views of a shot, ascending.
 struct Shot {
@@ -19,7 +19,7 @@ struct Shot {
   std::vector<int> views;
 };
 
-// The longest first; those of one frame (torn, blank) are left out where there are others.
+// Shots, the longest first. Those of one frame (torn, blank) only where there are no others.
 std::vector<Shot> ShotsOf(const Scene& scene) {
   std::map<int, Shot> by_number;
   for (size_t i = 0; i < scene.views.size(); ++i) {
@@ -46,19 +46,18 @@ std::vector<int> TrainingViewsOf(const Shot& shot, const Scene& scene) {
   return views;
 }
 
-// The key frames of a shot.
+// Numbers of key frames of a shot.
 struct ShotKeys {
   int possible = 0;
   int own = 0;
-  // Shows, behind a cut, what a shot with a key frame shows, and has its colours; nothing until
-  // somebody has looked.
+  // Whether it shows the place of a shot with a key frame again; nothing: not known yet.
   std::optional<bool> returns;
 
   int Serving() const { return std::max(own, returns.value_or(false) ? 1 : 0); }
 };
 
-// Where the next key frame goes: the longest shot that none serves, else the one with the most
-// frames for each. -1: every shot is full.
+// Shot of the next key frame: the longest one without any, else the one with most frames for each.
+// -1: every shot is full.
 int NextShot(const std::vector<Shot>& shots, const std::vector<ShotKeys>& keys) {
   int next = -1;
   const auto frames_for_each = [&](int i) {
@@ -77,8 +76,8 @@ int NextShot(const std::vector<Shot>& shots, const std::vector<ShotKeys>& keys) 
 
 int MiddleOf(const Shot& shot) { return shot.views[shot.views.size() / 2]; }
 
-// Whether the middle of `shot` shows what the middle of one of `others` shows, as carry_color finds
-// out with their colours.
+// Whether the middle of `shot` shows the place of the middle of one of `others`, by the same search
+// as in carry_color.
 bool Returns(const Shot& shot,
              const std::vector<const Shot*>& others,
              const ViewImages& images,
@@ -180,8 +179,8 @@ ChosenKeyViews ChooseFilmKeys(const Scene& scene,
     const int next = NextShot(shots, keys);
     if (next < 0) {
       throw InvalidArgument(
-          "{} key views are asked for, but only {} frames can be one (of those that are compared, "
-          "and show something); ask for fewer",
+          "{} key views are asked for, but only {} of the compared frames can be one, since "
+          "others are blank or torn; ask for fewer",
           count,
           order.size());
     }
@@ -195,7 +194,7 @@ ChosenKeyViews ChooseFilmKeys(const Scene& scene,
   std::vector<std::vector<int>> chosen(shots.size());
   for (size_t i = 0; i < shots.size(); ++i) {
     if (keys[i].own == 0) continue;
-    // Only its own frames ask for it.
+    // Only frames of the shot count.
     std::vector<bool> asked = may[i];
     if (firsts[i] >= 0) asked[firsts[i]] = true;
     chosen[i] = ChooseKeyViews(none,
@@ -222,7 +221,7 @@ std::optional<NextFilmKey> AdviseNextFilmKey(const Scene& scene,
                                              const std::vector<double>& coverage) {
   std::set<int> with_key;
   for (const int key : keys) with_key.insert(scene.views[key].moment->shot);
-  double without = 0.0, gained = 0.0;  // frames that no key frame shows; parts count as parts
+  double without = 0.0, gained = 0.0;  // frames that no key frame shows, in parts
   NextFilmKey next;
   for (const Shot& shot : ShotsOf(scene)) {
     if (with_key.contains(shot.number)) continue;

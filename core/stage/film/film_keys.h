@@ -1,6 +1,5 @@
-// Which frames of a film to colour. A key frame colours its own shot by motion and others only by
-// likeness, so every shot should get one before any gets two (METHOD.md "Film"). For the stages of
-// this layer only.
+// Chooses the key frames of a film. A key frame colours its own shot by optical flow and other
+// shots by inference alone, so every shot gets one before any gets two (METHOD.md "Film").
 #pragma once
 
 #include <optional>
@@ -15,22 +14,20 @@
 
 namespace color3d {
 
-// Neighbours of a film show much the same: up to 60 of its training views stand for all, evenly
-// spread, and the middle one of each shot that has none so (the longest shots first). None that is
-// a shot of its own (torn, blank) where there are others. `named`, unless it is empty or held out,
-// is among them. Ascending.
+// Returns up to 60 training views, evenly spread, the middle ones of shots without any (the longest
+// shots first), and `named` unless it is empty or held out. Frames with faults, which are shots of
+// their own, only where there are no others. Ascending.
 std::vector<int> CandidatesOfFilm(const Scene& scene, const std::string& named);
 
-// The best of the film's longest shot in place of the best of all; false where that is the same.
+// Moves the selection to the best view of the film's longest shot. False when it is there already.
 bool TakeFromLongestShot(const Scene& scene,
                          const std::vector<int>& candidates,
                          KeyViewSelection* selection);
 
-// `count` of the candidates: as many as there are shots, each in another one, the longest first,
-// and those that show what a shot with a key frame shows behind the others; further ones where the
-// most frames are for each key frame. Within a shot those that are expected to serve its frames
-// best. `kept`: candidates that may be chosen; `first` >= 0: is the first whatever it costs. Throws
-// as ChooseKeyViews.
+// Chooses `count` of the candidates: one in each shot, the longest first, shots that show the place
+// of a shot with a key frame last; then where there are most frames for each key frame. Within a
+// shot, those with the least expected error. `kept`: candidates that may be chosen. `first` >= 0:
+// the first key frame. Throws as ChooseKeyViews.
 ChosenKeyViews ChooseFilmKeys(const Scene& scene,
                               const std::vector<int>& candidates,
                               const std::vector<ViewFeatures>& features,
@@ -40,12 +37,12 @@ ChosenKeyViews ChooseFilmKeys(const Scene& scene,
                               StageContext& context);
 
 struct NextFilmKey {
-  int view = 0;             // the middle of the shot without a key frame of which most is open
-  double error_now = 0.0;   // CIEDE2000 that is expected over all frames
-  double error_with = 0.0;  // ... with this frame coloured, too
+  int view = 0;             // middle of the shot with most open frames and no key frame
+  double error_now = 0.0;   // expected CIEDE2000 over all frames
+  double error_with = 0.0;  // expected CIEDE2000 with this key frame
 };
-// `keys`: views. `coverage`: of each view, 0..1, what key frames show of it, also behind a cut in a
-// shot that returns. Nothing when every shot of two frames or more has a key frame or is covered.
+// `keys`: indices of views. `coverage`: share of each view that key frames show, 0..1, shots that
+// return included. Nothing when every shot of two frames or more has a key frame or is covered.
 std::optional<NextFilmKey> AdviseNextFilmKey(const Scene& scene,
                                              const std::vector<int>& keys,
                                              const std::vector<double>& coverage);

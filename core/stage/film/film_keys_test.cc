@@ -21,7 +21,7 @@ using testing::ElementsAre;
 
 constexpr int kWidth = 176, kHeight = 132;
 
-// Shots of these lengths, one after the other; without pictures.
+// A film with shots of these lengths, without pictures.
 Scene FilmOf(const std::vector<int>& lengths) {
   Scene scene;
   for (size_t shot = 0; shot < lengths.size(); ++shot) {
@@ -38,7 +38,7 @@ Scene FilmOf(const std::vector<int>& lengths) {
   return scene;
 }
 
-TEST(FilmKeys, EveryShotHasACandidateAndFaultsHaveNone) {
+TEST(FilmKeys, EveryShotHasACandidateAndFaultsNone) {
   const Scene scene = FilmOf({200, 1, 3, 90, 2});
   const std::vector<int> candidates = CandidatesOfFilm(scene, "");
   EXPECT_LE(candidates.size(), 64u);
@@ -49,11 +49,11 @@ TEST(FilmKeys, EveryShotHasACandidateAndFaultsHaveNone) {
   EXPECT_GE(of_shot[2], 1);
   EXPECT_GE(of_shot[4], 1);
   EXPECT_THAT(CandidatesOfFilm(scene, "f0200"), testing::Contains(200));
-  // Nothing but faults.
+  // Faulty frames only.
   EXPECT_EQ(CandidatesOfFilm(FilmOf({1, 1, 1}), "").size(), 3u);
 }
 
-TEST(FilmKeys, TheLongestShotWithoutAKeyFrameIsNext) {
+TEST(FilmKeys, LongestShotWithoutKeyFrameIsNext) {
   const Scene scene = FilmOf({20, 40, 1, 30});
   std::vector<double> coverage(scene.views.size(), 0.0);
   const auto next = AdviseNextFilmKey(scene, {45}, coverage);
@@ -63,7 +63,7 @@ TEST(FilmKeys, TheLongestShotWithoutAKeyFrameIsNext) {
   EXPECT_GT(next->error_now, next->error_with);
   EXPECT_EQ(scene.views[AdviseNextFilmKey(scene, {45, 70}, coverage)->view].moment->shot, 0);
   EXPECT_FALSE(AdviseNextFilmKey(scene, {45, 70, 3}, coverage));
-  // A shot that returns behind a cut asks for less than one that shows something new.
+  // A shot that returns to a place ranks behind one that shows a new place.
   std::fill(coverage.begin() + 61, coverage.end(), 0.9);
   const auto other = AdviseNextFilmKey(scene, {45}, coverage);
   ASSERT_TRUE(other);
@@ -71,7 +71,7 @@ TEST(FilmKeys, TheLongestShotWithoutAKeyFrameIsNext) {
   EXPECT_LT(other->error_now, next->error_now);
 }
 
-// A film of these shots, of these places.
+// A film of shots of these lengths at these places.
 class FilmKeysStageTest : public StageTest {
  protected:
   void WriteFilm(const std::vector<int>& lengths, const std::vector<uint64_t>& places) {
@@ -83,7 +83,7 @@ class FilmKeysStageTest : public StageTest {
     }
     AddInput(artifact::kScene, SceneToJson(scene_));
   }
-  // Shots of the key views, in their order.
+  // Shots of the key views, in order.
   std::vector<int> Select(int count, const std::string& named = "") {
     SelectKeyViewOptions options;
     options.selection.count = count;
@@ -111,7 +111,7 @@ class FilmKeysStageTest : public StageTest {
   Scene scene_;
 };
 
-TEST_F(FilmKeysStageTest, ShotsGetKeyFramesTheLongestFirst) {
+TEST_F(FilmKeysStageTest, LongestShotsGetKeyFramesFirst) {
   WriteFilm({6, 14, 9}, {1, 2, 3});
   EXPECT_THAT(Select(1), ElementsAre(1));
   EXPECT_THAT(Select(2), ElementsAre(1, 2));
@@ -120,14 +120,14 @@ TEST_F(FilmKeysStageTest, ShotsGetKeyFramesTheLongestFirst) {
   EXPECT_THAT(Select(3, "f0002"), ElementsAre(0, 1, 2));
 }
 
-TEST_F(FilmKeysStageTest, AShotThatReturnsWaitsForThoseThatShowSomethingNew) {
+TEST_F(FilmKeysStageTest, NewPlacesComeBeforeReturningShots) {
   WriteFilm({12, 7, 9}, {1, 2, 1});
   EXPECT_THAT(Select(2), ElementsAre(0, 1));
   EXPECT_THAT(Select(3), ElementsAre(0, 1, 0));
   EXPECT_THAT(Select(4), ElementsAre(0, 1, 0, 2));
 }
 
-TEST_F(FilmKeysStageTest, MoreKeyFramesThanFramesAreRefused) {
+TEST_F(FilmKeysStageTest, RefusesMoreKeyFramesThanFrames) {
   WriteFilm({2, 2}, {1, 2});
   EXPECT_THROW(Select(5), Error);
 }

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "core/catalogue/film_rate.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/film_import/film_frames.h"
@@ -21,7 +22,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Of the size that MovieSize says.
+// Fits the picture into a movie frame, cropped to MovieSize.
 Image MovieFrame(const Image& picture) {
   Image image = FitWithin(picture, kMaxMovieSidePx);
   const auto [width, height] = MovieSize(picture.width, picture.height);
@@ -35,8 +36,6 @@ Image MovieFrame(const Image& picture) {
   return out;
 }
 
-constexpr double kUsualRate = 25.0;  // frames a second, where times are no seconds
-
 FilmClock ClockOfFilm(const Scene& scene,
                       const std::vector<int>& frames,
                       const StageContext& context) {
@@ -44,12 +43,12 @@ FilmClock ClockOfFilm(const Scene& scene,
   std::vector<double> times;
   for (size_t i = 0; i < frames.size(); ++i) {
     times.push_back(seconds ? scene.views[frames[i]].time_s()
-                            : static_cast<double>(i) / kUsualRate);
+                            : static_cast<double>(i) / kDefaultFramesPerSecond);
   }
   return ClockOf(times);
 }
 
-// A file name that tells the camera, unlike those that are taken.
+// A file name for the camera that is not among `taken`.
 std::string FileNameOf(const std::string& camera, std::set<std::string>* taken) {
   std::string name = camera.empty() ? "camera" : camera;
   for (char& c : name) {
@@ -71,7 +70,7 @@ std::map<int, std::vector<int>> FramesByShot(const Scene& scene) {
   return frames;
 }
 
-// The file in the scratch folder under one name or more.
+// Publishes the file of the scratch folder under each of the names.
 void LeaveAs(const std::vector<std::string>& artifacts,
              const fs::path& file,
              StageContext& context) {

@@ -1,5 +1,4 @@
-// The coloured frames of a film: their own luminance under the colours that their views got. For
-// the stages of this layer only.
+// Writes coloured films: each frame's own luminance with the colours of its view.
 #pragma once
 
 #include <functional>
@@ -12,7 +11,7 @@
 
 namespace color3d {
 
-// Lab of the size in `images` of the view with that index; the key frame keeps its own colours.
+// Returns the frame in Lab, of the size of `images`. The key view keeps its given colours.
 Image ColoredFrame(const View& view,
                    int index,
                    bool is_key,
@@ -20,26 +19,25 @@ Image ColoredFrame(const View& view,
                    const StageContext& context);
 
 struct ColoredFilm {
-  std::vector<int> frames;             // views, in the order in which they are shown
-  std::vector<std::string> artifacts;  // names of the movie, one at least
-  bool pictures = false;  // every frame as a picture of its own size, too: artifact::kFilmFrames
+  std::vector<int> frames;             // indices of views, in order
+  std::vector<std::string> artifacts;  // names of the movie, at least one
+  bool pictures = false;  // also write each frame as a picture of its own size: kFilmFrames
 };
 
-// Leaves a movie of these frames in colour, at the film's own times and size (within what movies
-// take), with its sound where it came as a video file. `written`, which may be empty, is told each
-// of them, in sRGB. Throws Error{kCancelled} and what Mp4Writer throws.
+// Writes a movie of the coloured frames with the film's times, its size (within the limits of
+// movies) and its sound if it came as a video file. Calls `written`, unless it is empty, with each
+// frame in sRGB. Throws Error{kCancelled} and what Mp4Writer throws.
 void WriteColoredFilm(const Scene& scene,
                       const ColoredFilm& film,
                       StageContext& context,
                       const std::function<void(int view, const Image& srgb)>& written = {});
 
-// Of a scene that moves: what the key view's camera filmed as artifact::kFilm, of several cameras
-// each of them, by its name, below artifact::kFilms. Their frames as pictures where `pictures` is
-// set.
+// For dynamic scenes: writes the film of the key view's camera as artifact::kFilm, and of several
+// cameras the film of each by its name below artifact::kFilms. `pictures`: also their frames.
 void WriteFilmsOfCameras(const Scene& scene, bool pictures, StageContext& context);
 
-// All frames of a film as artifact::kMovie, as pictures where the options say so, and `views` (for
-// the report) as artifact::kRenders.
+// Writes all frames of a film as artifact::kMovie, as pictures if the options say so, and `views`
+// (for the report) as artifact::kRenders.
 void RenderFilm(const RenderOptions& options,
                 const Scene& scene,
                 const std::vector<int>& views,

@@ -33,7 +33,7 @@ Image FrameOf(int frame) {
   return image;
 }
 
-// Silence until a time, then a tone.
+// Silence, then a tone from a given time on.
 double ToneFrom2s(double time_s) { return time_s < 2.0 ? 0.0 : 0.6 * std::sin(3000.0 * time_s); }
 
 double OnsetOf(const HeardSound& sound) {
@@ -43,7 +43,7 @@ double OnsetOf(const HeardSound& sound) {
   return -1.0;
 }
 
-class ColoredFramesTest : public StageTest {
+class FilmWriterTest : public StageTest {
  protected:
   void WriteFilm(const std::vector<double>& times, const std::string& encoder) {
     ScratchFolder elsewhere;
@@ -58,7 +58,7 @@ class ColoredFramesTest : public StageTest {
     const GivenSound sound{.encoder = encoder, .seconds = times.back() + 0.1, .level = ToneFrom2s};
     AddSound(elsewhere.path() / "silent.mp4", sound, scratch_.path() / "film.mov");
   }
-  // Import, colours of one kind, movie.
+  // Imports, colours uniformly, and writes the movie.
   fs::path Colored(const FilmOptions& options = {}) {
     inputs_.clear();
     fs::remove_all(scratch_.path() / "out");
@@ -78,7 +78,7 @@ class ColoredFramesTest : public StageTest {
     RunRender({.max_views = 2}, context);
     return scratch_.path() / "out/scene.mp4";
   }
-  // Two frames, 0.5 s apart, of each of two cameras whose poses are known, in colours of one kind.
+  // Two frames, 0.5 s apart, of each of two posed cameras, coloured uniformly.
   void MakeRig() {
     for (const char* camera : {"left", "right"}) {
       for (int i = 0; i < 2; ++i) {
@@ -110,7 +110,7 @@ std::vector<double> UnevenTimes() {
   return times;
 }
 
-TEST_F(ColoredFramesTest, TimesAndSoundAreTheFilmsOwn) {
+TEST_F(FilmWriterTest, KeepsTimesAndSoundOfFilm) {
   const std::vector<double> times = UnevenTimes();
   ASSERT_GT(times.back(), 3.0);
   WriteFilm(times, "aac");
@@ -128,7 +128,7 @@ TEST_F(ColoredFramesTest, TimesAndSoundAreTheFilmsOwn) {
   EXPECT_EQ(observer_.text, "");
 }
 
-TEST_F(ColoredFramesTest, APartOfEverySecondFrameStaysInStep) {
+TEST_F(FilmWriterTest, KeepsSoundInStepWithPartOfFilm) {
   const std::vector<double> times = UnevenTimes();
   WriteFilm(times, "pcm_s16le");
   const fs::path movie = Colored({.stride = 2, .begin_s = 1.0, .end_s = 3.0});
@@ -145,7 +145,7 @@ TEST_F(ColoredFramesTest, APartOfEverySecondFrameStaysInStep) {
   EXPECT_NEAR(OnsetOf(sound), 2.0 - begin, 0.01);
 }
 
-TEST_F(ColoredFramesTest, EveryFrameIsAPictureOfItsOwnSizeWhereThatIsAskedFor) {
+TEST_F(FilmWriterTest, WritesFramesAsPictures) {
   const std::vector<double> times = {0.0, 0.1, 0.2, 0.3, 0.4};
   WriteFilm(times, "aac");
   Colored({.stride = 2});
@@ -170,7 +170,7 @@ TEST_F(ColoredFramesTest, EveryFrameIsAPictureOfItsOwnSizeWhereThatIsAskedFor) {
   }
 }
 
-TEST_F(ColoredFramesTest, WideScansKeepTheirSizeAsPicturesAndFitIntoTheMovie) {
+TEST_F(FilmWriterTest, KeepsSizeOfWideScansInPictures) {
   constexpr int kWide = 8210, kTall = 31;
   fs::create_directories(scratch_.path() / "frames");
   for (int i = 0; i < 2; ++i) {
@@ -198,7 +198,7 @@ TEST_F(ColoredFramesTest, WideScansKeepTheirSizeAsPicturesAndFitIntoTheMovie) {
   EXPECT_EQ(picture.height, kTall);
 }
 
-TEST_F(ColoredFramesTest, EveryCameraOfARigHasAFilmOfItsOwn) {
+TEST_F(FilmWriterTest, WritesFilmOfEachCamera) {
   MakeRig();
   WriteFilm({0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0}, "aac");
   ImportFacts facts;
@@ -224,7 +224,7 @@ TEST_F(ColoredFramesTest, EveryCameraOfARigHasAFilmOfItsOwn) {
   EXPECT_FALSE(fs::exists(out / "frames"));
 }
 
-TEST_F(ColoredFramesTest, HalfASecondOfAColmapModelWithTimesIsNoWhole) {
+TEST_F(FilmWriterTest, KeepsHalfSecondsOfColmapScene) {
   MakeRig();
   ImportFacts facts;
   facts.layout = "colmap";
@@ -237,7 +237,7 @@ TEST_F(ColoredFramesTest, HalfASecondOfAColmapModelWithTimesIsNoWhole) {
   EXPECT_NEAR(film.times()[1], 0.5, 1e-6);
 }
 
-TEST_F(ColoredFramesTest, AFilmOfWhatStandsStillIsAColoredFilm) {
+TEST_F(FilmWriterTest, WritesFilmOfStaticScene) {
   MakeRig();
   AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
   StageContext context = MakeContext();
@@ -246,7 +246,7 @@ TEST_F(ColoredFramesTest, AFilmOfWhatStandsStillIsAColoredFilm) {
   EXPECT_FALSE(fs::exists(scratch_.path() / "out/scene.mp4"));
 }
 
-TEST_F(ColoredFramesTest, ARenderedPathThatKeepsTheFilmsTimesIsHeard) {
+TEST_F(FilmWriterTest, RenderedPathKeepsSound) {
   const std::vector<double> times = UnevenTimes();
   WriteFilm(times, "aac");
   Colored({.begin_s = 1.0});
@@ -274,7 +274,7 @@ TEST_F(ColoredFramesTest, ARenderedPathThatKeepsTheFilmsTimesIsHeard) {
   EXPECT_EQ(HearFilm(scratch_.path() / "out/scene.mp4").codec, "");
 }
 
-TEST_F(ColoredFramesTest, SoundThatIsLeftOutIsNamed) {
+TEST_F(FilmWriterTest, NamesSoundThatIsLeftOut) {
   ScratchFolder elsewhere;
   WriteFilm(UnevenTimes(), "aac");
   ThreadPool pool(1);

@@ -1,7 +1,5 @@
 #include "core/stage/film/temporal_scores.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -20,7 +18,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int64_t kScoredFramesCacheBytes = int64_t{16} << 20;  // each frame is read twice, at once
+constexpr int64_t kScoredFramesCacheBytes = int64_t{16} << 20;  // each frame is read twice in a row
 
 std::vector<std::vector<int>> ShotsInOrderOfTime(const Scene& scene) {
   std::map<int, std::vector<int>> shots;
@@ -32,15 +30,9 @@ std::vector<std::vector<int>> ShotsInOrderOfTime(const Scene& scene) {
   return ordered;
 }
 
-ordered_json JsonOf(const TemporalConsistency& figures) {
-  ordered_json json{{"pairs", figures.pairs},
-                    {"followed", figures.followed},
-                    {"tc_chroma", figures.tc_chroma},
-                    {"chroma", figures.chroma},
-                    {"cdc", figures.cdc}};
-  for (size_t d = 0; d < kCdcDistances.size(); ++d) {
-    json[fmt::format("cdc_{}", kCdcDistances[d])] = figures.cdc_at[d];
-  }
+ordered_json JsonOf(const TemporalConsistency& consistency) {
+  ordered_json json{{"pairs", consistency.pairs}};
+  for (const auto& [name, value] : consistency.Figures()) json[name] = value;
   return json;
 }
 

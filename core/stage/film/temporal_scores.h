@@ -1,5 +1,5 @@
-// How steady the colours of a film or of a scene that moves are, for scores.json. For the stages of
-// this layer only.
+// Temporal consistency of the colours of a film or a dynamic scene, for scores.json. For stages
+// only.
 #pragma once
 
 #include <filesystem>
@@ -13,11 +13,10 @@
 
 namespace color3d {
 
-// Of the frames in colour ("colored_views"), of pictures of the model ("rendered") and of the same
-// geometry under true colours ("bound") where there are such, and of the true colours when every
-// view has them ("truth"): "pairs", "followed", "tc_chroma", "chroma", "cdc", "cdc_1", "cdc_2",
-// "cdc_4" (TemporalConsistency). `truth`: by view. Empty when views have no moments, or no shot has
-// two frames. Throws Error{kCancelled}.
+// TemporalConsistency of the coloured frames ("colored_views"), of renders of `model` ("rendered")
+// and of `bound`, the same geometry under true colours ("bound"), and of the true colours if every
+// view has them ("truth"). `truth`: by view. Empty if the views have no times or no shot has two
+// frames. Throws Error{kCancelled}.
 nlohmann::ordered_json TemporalScores(const Scene& scene,
                                       const std::optional<GaussianModel>& model,
                                       const std::optional<GaussianModel>& bound,

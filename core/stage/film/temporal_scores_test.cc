@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/catalogue/metrics.h"
 #include "core/color/lab.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
@@ -18,7 +19,7 @@ constexpr int kWidth = 96, kHeight = 64, kFrames = 6;
 
 class TemporalScoresTest : public StageTest {
  protected:
-  // A grey film of two shots, the second of one frame.
+  // A grey film of two shots; the second one has one frame.
   TemporalScoresTest() {
     for (int i = 0; i < kFrames; ++i) {
       Image gray(kWidth, kHeight, 1);
@@ -33,7 +34,7 @@ class TemporalScoresTest : public StageTest {
       view.camera =
           view.captured_camera = {kWidth, kHeight, 100.0, 100.0, kWidth / 2.0, kHeight / 2.0};
       view.held_out = i == 0;
-      // Names do not tell the order of time.
+      // Names are not in order of time.
       view.moment = Moment{0.1 * (i < 2 ? 1 - i : i), i == kFrames - 1 ? 1 : 0};
       WriteFileAtomic(scratch_.path() / view.image_file, EncodePng8(gray));
       scene_.views.push_back(view);
@@ -57,11 +58,14 @@ class TemporalScoresTest : public StageTest {
   std::vector<TruthFile> truth_;
 };
 
-TEST_F(TemporalScoresTest, FramesAreComparedInTheOrderOfTimeWithinTheirShots) {
+TEST_F(TemporalScoresTest, ComparesFramesInOrderWithinShots) {
   const json temporal = Evaluated({}).at("temporal");
   EXPECT_FALSE(temporal.contains("truth"));
   EXPECT_FALSE(temporal.contains("rendered"));
   const json& frames = temporal.at("colored_views");
+  for (const auto& [key, value] : frames.items()) {
+    EXPECT_NE(FindMetric(key).metric, nullptr) << key << " has no row in core/catalogue/metrics.cc";
+  }
   EXPECT_EQ(frames.at("pairs"), 4);
   EXPECT_GT(frames.at("followed"), 0.5);
   // In time: 14, 10, 10, 14, 10; so three of four pairs differ by 4 in a and in b. 8 bits of ab.
@@ -72,7 +76,7 @@ TEST_F(TemporalScoresTest, FramesAreComparedInTheOrderOfTimeWithinTheirShots) {
   EXPECT_NEAR(frames.at("cdc_2"), 2.0 / 3.0 * unlike, 0.01 * unlike);
 }
 
-TEST_F(TemporalScoresTest, TheTruthOfAllFramesIsScoredBeside) {
+TEST_F(TemporalScoresTest, ScoresTruthOfAllFrames) {
   EvaluateOptions options;
   options.truth = {truth_[0]};
   EXPECT_FALSE(Evaluated(options).at("temporal").contains("truth"));
@@ -82,7 +86,7 @@ TEST_F(TemporalScoresTest, TheTruthOfAllFramesIsScoredBeside) {
   EXPECT_NEAR(truth.at("chroma"), std::hypot(8.0, 8.0), 0.5);
 }
 
-TEST_F(TemporalScoresTest, PicturesOfAModelAndOfItsBoundAreScoredBeside) {
+TEST_F(TemporalScoresTest, ScoresRendersOfModelAndBound) {
   GaussianModel model = SmallModel();
   model.opacity_logit.assign(model.size(), 6.0f);
   model.log_scale.assign(3 * model.size(), 1.0f);
@@ -102,7 +106,7 @@ TEST_F(TemporalScoresTest, PicturesOfAModelAndOfItsBoundAreScoredBeside) {
   EXPECT_NEAR(temporal.at("bound").at("chroma"), std::hypot(8.0, 8.0), 3.0);
 }
 
-TEST_F(TemporalScoresTest, PhotosHaveNoMoments) {
+TEST_F(TemporalScoresTest, GivesNothingForPhotos) {
   for (View& view : scene_.views) view.moment.reset();
   const GaussianModel model = SmallModel();
   AddInput(artifact::kModel, SerializeGaussians(model));

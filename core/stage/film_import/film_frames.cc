@@ -12,6 +12,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/text/name_order.h"
+#include "core/catalogue/film_rate.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/probe/probe.h"
@@ -60,13 +61,12 @@ std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
 std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
                                     const FilmOptions& options,
                                     StageContext& context) {
-  constexpr double kFramesPerSecond = 25.0;  // where nobody tells
   const FrameNumbers numbers = PlacesOfFrames(files);
   if (!numbers.note.empty()) context.progress().OnWarning(numbers.note);
   std::vector<double> times;
   for (const int64_t place : numbers.places) {
     times.push_back(static_cast<double>(place) /
-                    options.frames_per_second.value_or(kFramesPerSecond));
+                    options.frames_per_second.value_or(kDefaultFramesPerSecond));
   }
   return times;
 }

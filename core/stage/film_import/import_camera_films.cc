@@ -58,10 +58,10 @@ class CameraFilmsImport {
         return x.name < y.name;
       });
       result.scene = std::move(frames_);
-      result.layout = SceneLayout::kPosedFilms;
+      result.layout = CaptureLayout::kPosedFilms;
     } else {
       result = Place(options);
-      result.layout = SceneLayout::kFilms;
+      result.layout = CaptureLayout::kFilms;
     }
     result.photos_found = count_;
     TellMoments(&result);

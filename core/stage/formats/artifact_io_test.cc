@@ -24,7 +24,7 @@ TEST_F(StageTest, ImportFactsRoundTrip) {
   EXPECT_THROW(ImportFactsFromJson("{}"), Error);
 }
 
-TEST_F(StageTest, FindingsAboutAFilmRoundTrip) {
+TEST_F(StageTest, FilmFindingsRoundTrip) {
   ImportFacts facts;
   facts.layout = "film";
   EXPECT_FALSE(ImportFactsFromJson(ImportFactsToJson(facts)).film.has_value());
@@ -43,7 +43,7 @@ TEST_F(StageTest, FindingsAboutAFilmRoundTrip) {
   EXPECT_EQ(back.film->motion_energy, 0.125);
 }
 
-TEST_F(StageTest, FramesWithPosesAreColoredAsAFilmUnlessTheyAreReconstructed) {
+TEST_F(StageTest, DynamicSceneWithoutGeometryIsAFilm) {
   Scene scene = RampScene(scratch_.path(), 32, 24);
   EXPECT_FALSE(IsColoredAsFilm(MakeContext(), scene)) << "photos of a place";
   for (View& view : scene.views) view.moment = Moment{0.1, 0};
@@ -55,7 +55,7 @@ TEST_F(StageTest, FramesWithPosesAreColoredAsAFilmUnlessTheyAreReconstructed) {
   EXPECT_TRUE(IsColoredAsFilm(MakeContext(), scene)) << "without poses there is no geometry";
 }
 
-TEST(ViewArtifact, DropsThePhotosExtensionAndNoticesCollisions) {
+TEST(ViewArtifact, DropsTheExtensionAndFindsCollisions) {
   Scene scene;
   scene.views.resize(2);
   scene.views[0].name = "left/a.jpg";
@@ -66,7 +66,7 @@ TEST(ViewArtifact, DropsThePhotosExtensionAndNoticesCollisions) {
   EXPECT_THROW(CheckStemsAreUnique(scene), Error);
 }
 
-TEST_F(EvaluatedSceneTest, ConfidenceComesFromTheProvenance) {
+TEST_F(EvaluatedSceneTest, ConfidenceIsFromProvenance) {
   AddProvenance("p1.png", Halves({0.0f, 1.0f, 0.0f}, {0.2f, 0.0f, 0.8f}));
   const StageContext context = MakeContext();
   const Image confidence = ReadViewConfidence(context, scene_.views[1], 48, 32);

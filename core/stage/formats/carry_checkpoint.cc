@@ -12,11 +12,11 @@ using nlohmann::json;
 
 namespace {
 
-// A checkpoint: these bytes, then records:
-//   {"view": name, "coverage": 0..1, "png": bytes}       a view that is done; the last one counts
+// First bytes of a checkpoint; records follow:
+//   {"view": name, "coverage": 0..1, "png": bytes}       a finished view; the last one counts
 //   {"key": name, "direction": 1 or -1, "frame": name, "moved": longer sides,
 //    "wanted": 0..1, "width": px, "height": px, "in_key": bytes, "in_frame": bytes}
-//                                                        a walk of a film; no maps at its end
+//                                                        a walk of a film; without maps at its end
 constexpr char kMagic[] = "carry 3\n";
 
 json::binary_t BytesOf(const Image& map) {
@@ -83,11 +83,11 @@ CarryCheckpoint::CarryCheckpoint(const Scene& scene, StageContext& context)
       is_done_(scene.views.size(), 0),
       coverage_(scene.views.size(), 0.0),
       records_(kind::kCarryColor, kMagic, context) {
-  records_.TakeUp([&](const json& record) { CheckRecord(record, scene_); },
-                  [&](const json& record) { TakeUp(record); });
+  records_.Restore([&](const json& record) { CheckRecord(record, scene_); },
+                   [&](const json& record) { Restore(record); });
 }
 
-void CarryCheckpoint::TakeUp(const json& record) {
+void CarryCheckpoint::Restore(const json& record) {
   if (record.contains("key")) {
     const FilmWalk walk = WalkFrom(record, scene_);
     walks_[{walk.key, walk.direction}] = walk;
@@ -124,7 +124,7 @@ void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
   SaveWhenDue();
 }
 
-void CarryCheckpoint::Tell(const std::string& message) const {
+void CarryCheckpoint::ReportProgress(const std::string& message) const {
   const std::lock_guard lock(mutex_);
   context_.progress().OnProgress(done_, static_cast<int64_t>(scene_.views.size()), message);
 }

@@ -1,6 +1,5 @@
-// The views that carry_color has finished, kept in checkpoints so that a killed worker's successor
-// does not carry into them again. They wait in a file of the scratch folder: memory does not grow
-// with their number. Thread-safe but for the constructor.
+// Checkpoints of carry_color: the finished views. Records are kept in a file of the scratch folder,
+// so that memory does not grow with their number. Thread-safe except for the constructor.
 #pragma once
 
 #include <map>
@@ -19,29 +18,29 @@ namespace color3d {
 
 class CarryCheckpoint {
  public:
-  // Takes up the checkpoint, if there is one, and writes the outputs of its views. One that is
-  // damaged is reported as a warning and ignored. The references must outlive the object.
+  // Reads the checkpoint, if there is one, and writes the outputs of its views. A damaged one is
+  // ignored with a warning. Requires: the references outlive the object.
   CarryCheckpoint(const Scene& scene, StageContext& context);
 
-  // The checkpoint has it: nothing is left to do for this view.
+  // Returns true if the checkpoint has the view.
   bool WasDone(int view) const { return was_done_[static_cast<size_t>(view)] != 0; }
-  // Writes the output, reports progress, saves a checkpoint when it is time. `coverage`: 0..1.
+  // Writes the output, reports progress, saves a checkpoint when it is due. `coverage`: 0..1.
   void Add(int view, double coverage, const std::string& png);
-  // Reports what is done beside that.
-  void Tell(const std::string& message) const;
-  // The output of a view that was added.
+  // Reports progress of other work.
+  void ReportProgress(const std::string& message) const;
+  // Requires: the view was added. Returns its output.
   std::string Png(int view) const;
-  // Writes another one in its place, saves a checkpoint when it is time.
+  // Replaces the output of a view, saves a checkpoint when it is due.
   void Replace(int view, double coverage, const std::string& png);
-  // By view; once all are there.
+  // By view. Requires: all views were added.
   const std::vector<double>& coverage() const { return coverage_; }
 
-  // Of a film: how far its walks were, and how far this one is now; told before the frame is added.
+  // Films: the progress of all walks, and an update of one. Set before the frame is added.
   std::vector<FilmWalk> Walks() const;
   void SetWalk(const FilmWalk& walk);
 
  private:
-  void TakeUp(const nlohmann::json& record);
+  void Restore(const nlohmann::json& record);
   void Keep(size_t view, double coverage, const std::string& png);
   void SaveWhenDue();
 

@@ -1,5 +1,4 @@
-// carry.json: how much of the scene the key views show. Written by
-// carry_color, read by the stages after it.
+// carry.json: coverage of the scene by the key views. Written by carry_color, read by later stages.
 #pragma once
 
 #include <map>
@@ -12,14 +11,14 @@
 namespace color3d {
 
 struct CarryFacts {
-  // Share of the other views' pixels that a key view shows, mean over the views that are not key
-  // views, 0..1; nothing when nobody measured it.
+  // Share of the pixels that a key view shows, mean over the views that are not key views, 0..1;
+  // nullopt if it was not measured.
   std::optional<double> coverage;
   std::vector<std::string> key_views;           // names
   std::map<std::string, double> view_coverage;  // of every view, by its name
 };
 
-// Empty facts when the job has no such input. Throws Error{kInvalidArgument} when it is damaged.
+// Returns empty facts if there is no such input. Throws Error{kInvalidArgument} if it is damaged.
 CarryFacts ReadCarryFacts(const StageContext& context);
 void WriteCarryFacts(const CarryFacts& facts, StageContext& context);
 

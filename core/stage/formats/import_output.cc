@@ -4,30 +4,6 @@
 #include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
-namespace {
-
-const char* LayoutName(SceneLayout layout) {
-  switch (layout) {
-    case SceneLayout::kPhotos:
-      return "photos";
-    case SceneLayout::kColmap:
-      return "colmap";
-    case SceneLayout::kTransforms:
-      return "transforms";
-    case SceneLayout::kNerfies:
-      return "nerfies";
-    case SceneLayout::kPosesBounds:
-      return "poses_bounds";
-    case SceneLayout::kPosedFilms:
-      return "posed_films";
-    case SceneLayout::kFilms:
-      return "films";
-  }
-  return "photos";
-}
-
-}  // namespace
-
 void WriteImported(const ImportResult& result,
                    StageContext& context,
                    const std::map<std::string, std::string>& films,
@@ -35,7 +11,7 @@ void WriteImported(const ImportResult& result,
   CheckStemsAreUnique(result.scene);
   for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
   ImportFacts facts;
-  facts.layout = LayoutName(result.layout);
+  facts.layout = result.layout;
   facts.ran_structure_from_motion = result.ran_structure_from_motion;
   facts.sfm_plan = result.sfm.plan;
   facts.undistorted = result.undistorted;

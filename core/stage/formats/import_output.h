@@ -1,4 +1,4 @@
-// What an import hands to the other stages. For core/stage only.
+// Writes the artifacts of an import. For core/stage only.
 #pragma once
 
 #include <map>
@@ -11,9 +11,9 @@
 
 namespace color3d {
 
-// Tells the warnings, and leaves kScene, kImportFacts and, where there is one, kSfmLog. `films`: by
-// camera, those that its frames are of; `film`: what looking for their poses found. Throws as
-// CheckStemsAreUnique.
+// Reports the warnings and writes kScene, kImportFacts and, if there is one, kSfmLog. `films`: the
+// film of each camera, by its name; `film`: findings of the search for poses. Throws what
+// CheckStemsAreUnique throws.
 void WriteImported(const ImportResult& result,
                    StageContext& context,
                    const std::map<std::string, std::string>& films = {},

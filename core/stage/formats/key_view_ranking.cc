@@ -18,12 +18,6 @@ constexpr int kSheetQuality = 88;
 constexpr double kTie = 0.05;
 constexpr double kNarrow = 0.25;
 
-std::string StrategyInWords(const std::string& strategy) {
-  if (strategy == "entropy") return "the entropy of its similarities";
-  if (strategy == "tracks") return "the points it shares with the others";
-  return "feature coverage";
-}
-
 std::string Views(size_t count) {
   return fmt::format("{} {}", count, count == 1 ? "view" : "views");
 }
@@ -34,6 +28,13 @@ Image Thumbnail(const KeyViewRanking& ranking, int index) {
 }
 
 }  // namespace
+
+std::string StrategyInWords(const std::string& strategy) {
+  if (strategy == "coverage") return "feature coverage";
+  if (strategy == "entropy") return "the entropy of its similarities";
+  if (strategy == "tracks") return "the sparse points that it shares with other views";
+  return "the strategy " + strategy;
+}
 
 std::string DescribeKeyView(const KeyViewRanking& ranking) {
   const auto& ranked = ranking.selection.ranking;

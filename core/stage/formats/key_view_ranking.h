@@ -1,4 +1,4 @@
-// The outcome of key view selection for programs and for people.
+// Result of the key view selection, as JSON, as text and as a contact sheet. Pure functions.
 #pragma once
 
 #include <string>
@@ -13,24 +13,27 @@ struct KeyViewRanking {
   KeyViewSelection selection;
   std::vector<std::string> names;      // of the candidates, by index
   std::vector<ViewFeatures> features;  // by index; empty when the user chose
-  std::string strategy;                // that was used: "coverage", "entropy", "tracks", "manual"
-  std::string fallback;                // why another one than was asked for; empty: as asked for
-  std::string among;                   // what it is the best of; empty: of all
-  std::string encoder;                 // description; empty when no features were used
-  // Where several were chosen together: all of them, best first, and the error that is expected
-  // with the first, the first two, ... Else empty.
+  std::string strategy;                // the one used: "coverage", "entropy", "tracks", "manual"
+  std::string fallback;  // reason for which the requested strategy was not used; empty: it was
+  std::string among;     // the set that the view is the best of; empty: all candidates
+  std::string encoder;   // description; empty if no features were used
+  // Only if several were chosen together: all of them, best first, and the expected error with the
+  // first, the first two, and so on.
   std::vector<int> together;
   std::vector<double> expected_error;
 
   const std::string& Chosen() const { return names[selection.index]; }
 };
 
-// "Best of 50 views by feature coverage, clearly ahead of the next, x.jpg."
+// E.g. "feature coverage".
+std::string StrategyInWords(const std::string& strategy);
+
+// E.g. "Best of 50 views by feature coverage, clearly ahead of x.jpg."
 std::string DescribeKeyView(const KeyViewRanking& ranking);
 // key_view.json.
 std::string KeyViewToJson(const KeyViewRanking& ranking);
-// key_view_ranking.jpg: the best 40 and up to 20 that were set aside. `chosen_thumbnail`
-// stands for the chosen view when there are no features.
+// key_view_ranking.jpg: the best 40 views and up to 20 that were set aside. `chosen_thumbnail`: the
+// picture of the chosen view if there are no features.
 std::string KeyViewSheetJpeg(const KeyViewRanking& ranking, const Image& chosen_thumbnail);
 
 }  // namespace color3d

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Length (uint64) and CBOR.
+// A record: its length (uint64) and CBOR.
 void Write(const json& record, std::ostream& out) {
   std::string bytes;
   json::to_cbor(record, bytes);
@@ -59,7 +59,7 @@ RecordCheckpoint::RecordCheckpoint(std::string stage, std::string magic, StageCo
   file_ << magic_;
 }
 
-void RecordCheckpoint::TakeUp(const OnRecord& check, const OnRecord& take) {
+void RecordCheckpoint::Restore(const OnRecord& check, const OnRecord& take) {
   const fs::path before = FileOf("before");
   try {
     if (context_.checkpoints().LoadTo(before)) {

@@ -1,5 +1,5 @@
-// Checkpoints of stages whose results come one by one: records that wait in a file of the scratch
-// folder, so that memory does not grow with their number. Not thread-safe.
+// Checkpoints of stages that make results one by one: records in a file of the scratch folder, so
+// that memory does not grow with their number. Not thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -17,17 +17,18 @@ class RecordCheckpoint {
  public:
   using OnRecord = std::function<void(const nlohmann::json&)>;
 
-  // `stage`: its kind; `magic`: how files of this version begin. The context must outlive it.
+  // `stage`: its kind; `magic`: first bytes of files of this version. Requires: the context
+  // outlives the object.
   RecordCheckpoint(std::string stage, std::string magic, StageContext& context);
 
-  // Hands over the records of the last checkpoint, all of them or none: `check` throws
-  // nlohmann::json::exception or Error{kNotFound, kDataLoss} for what is no record, which is
-  // reported as a warning.
-  void TakeUp(const OnRecord& check, const OnRecord& take);
-  // Keeps a record for this checkpoint and all later ones.
+  // Calls `take` for the records of the last checkpoint, if `check` accepts all of them. `check`
+  // throws nlohmann::json::exception or Error{kNotFound, kDataLoss} for an invalid record; the
+  // checkpoint is then ignored with a warning.
+  void Restore(const OnRecord& check, const OnRecord& take);
+  // Adds a record to this checkpoint and all later ones.
   void Append(const nlohmann::json& record);
-  // Saves a checkpoint when it is time: what was appended, and `latest`, which is asked for then.
-  // Throws Error{kResourceExhausted} when the disk is full.
+  // Saves a checkpoint when it is due: the appended records, then those of `latest`. Throws
+  // Error{kResourceExhausted} if the disk is full.
   void SaveWhenDue(const std::function<std::vector<nlohmann::json>()>& latest = {});
 
  private:

@@ -1,4 +1,4 @@
-// The artifacts of generate_augmentations as pictures to train on.
+// Training pictures from the artifacts of generate_augmentations. Pure functions.
 #pragma once
 
 #include <functional>
@@ -10,11 +10,11 @@
 
 namespace color3d {
 
-// How often all generated pictures together are drawn for each time the key view is.
+// Frequency of all generated pictures together in training, relative to the key view.
 inline constexpr double kGeneratedShare = 0.5;
 
-// `facts`: augmentations.json; `read` gives the bytes of an artifact by name. Pictures larger than
-// `max_side_px` are reduced. Throws Error{kInvalidArgument} on damaged artifacts.
+// `facts`: augmentations.json; `read` returns the bytes of an artifact. Pictures larger than
+// `max_side_px` are reduced. Throws Error{kInvalidArgument} for damaged artifacts.
 std::vector<TrainingPicture> TrainingPicturesFrom(
     std::string_view facts,
     const std::function<std::string(const std::string& name)>& read,

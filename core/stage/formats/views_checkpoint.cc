@@ -12,7 +12,8 @@ using nlohmann::json;
 
 namespace {
 
-// How a checkpoint begins; then records {"view": name, "ab": bytes, "provenance": bytes}, of PNG.
+// First bytes of a checkpoint; records follow: {"view": name, "ab": bytes, "provenance": bytes},
+// PNG.
 constexpr char kMagic[] = "views 1\n";
 
 std::string BytesAt(const json& record, const char* name) {
@@ -34,7 +35,7 @@ ViewsCheckpoint::ViewsCheckpoint(const Scene& scene, StageContext& context)
   const auto view_of = [&](const json& record) {
     return scene.FindView(record.at("view").get<std::string>());
   };
-  records_.TakeUp(
+  records_.Restore(
       [&](const json& record) {
         view_of(record);
         record.at("ab").get_binary();

@@ -1,5 +1,5 @@
-// The views that colorize_views has coloured: its outputs, kept in checkpoints so that a killed
-// worker's successor does not colour them again. Thread-safe but for the constructor.
+// Checkpoints of colorize_views: the outputs of the coloured views. Thread-safe except for the
+// constructor.
 #pragma once
 
 #include <cstdint>
@@ -17,13 +17,13 @@ namespace color3d {
 
 class ViewsCheckpoint {
  public:
-  // Takes up the checkpoint, if there is one, and writes the outputs of its views. The references
-  // must outlive the object.
+  // Reads the checkpoint, if there is one, and writes the outputs of its views. Requires: the
+  // references outlive the object.
   ViewsCheckpoint(const Scene& scene, StageContext& context);
 
-  // The checkpoint has it: nothing is left to do for this view.
+  // Returns true if the checkpoint has the view.
   bool WasDone(int view) const { return was_done_[static_cast<size_t>(view)] != 0; }
-  // Writes the outputs, reports progress, saves a checkpoint when it is time.
+  // Writes the outputs, reports progress, saves a checkpoint when it is due.
   void Add(int view, const FusedColor& color);
 
  private:

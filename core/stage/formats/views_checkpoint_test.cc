@@ -24,7 +24,7 @@ class ViewsCheckpointTest : public StageTest {
   const Scene scene_ = RampScene(scratch_.path(), kWidth, kHeight);
 };
 
-TEST_F(ViewsCheckpointTest, WhatWasDoneIsThereAgain) {
+TEST_F(ViewsCheckpointTest, RestoresFinishedViews) {
   DyingCheckpoints store;
   store.dies_at = 2;
   checkpoints_ = &store;
@@ -48,7 +48,7 @@ TEST_F(ViewsCheckpointTest, WhatWasDoneIsThereAgain) {
   EXPECT_TRUE(observer_.text.empty()) << observer_.text;
 }
 
-TEST_F(ViewsCheckpointTest, ADamagedOneIsSaidAndLeft) {
+TEST_F(ViewsCheckpointTest, WarnsOfDamageAndStartsAnew) {
   DyingCheckpoints store;
   store.states = {"views 1\nand then nonsense"};
   checkpoints_ = &store;

@@ -15,9 +15,9 @@
 namespace color3d {
 namespace {
 
-constexpr double kLongestWhole = 1.0;  // times up to here may be shares of the whole
+constexpr double kLongestWhole = 1.0;  // longest span of times that may run from 0 to 1
 
-// Relative to the scene's folder; empty for none.
+// Path of the film relative to the folder of the scene; empty if there is none.
 std::string FilmOf(const View& view, const StageContext& context) {
   if (!view.moment || !view.image_file.starts_with(artifact::kGivenViews)) return "";
   const std::optional<ImportFacts> facts = FindImportFacts(context);
@@ -32,7 +32,7 @@ std::string FilmOf(const View& view, const StageContext& context) {
   return films.size() == 1 ? films[0] : "";
 }
 
-// Its place among the film's frames, which its name tells: "f000012.png"; -1 for another name.
+// Index of a frame in its film, from its name ("f000012.png"); -1 for other names.
 int FrameNumber(const View& view) {
   const std::string stem = std::filesystem::path(view.name).stem().string();
   int number = -1;
@@ -58,7 +58,7 @@ FilmClock ClockOf(const std::vector<double>& times_s) {
   }
   clock.ticks_per_second = TicksPerSecond(clock.time_s);
   for (size_t i = 1; i < clock.time_s.size(); ++i) {
-    // Broken films give two frames nearly one time.
+    // Damaged films have frames with nearly equal times.
     const double least = clock.time_s[i - 1] + 1.0 / clock.ticks_per_second;
     clock.time_s[i] = std::max(clock.time_s[i], least);
     clock.seconds.push_back(clock.time_s[i] - clock.time_s[i - 1]);
@@ -73,9 +73,7 @@ std::optional<ImportFacts> FindImportFacts(const StageContext& context) {
 }
 
 bool TimesAreSeconds(const Scene& scene, const std::optional<ImportFacts>& facts) {
-  for (const char* layout : {"film", "posed_films", "films", "colmap"}) {
-    if (facts && facts->layout == layout) return true;
-  }
+  if (facts && InfoOf(facts->layout).times_are_seconds) return true;
   return scene.IsFilm() || scene.Times().back() > kLongestWhole;
 }
 

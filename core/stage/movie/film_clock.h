@@ -1,5 +1,4 @@
-// When a movie shows frames that have times of their own, and what is heard with them. For the
-// stages of this layer only.
+// Times at which a movie shows frames, and the sound that belongs to them. For stages only.
 #pragma once
 
 #include <optional>
@@ -14,25 +13,25 @@ namespace color3d {
 
 struct FilmClock {
   int ticks_per_second = 0;
-  std::vector<double> time_s;     // of each frame, from the first one's
-  std::vector<double> seconds;    // to the next one
-  double frames_per_second = 25;  // as is usual, 1..120
+  std::vector<double> time_s;     // of each frame, relative to the first
+  std::vector<double> seconds;    // from each frame to the next
+  double frames_per_second = 25;  // typical rate, 1..120
 };
 
-// Of frames at these times of the scene, in the order in which they are shown. Gaps that frames of
-// no use have left stay gaps, so that what is heard fits what is seen; a time that goes back, where
-// another camera's film begins, follows at the usual step.
+// Clock for frames at these times, in the order in which they are shown. Gaps remain, so that sound
+// and picture stay in step. A frame with an earlier time than the one before, from the film of
+// another camera, follows after the typical step.
 FilmClock ClockOf(const std::vector<double>& times_s);
 
-// Nothing where the import has left no facts, as in tests.
+// nullopt if there are no facts of the import among the inputs.
 std::optional<ImportFacts> FindImportFacts(const StageContext& context);
 
-// Whether the scene's times are seconds, as those of films and of times.txt are: others may also
-// count from 0 to 1 for the whole.
+// Returns true if the times of the scene are seconds, as for films and times.txt. Other times may
+// run from 0 to 1.
 bool TimesAreSeconds(const Scene& scene, const std::optional<ImportFacts>& facts);
 
-// What is heard in the film that `view` is a frame of, from this time of the scene on, as long as
-// the clock runs; nothing for frames that came as pictures and for films without sound.
+// Sound of the film that `view` is a frame of, from `begin_s` for the duration of the clock;
+// nullopt for frames that came as pictures and for films without sound.
 std::optional<SoundPart> SoundFrom(const Scene& scene,
                                    int view,
                                    double begin_s,

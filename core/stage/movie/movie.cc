@@ -23,25 +23,25 @@
 namespace color3d {
 namespace {
 
-constexpr int kFocusSidePx = 256;              // of the picture that tells how far the scene is
+constexpr int kFocusSidePx = 256;  // longer side of the render that the distance is measured in
 constexpr int64_t kMaxFileBytes = 64ll << 20;  // of cameras
 constexpr int kLeastSidePx = 16;
 
-// The one whose picture says how the movie's looks and how far away things are.
+// The view whose camera gives the movie its picture format and the distance of the scene.
 int HomeView(const Scene& scene, const StageContext& context) {
   if (scene.views.empty()) throw InvalidArgument("the scene has no views");
   if (context.HasInput(artifact::kKeyView)) return ReadKeyView(context, scene);
   return ViewsInOrder(scene)[scene.views.size() / 2];
 }
 
-// A way of the camera, before it is known how many frames it takes.
+// A camera path without a number of frames.
 struct Stations {
   std::vector<PathCamera> cameras;
   bool have_times = false;  // of the scene
 };
 
-// A time of the scene, which ends at `last_s`. As its end counts what that is rounded to where it
-// is told.
+// Returns a time of the scene, which ends at `last_s`. A time that exceeds the end by rounding only
+// is the end. Throws for later times.
 double TimeInScene(double time_s, double last_s, const std::string& what) {
   constexpr double kRounded = 1e-5;
   if (time_s < 0.0 || time_s > (1.0 + kRounded) * last_s) {
@@ -51,8 +51,8 @@ double TimeInScene(double time_s, double last_s, const std::string& what) {
   return std::min(time_s, last_s);
 }
 
-// The moments that a file of cameras tells; refused where it tells those of some.
-bool TakeTimes(const std::vector<FileCamera>& file, const Scene& scene, Stations* stations) {
+// Times in a file of cameras. Throws if only some of its frames have one.
+bool ReadTimes(const std::vector<FileCamera>& file, const Scene& scene, Stations* stations) {
   if (!scene.IsDynamic()) return false;
   const bool has_times = file[0].time_s.has_value();
   const double last_s = scene.Times().back();
@@ -79,7 +79,7 @@ Stations CamerasOfFile(const RenderOptions& options, const Scene& scene, const C
   for (const FileCamera& camera : file) {
     stations.cameras.push_back({camera.camera, camera.cam_from_world});
   }
-  stations.have_times = TakeTimes(file, scene, &stations);
+  stations.have_times = ReadTimes(file, scene, &stations);
   return stations;
 }
 
@@ -95,7 +95,7 @@ std::vector<PathCamera> CamerasOfViews(const RenderOptions& options, const Scene
   return cameras;
 }
 
-// Where that view's camera stood, at all moments.
+// The camera of the view, standing still, at all times.
 std::vector<PathCamera> StillCamera(const Scene& scene, int home) {
   std::vector<PathCamera> cameras;
   for (const double time_s : scene.Times()) {
@@ -104,22 +104,22 @@ std::vector<PathCamera> StillCamera(const Scene& scene, int home) {
   return cameras;
 }
 
-// Whether a movie without a wanted length shows every camera of its path once.
+// Returns true if a movie without a given length shows every camera of its path once.
 bool IsOneByOne(const RenderOptions& options, const Scene& scene) {
   using Path = RenderOptions::Path;
   return options.path == Path::kCameras || options.path == Path::kStill ||
          (options.path == Path::kPhotos && scene.IsDynamic());
 }
 
-// Every camera as it is, and back again where the movie is to end as it begins.
+// The cameras as they are, and back again for --bounce.
 std::vector<PathCamera> OneByOne(std::vector<PathCamera> cameras, bool bounce) {
   const size_t count = cameras.size();
   for (size_t i = count - 1; bounce && i-- > 1;) cameras.push_back(cameras[i]);
   return cameras;
 }
 
-// The moment that each frame shows, where nobody tells: all of the scene's time, and back where the
-// path comes back.
+// Times of the frames if the path has none: the whole time of the scene, and back if the path goes
+// back.
 void SpreadTimes(bool bounce, const Scene& scene, std::vector<PathCamera>* frames) {
   const std::vector<double> times = scene.Times();
   const double last = std::max<double>(1.0, static_cast<double>(frames->size()) - 1.0);
@@ -130,7 +130,7 @@ void SpreadTimes(bool bounce, const Scene& scene, std::vector<PathCamera>* frame
   }
 }
 
-// The moment at a share of a smooth path: between its stations' as far as the camera is.
+// Time at a position on a smooth path, interpolated between its stations.
 double TimeOnPath(const SmoothPath& path, const std::vector<PathCamera>& stations, double share) {
   size_t next = 1;
   while (next + 1 < stations.size() && path.KnotAt(next) < share) ++next;
@@ -148,12 +148,12 @@ Eigen::Vector3d FocusOfView(const View& view, const GaussianModel& model, Thread
       RenderView(model, small, view.cam_from_world, pool, 0.0f, view.time_s()).median_depth);
 }
 
-// Of the size of all frames.
+// The camera at the size of all frames.
 Camera PictureOf(const RenderOptions& options, const Stations& stations, const View& home) {
   Camera picture =
       options.path == RenderOptions::Path::kCameras ? stations.cameras[0].camera : home.camera;
   picture = picture.FitWithin(options.max_side_px);
-  picture.width -= picture.width % 2;  // as movies need it
+  picture.width -= picture.width % 2;  // movies need even sizes
   picture.height -= picture.height % 2;
   if (std::min(picture.width, picture.height) >= kLeastSidePx) return picture;
   throw InvalidArgument(
@@ -164,7 +164,7 @@ Camera PictureOf(const RenderOptions& options, const Stations& stations, const V
       kLeastSidePx);
 }
 
-Stations StationsOf(const RenderOptions& options, const Scene& scene, int home) {
+Stations PathStations(const RenderOptions& options, const Scene& scene, int home) {
   using Path = RenderOptions::Path;
   switch (options.path) {
     case Path::kCameras:
@@ -178,7 +178,7 @@ Stations StationsOf(const RenderOptions& options, const Scene& scene, int home) 
   }
 }
 
-// On a way that is gone smoothly; with moments where `file_tells` them.
+// Cameras along a smooth path, with times if the file has them.
 std::vector<PathCamera> SmoothFrames(const RenderOptions& options,
                                      const Stations& stations,
                                      double unit,
@@ -207,14 +207,14 @@ std::vector<PathCamera> Turning(const RenderOptions& options,
   return frames;
 }
 
-// The frames' cameras, all of one size, each at its moment.
+// The cameras of the frames, all of one size, each with its time.
 std::vector<PathCamera> FramesOf(const RenderOptions& options,
                                  const Scene& scene,
                                  int home,
                                  const GaussianModel& model,
                                  StageContext& context) {
   const View& view = scene.views[home];
-  Stations stations = StationsOf(options, scene, home);
+  Stations stations = PathStations(options, scene, home);
   const Camera picture = PictureOf(options, stations, view);
   for (PathCamera& station : stations.cameras) {
     station.camera = CoverPicture(station.camera, picture.width, picture.height);
@@ -235,16 +235,16 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
   if (!told && scene.IsDynamic()) SpreadTimes(options.bounce, scene, &frames);
   if (!options.time_s) return frames;
   const double time_s =
-      TimeInScene(*options.time_s, scene.Times().back(), "the moment that is asked for (time_s)");
+      TimeInScene(*options.time_s, scene.Times().back(), "the requested time (time_s)");
   for (PathCamera& frame : frames) frame.time_s = time_s;
   return frames;
 }
 
-// Of frames that are the scene's own moments; nothing where frames follow each other evenly.
-std::optional<FilmClock> OwnClock(const RenderOptions& options,
-                                  const Scene& scene,
-                                  const std::vector<PathCamera>& frames,
-                                  const StageContext& context) {
+// Clock for frames at the times of the scene; nullopt for evenly spaced frames.
+std::optional<FilmClock> ClockOfScene(const RenderOptions& options,
+                                      const Scene& scene,
+                                      const std::vector<PathCamera>& frames,
+                                      const StageContext& context) {
   const bool own = !options.frames && !options.time_s && frames.size() > 1 && scene.IsDynamic() &&
                    options.path != RenderOptions::Path::kCameras && IsOneByOne(options, scene);
   if (!own || !TimesAreSeconds(scene, FindImportFacts(context))) return std::nullopt;
@@ -267,7 +267,7 @@ Mp4Options MovieOf(const RenderOptions& options,
   if (!clock) return movie;
   movie.frames_per_second = clock->frames_per_second;
   movie.ticks_per_second = clock->ticks_per_second;
-  // Views that are named need not follow each other as they were filmed.
+  // Named views need not be in the order in which they were filmed.
   if (options.views.empty() && !options.bounce) {
     movie.sound = SoundFrom(scene, home, frames[0].time_s, *clock, context);
   }
@@ -290,21 +290,19 @@ void RenderMovie(const RenderOptions& options,
                  const GaussianModel& model,
                  StageContext& context) {
   if (!scene.IsDynamic() && (options.path == RenderOptions::Path::kStill || options.time_s)) {
-    throw InvalidArgument(
-        "this scene has no times: a camera that stands still, or a moment, is of use for a scene "
-        "that moves");
+    throw InvalidArgument("this scene has no times: path still and time_s need a dynamic scene");
   }
   const int home = HomeView(scene, context);
   const std::vector<PathCamera> frames = FramesOf(options, scene, home, model, context);
   if (options.pictures && frames.size() > kMaxMoviePictures) {
     throw InvalidArgument(
-        "{} frames are too many to keep as pictures; at most {} are: ask for "
-        "fewer frames or only for the video",
+        "{} frames are too many to keep as pictures; the limit is {}: ask for "
+        "fewer frames, or for the video only",
         frames.size(),
         kMaxMoviePictures);
   }
   const std::filesystem::path file = context.scratch_folder() / artifact::kMovie;
-  const std::optional<FilmClock> clock = OwnClock(options, scene, frames, context);
+  const std::optional<FilmClock> clock = ClockOfScene(options, scene, frames, context);
   std::optional<Mp4Writer> movie;
   if (options.video) {
     movie.emplace(file, MovieOf(options, scene, home, frames, clock, context));

@@ -1,4 +1,4 @@
-// A scene along a path of the camera, as a movie or frame by frame. For the render stage only.
+// Renders a scene along a camera path, as a movie or as pictures. For the render stage only.
 #pragma once
 
 #include "core/scene/scene.h"
@@ -8,10 +8,9 @@
 
 namespace color3d {
 
-// Leaves artifact::kMovie, artifact::kFrames or both, as `options` say, which name a path. Throws
-// Error: kInvalidArgument for a file of cameras that is none, times that the scene does not have
-// and pictures that are too small for a movie; kFailedPrecondition when this machine encodes no
-// movie.
+// Writes artifact::kMovie, artifact::kFrames or both. Requires: `options` name a path. Throws
+// Error: kInvalidArgument for an invalid file of cameras, times outside the scene, and pictures too
+// small for a movie; kFailedPrecondition if this machine has no encoder.
 void RenderMovie(const RenderOptions& options,
                  const Scene& scene,
                  const GaussianModel& model,

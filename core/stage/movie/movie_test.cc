@@ -82,7 +82,7 @@ double PsnrDb(const Image& a, const Image& b) {
   return -10.0 * std::log10(sum / static_cast<double>(a.data.size()));
 }
 
-TEST_F(MovieTest, TheMovieShowsWhatThePicturesShow) {
+TEST_F(MovieTest, MovieEqualsPictures) {
   AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
   for (const Path path : {Path::kOrbit, Path::kPhotos}) {
     const auto out = Render({.path = path,
@@ -112,7 +112,7 @@ TEST_F(MovieTest, TheMovieShowsWhatThePicturesShow) {
   }
 }
 
-TEST_F(MovieTest, TheFirstFrameOfTheOriginalPathIsTheFirstPhotosView) {
+TEST_F(MovieTest, OriginalPathStartsAtTheFirstPhoto) {
   const auto out = Render({.views = {"p2.png", "p0.png"},
                            .path = Path::kPhotos,
                            .frames = 5,
@@ -127,7 +127,7 @@ TEST_F(MovieTest, TheFirstFrameOfTheOriginalPathIsTheFirstPhotosView) {
   EXPECT_LT(PsnrDb(first, last), 40.0);
 }
 
-TEST_F(MovieTest, AFrameWithoutAPlaceLeavesAGap) {
+TEST_F(MovieTest, FrameWithoutPoseLeavesAGap) {
   scene_.views.push_back(scene_.views[0]);
   scene_.views.push_back(scene_.views[1]);
   const double times[] = {0.0, 0.5, 0.75, 1.0, 1.25};  // the second found no place
@@ -142,7 +142,7 @@ TEST_F(MovieTest, AFrameWithoutAPlaceLeavesAGap) {
   EXPECT_NEAR(movie.seconds, 1.5, 0.01);
 }
 
-TEST_F(MovieTest, AStillCameraSeesAllMomentsAtTheirOwnTimes) {
+TEST_F(MovieTest, StillCameraShowsAllTimes) {
   MakeMoving({0.0, 1.0, 2.5});
   const auto out = Render({.path = Path::kStill, .pictures = true});
   const ReadMovie movie = DecodeMovie(out / "scene.mp4");
@@ -156,7 +156,7 @@ TEST_F(MovieTest, AStillCameraSeesAllMomentsAtTheirOwnTimes) {
   }
 }
 
-TEST_F(MovieTest, ThereAndBackKeepsTheFilmsPace) {
+TEST_F(MovieTest, BounceKeepsTheSpeedOfTheFilm) {
   MakeMoving({0.0, 0.5, 1.5});
   const ReadMovie movie =
       DecodeMovie(Render({.path = Path::kPhotos, .bounce = true}) / "scene.mp4");
@@ -165,7 +165,7 @@ TEST_F(MovieTest, ThereAndBackKeepsTheFilmsPace) {
   EXPECT_NEAR(movie.times[2], 1.5, 1e-4);
 }
 
-TEST_F(MovieTest, TimeStandsStillOnAnOrbit) {
+TEST_F(MovieTest, OrbitShowsOneTime) {
   MakeMoving({0.0, 1.0, 2.5});
   const RenderOptions options{
       .path = Path::kOrbit, .frames = 4, .video = false, .pictures = true, .time_s = 1.0};
@@ -187,7 +187,7 @@ TEST_F(MovieTest, TimeStandsStillOnAnOrbit) {
   EXPECT_EQ(bytes(options), frozen);
 }
 
-TEST_F(MovieTest, AMomentBehindTheScenesEndIsRefused) {
+TEST_F(MovieTest, RefusesATimeAfterTheEnd) {
   MakeMoving({0.0, 1.0, 89.0 / 30.0});
   RenderOptions options{.path = Path::kOrbit, .frames = 2, .time_s = 3.0};
   EXPECT_THAT(Complaint(options),
@@ -196,7 +196,7 @@ TEST_F(MovieTest, AMomentBehindTheScenesEndIsRefused) {
   EXPECT_EQ(Complaint(options), "none");
 }
 
-TEST_F(MovieTest, CamerasOfAFileMayHaveTimesOfTheirOwn) {
+TEST_F(MovieTest, FileOfCamerasMayHaveTimes) {
   MakeMoving({0.0, 1.0, 2.0});
   const auto at = [](double time_s) {
     return "{\"time\":" + std::to_string(time_s) +
@@ -225,7 +225,7 @@ TEST_F(MovieTest, CamerasOfAFileMayHaveTimesOfTheirOwn) {
               HasSubstr("frame 1 is at 2.5 s, but the scene lasts from 0 to 2"));
 }
 
-TEST_F(MovieTest, CamerasOfAFileAreTakenOneByOneOrSmoothly) {
+TEST_F(MovieTest, FileOfCamerasIsExactOrSmooth) {
   const std::string frames = FrameAt(0.0) + "," + FrameAt(-0.1) + "," + FrameAt(-0.2);
   RenderOptions options{.path = Path::kCameras, .pictures = true, .cameras = CameraFile(frames)};
   auto out = Render(options);
@@ -240,7 +240,7 @@ TEST_F(MovieTest, CamerasOfAFileAreTakenOneByOneOrSmoothly) {
   EXPECT_EQ(DecodeMovie(Render(options) / "scene.mp4").frames.size(), 11u);
 }
 
-TEST_F(MovieTest, OddSizesBecomeEvenAndTinyOnesAreRefused) {
+TEST_F(MovieTest, MakesSizesEvenAndRefusesTinyOnes) {
   for (View& view : scene_.views) view.camera = {101, 77, 100.0, 100.0, 50.5, 38.5};
   AddInput(artifact::kScene, SceneToJson(scene_));
   const ReadMovie movie = DecodeMovie(Render({.path = Path::kOrbit, .frames = 2}) / "scene.mp4");
@@ -251,7 +251,7 @@ TEST_F(MovieTest, OddSizesBecomeEvenAndTinyOnesAreRefused) {
   EXPECT_THAT(Complaint({.path = Path::kCameras, .cameras = tiny}), HasSubstr("0 x 0 px"));
 }
 
-TEST_F(MovieTest, WhatCannotBeRenderedIsNamed) {
+TEST_F(MovieTest, ErrorsNameTheProblem) {
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 0}), HasSubstr("frames"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 18'001}), HasSubstr("18000"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 1'001, .pictures = true}),
@@ -261,7 +261,7 @@ TEST_F(MovieTest, WhatCannotBeRenderedIsNamed) {
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .video = false}), HasSubstr("nothing"));
   EXPECT_THAT(Complaint({.path = Path::kCameras}), HasSubstr("needs a file"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .cameras = CameraFile(FrameAt(0))}),
-              HasSubstr("no other path"));
+              HasSubstr("by cameras only"));
   EXPECT_THAT(Complaint({.path = Path::kCameras, .cameras = CameraFile("{")}),
               HasSubstr("not JSON"));
   EXPECT_THAT(Complaint({.views = {"no such"}, .path = Path::kPhotos}), HasSubstr("no such"));
@@ -272,7 +272,7 @@ TEST_F(MovieTest, WhatCannotBeRenderedIsNamed) {
   EXPECT_THAT(Complaint({}), HasSubstr("no Gaussians"));
 }
 
-TEST_F(MovieTest, AFilmWithoutPosesIsNoPlaceToMoveThrough) {
+TEST_F(MovieTest, RefusesPathsThroughFilmsWithoutPoses) {
   for (int i = 0; i < 3; ++i) {
     scene_.views[i].cam_from_world = Pose{};
     scene_.views[i].moment = Moment{0.1 * i, 0};
@@ -284,12 +284,12 @@ TEST_F(MovieTest, AFilmWithoutPosesIsNoPlaceToMoveThrough) {
   }
 }
 
-TEST_F(MovieTest, PicturesOfFramesAreToldToBeOfNoUseWhereNothingWasFilmed) {
+TEST_F(MovieTest, WarnsThatPhotosHaveNoFrames) {
   Render({.pictures = true});
-  EXPECT_THAT(observer_.text, HasSubstr("pictures is left aside"));
+  EXPECT_THAT(observer_.text, HasSubstr("pictures is ignored"));
 }
 
-TEST_F(MovieTest, ACancelledMovieLeavesNothing) {
+TEST_F(MovieTest, CancelledMovieLeavesNothing) {
   cancel_.Cancel();
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 2}), HasSubstr("cancelled"));
   EXPECT_FALSE(std::filesystem::exists(scratch_.path() / "scene.mp4.part"));

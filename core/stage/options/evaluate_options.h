@@ -14,13 +14,13 @@ struct TruthFile {
   std::filesystem::path file;
 };
 struct EvaluateOptions {
-  std::vector<TruthFile> truth;           // of held-out views: these are scored. May be empty
-  std::vector<TruthFile> training_truth;  // of training views. May be empty
-  // Also score what the same geometry reaches under the true colours of all training views
-  // ("delta_e00_chroma_bound"): what the reconstruction itself costs. About as long as
+  std::vector<TruthFile> truth;           // of held-out views, which are scored; may be empty
+  std::vector<TruthFile> training_truth;  // of training views; may be empty
+  // Also scores the same geometry with the true colours of all training views
+  // ("delta_e00_chroma_bound"): the error of the reconstruction itself. Takes about as long as
   // solve_chroma.
   bool bound = false;
-  ChromaOptions chroma;  // of the bound
+  ChromaOptions chroma;  // for the bound
   void Validate() const;
 };
 

@@ -22,7 +22,7 @@ struct ColorizeKeyViewOptions {
     kEdit
   };
   Source source = Source::kImage;
-  std::filesystem::path file;  // image, strokes, points (JSON), edit; backend: points, may be empty
+  std::filesystem::path file;  // image, strokes, points (JSON) or edit; backend: points or empty
   std::vector<std::filesystem::path> references;  // references: 1..16; backend: at most 1
   std::filesystem::path mask;                     // edit and backend; empty: everywhere
   std::filesystem::path labels;                   // points: the picture that labels refer to

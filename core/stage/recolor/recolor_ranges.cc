@@ -28,19 +28,19 @@
 namespace color3d {
 namespace {
 
-constexpr size_t kAtOnce = 16;  // frames
-// Neighbours are read several times.
+constexpr size_t kAtOnce = 16;  // frames; bounds memory
+// Neighbouring frames are read several times.
 constexpr int64_t kRecoloredFramesCacheBytes = int64_t{32} << 20;
 
-// What the coloured film is read from, and who knows its colours.
+// The coloured film, and the colorizer that coloured it.
 struct FilmToRecolor {
   const Scene& scene;
   const ViewImages& images;
   const Colorizer& colorizer;
-  int key;  // the first key view
+  int key;  // the chosen key view
   StageContext& context;
 
-  // In its present colours.
+  // The frame in its present colours.
   PlacedPicture Picture(int view) const {
     PlacedPicture picture{*images.Luminance(view), {}, {}, {}};
     const Image& size = picture.luminance;
@@ -58,8 +58,8 @@ void MixIn(const CarriedColor& color, Image* ab) {
   }
 }
 
-// The colours of a key frame as channels to be carried: a, b and how far they are painted. Where
-// they are not, the frame has the colours that it had, and is known to.
+// Channels to propagate from a key view: a, b and the painted share. Unpainted parts have their
+// present colours. Confidence is 1 everywhere.
 CarriedColor PaintedOver(Image ab, const CarriedColor& color) {
   MixIn(color, &ab);
   CarriedColor key{Image(ab.width, ab.height, 3), Image(ab.width, ab.height, 1, 1.0f)};
@@ -68,56 +68,57 @@ CarriedColor PaintedOver(Image ab, const CarriedColor& color) {
   return key;
 }
 
-// What is told of a frame of a range before it is fused.
-struct Told {
-  Image before;          // its colours as they were
-  Image changed;         // as what is like it was changed
-  Image change_share;    // how far that is known; may be empty
-  Image provenance;      // as it was; may be empty
-  CarriedColor painted;  // followed from key frames: see PaintedOver
+// A frame of a range before fusion.
+struct FrameToRecolor {
+  Image before;          // its present colours
+  Image changed;         // these, changed as the corrector infers
+  Image change_share;    // confidence of that change; may be empty
+  Image provenance;      // of the present colours; may be empty
+  CarriedColor painted;  // propagated from key views: see PaintedOver
 };
 
-// What is surely followed is as it was painted or left. Elsewhere what the film shows of other key
-// frames stays, as changed. `is_old`: 1 where the colours are not those of key frames of the range.
-CarriedColor KnownOf(const Told& told, Image* is_old) {
-  const int width = told.before.width, height = told.before.height;
+// Known colours of a frame: painted or left colours where they are propagated surely, elsewhere
+// seen colours of other key views, as changed. `is_old`: 1 where they are not of the range's key
+// views.
+CarriedColor KnownColors(const FrameToRecolor& frame, Image* is_old) {
+  const int width = frame.before.width, height = frame.before.height;
   CarriedColor known{Image(width, height, 2), Image(width, height, 1)};
   *is_old = Image(width, height, 1);
   for (size_t i = 0; i < known.ab.PlaneSize(); ++i) {
-    const float followed = told.painted.confidence.data[i];
-    const float painted = followed * std::clamp(told.painted.ab.Plane(2)[i], 0.0f, 1.0f);
+    const float followed = frame.painted.confidence.data[i];
+    const float painted = followed * std::clamp(frame.painted.ab.Plane(2)[i], 0.0f, 1.0f);
     const float left = followed - painted;
-    const float seen = told.provenance.Empty() ? 0.0f : told.provenance.Plane(kSeenPlane)[i];
-    const Image* from = &told.painted.ab;
+    const float seen = frame.provenance.Empty() ? 0.0f : frame.provenance.Plane(kSeenPlane)[i];
+    const Image* from = &frame.painted.ab;
     known.confidence.data[i] = painted;
     if (left > kDecisiveConfidence) {
-      from = &told.before;
+      from = &frame.before;
       known.confidence.data[i] = left;
     } else if (painted <= kDecisiveConfidence && seen > kDecisiveConfidence) {
-      from = &told.changed;
+      from = &frame.changed;
       known.confidence.data[i] = seen;
     }
-    is_old->data[i] = from == &told.painted.ab ? 0.0f : 1.0f;
+    is_old->data[i] = from == &frame.painted.ab ? 0.0f : 1.0f;
     for (int c = 0; c < 2; ++c) known.ab.Plane(c)[i] = from->Plane(c)[i];
   }
   return known;
 }
 
-// What does not come from key frames of the range comes from where it came, changed or not.
-void TakeShares(const Told& told, const Image& is_old, Image* provenance) {
+// Pixels without colours of the range's key views keep their provenance, but for inferred changes.
+void SetProvenance(const FrameToRecolor& frame, const Image& is_old, Image* provenance) {
   for (size_t i = 0; i < provenance->PlaneSize(); ++i) {
     const float seen = is_old.data[i] > 0.0f ? 0.0f : provenance->Plane(kSeenPlane)[i];
-    const float change = told.change_share.Empty() ? 0.0f : told.change_share.data[i];
+    const float change = frame.change_share.Empty() ? 0.0f : frame.change_share.data[i];
     for (int c = 0; c < kProvenancePlanes; ++c) {
-      const float was = told.provenance.Empty() ? (c == kInferredPlane ? 1.0f : 0.0f)
-                                                : told.provenance.Plane(c)[i];
+      const float was = frame.provenance.Empty() ? (c == kInferredPlane ? 1.0f : 0.0f)
+                                                 : frame.provenance.Plane(c)[i];
       const float is = c == kInferredPlane ? was + change * (1.0f - was) : was * (1.0f - change);
       provenance->Plane(c)[i] = (c == kSeenPlane ? seen : 0.0f) + (1.0f - seen) * is;
     }
   }
 }
 
-// Colours one range.
+// Recolours one range.
 class RangeColorer {
  public:
   RangeColorer(const RecoloredRange& range, const FilmToRecolor& film, std::filesystem::path folder)
@@ -125,7 +126,7 @@ class RangeColorer {
     std::filesystem::create_directories(folder_);
   }
 
-  // `deliver` takes each frame of the range once, from several threads.
+  // Calls `deliver` once for each frame of the range, from several threads.
   void Run(const std::function<void(int view, const FusedColor& color)>& deliver) {
     ReadKeys();
     Carry();
@@ -149,14 +150,15 @@ class RangeColorer {
           ReadAdditionalKeyColor(film_.context, film_.scene, key.view, film_.images);
       const std::vector<float>& painted = color.confidence.data;
       if (std::none_of(painted.begin(), painted.end(), [](float p) { return p > 0.0f; })) {
-        throw InvalidArgument("nothing is painted on the key view {} that would recolour its range",
-                              film_.scene.views[key.view].name);
+        throw InvalidArgument(
+            "the key view {} has no painted pixels to recolour its range with; paint on it",
+            film_.scene.views[key.view].name);
       }
       PlacedPicture picture = film_.Picture(key.view);
       const auto frame = std::find(range_.views.begin(), range_.views.end(), key.view);
       keys_.push_back(
           {static_cast<int>(frame - range_.views.begin()), PaintedOver(picture.ab, color)});
-      // What was left unpainted is as it should be, too.
+      // Unpainted parts are right as they are, and correct nothing.
       Image wanted = picture.ab;
       MixIn(color, &wanted);
       Image sure(wanted.width, wanted.height, 1, 1.0f);
@@ -165,7 +167,7 @@ class RangeColorer {
     try {
       corrector_ = film_.colorizer.Correct(corrections);
     } catch (const Error& e) {
-      // Without feature neighbours nothing is known of what is alike.
+      // Without feature neighbours there is no similarity to infer from.
       if (e.code() != ErrorCode::kFailedPrecondition) throw;
     }
   }
@@ -219,7 +221,7 @@ class RangeColorer {
     return key == keys_.end() ? nullptr : &*key;
   }
 
-  // The next frames, behind those that are coloured.
+  // Recolours the next `count` frames.
   void Color(size_t count) {
     const size_t begin = first_ + colored_.size();
     const size_t place = colored_.size();
@@ -241,7 +243,7 @@ class RangeColorer {
     const int view = range_.views[frame];
     const PlacedPicture picture = film_.Picture(view);
     const Image& luminance = picture.luminance;
-    Told told{
+    FrameToRecolor recolored{
         picture.ab,
         picture.ab,
         {},
@@ -249,33 +251,33 @@ class RangeColorer {
         CarriedInto(frame)};
     if (corrector_) {
       CorrectedColor corrected = corrector_->Predict(picture, 0);
-      for (size_t i = 0; i < told.changed.data.size(); ++i) {
-        told.changed.data[i] += corrected.change.data[i];
+      for (size_t i = 0; i < recolored.changed.data.size(); ++i) {
+        recolored.changed.data[i] += corrected.change.data[i];
       }
-      told.change_share = std::move(corrected.share);
+      recolored.change_share = std::move(corrected.share);
     }
     Image is_old;
-    const CarriedColor known = KnownOf(told, &is_old);
+    const CarriedColor known = KnownColors(recolored, &is_old);
     const ColorSources sources{[&](const Image&, const Image&) {
-                                 return InferredColor{told.changed, {}};
+                                 return InferredColor{recolored.changed, {}};
                                },
                                {},
                                film_.colorizer.relative_chroma()};
     ThreadPool one(1);
     FusedColor color = ColorOfView(luminance, known, sources, one, film_.context.cancel());
-    TakeShares(told, is_old, &color.provenance);
+    SetProvenance(recolored, is_old, &color.provenance);
     if (const FilmKey* key = KeyAt(frame)) {
       std::copy_n(key->color.ab.data.begin(), color.ab.data.size(), color.ab.data.begin());
     }
     return color;
   }
 
-  // All frames whose neighbours are known; these are kept as long as others need them.
+  // Delivers the frames whose neighbours are recoloured, and keeps those that later ones need.
   void Deliver(bool is_end, const std::function<void(int view, const FusedColor& color)>& deliver) {
     const auto reach = static_cast<size_t>(steady_.reach);
     const size_t end =
         is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
-    // Beside a frame that another key frame is nearest to, colours may be others: no mean of both.
+    // Colours of different key views are not averaged.
     std::vector<FrameInMotion> neighbors;
     for (size_t i = 0; i < colored_.size(); ++i) {
       const size_t frame = first_ + i;
@@ -299,13 +301,13 @@ class RangeColorer {
   const RecoloredRange& range_;
   const FilmToRecolor& film_;
   const std::filesystem::path folder_;
-  std::vector<FilmKey> keys_;        // frames: places in range_.views
-  std::vector<NearKeyFrames> near_;  // of each of them
+  std::vector<FilmKey> keys_;        // FilmKey::frame: index in range_.views
+  std::vector<NearKeyFrames> near_;  // of each frame of the range
   std::unique_ptr<const Corrector> corrector_;
   const SteadyColorsOptions steady_;
-  std::vector<Recolored> colored_;  // frames one after the other
-  size_t first_ = 0;                // of them
-  size_t delivered_ = 0;            // of them
+  std::vector<Recolored> colored_;  // successive frames
+  size_t first_ = 0;                // index of the first of these
+  size_t delivered_ = 0;            // number of these
 };
 
 nlohmann::ordered_json FactsOf(const std::vector<RecoloredRange>& ranges, const Scene& scene) {
@@ -330,7 +332,7 @@ void RecolorRanges(const std::vector<RangeKeyView>& keys,
                    const std::string& encoder,
                    StageContext& context) {
   const std::vector<RecoloredRange> ranges = RangesOf(keys, scene);
-  // Frames are coloured side by side, each on one thread.
+  // Frames are coloured in parallel, each on one thread.
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
   const int key = ReadKeyView(context, scene);

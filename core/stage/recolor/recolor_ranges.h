@@ -1,4 +1,4 @@
-// Parts of a coloured film in other colours (METHOD.md "Film"). For the stages of this layer only.
+// Recolours ranges of time of a coloured film (METHOD.md "Film").
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace color3d {
 
-// Colours the frames of the ranges anew: kCorrectedAb and kCorrectedProvenance of each, and
-// kCorrections. Other frames are not read. `encoder`: as RunColorizeViews'.
+// Writes kCorrectedAb and kCorrectedProvenance of each frame of the ranges, and kCorrections. Other
+// frames are not read. `encoder`: as in RunColorizeViews.
 void RecolorRanges(const std::vector<RangeKeyView>& keys,
                    const Scene& scene,
                    const std::string& encoder,

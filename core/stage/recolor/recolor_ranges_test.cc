@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 
 constexpr int kWidth = 96, kHeight = 72, kFrames = 18, kKey = 7;
 
-// A camera pans over a wall. Its columns change their colour with the place.
+// A pan along a wall whose colour changes from left to right.
 Image LabOf(int frame) {
   Image lab(kWidth, kHeight, 3);
   for (int y = 0; y < kHeight; ++y) {
@@ -60,7 +60,7 @@ RangeKeyView KeyOf(const std::string& view,
 
 class RecolorRangesTest : public StageTest {
  protected:
-  // The film in colour.
+  // Colours the film.
   RecolorRangesTest() : scene_(FilmOf(kFrames)) {
     for (int i = 0; i < kFrames; ++i) {
       WriteFileAtomic(scratch_.path() / scene_.views[i].image_file,
@@ -81,7 +81,7 @@ class RecolorRangesTest : public StageTest {
       RunCorrectColors({.ranges = keys, .proposals = 0}, context);
     });
   }
-  // The frame in one other colour between two columns.
+  // The frame painted in one other colour between two columns.
   std::filesystem::path PaintedFile(int view, float a = -25.0f, int from = 0, int to = kWidth) {
     Image lab = LabOf(view);
     std::fill_n(lab.Plane(1), lab.PlaneSize(), a);
@@ -103,7 +103,7 @@ class RecolorRangesTest : public StageTest {
     key.file = PaintedFile(view, a, from, to);
     return KeyOf(AddKeyView(key), begin_s, end_s);
   }
-  // The colours that the film is delivered with.
+  // Final colours of the film.
   std::vector<Image> Film() {
     const StageContext context = MakeContext();
     std::vector<Image> frames;
@@ -164,7 +164,7 @@ TEST_F(RecolorRangesTest, TakesSeveralRangesAndKeyViews) {
   const std::vector<Image> after = Film();
   const std::pair<int, float> expected[] = {{2, -25.0f}, {8, 25.0f}, {14, 12.0f}, {15, 12.0f}};
   for (const auto& [frame, a] : expected) EXPECT_LT(MeanOff(after[frame], a), 3.0) << frame;
-  // From the one to the other there is no mean of both.
+  // Frames between them are no mean of both.
   EXPECT_LT(MeanOff(after[5], -25.0f), 5.0);
   EXPECT_LT(MeanOff(after[6], 25.0f), 5.0);
   EXPECT_GT(MeanOff(after[16], 12.0f), 4.0);

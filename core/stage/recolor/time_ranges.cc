@@ -15,10 +15,10 @@ namespace {
 
 constexpr double kSameTime = 1e-6;  // times are not exact
 
-// When the film is seen, seconds.
+// Times at which the film begins and ends, seconds.
 struct FilmTime {
   double first_s = 0.0;
-  double end_s = 0.0;  // of its last frame
+  double end_s = 0.0;  // end of its last frame
 };
 
 FilmTime TimeOf(const Scene& scene) {

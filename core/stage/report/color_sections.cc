@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/carry/confidence.h"
+#include "core/catalogue/metrics.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
@@ -19,8 +20,9 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int kPictureSidePx = 400;
-constexpr size_t kMaxRows = 20;     // of the table
-constexpr size_t kMaxPictures = 4;  // views shown with their provenance, of all certainties
+constexpr size_t kMaxRows = 20;  // of a table
+constexpr size_t kMaxPictures =
+    4;  // views shown with their provenance, from the least to the most certain
 
 std::string Percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
 
@@ -33,6 +35,12 @@ SourceShares SharesOf(const Image& provenance) {
   const double total = sum[0] + sum[1] + sum[2];
   if (!(total > 0.0)) return {1.0, 0.0, 0.0};
   return {sum[0] / total, sum[1] / total, sum[2] / total};
+}
+
+std::vector<std::string> KeysOf(const std::map<std::string, double>& figures) {
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : figures) keys.push_back(key);
+  return keys;
 }
 
 ReportPicture SmallPicture(const Image& image, std::string caption) {
@@ -61,7 +69,7 @@ void ColorFacts::ReadProvenance() {
   }
 }
 
-// All 0 without such views.
+// All 0 if there are no such views.
 SourceShares ColorFacts::MeanShares(bool scored_only) const {
   SourceShares mean;
   double count = 0.0;
@@ -91,19 +99,15 @@ void ColorFacts::ReadAugmentations() {
   }
 }
 
-void ColorFacts::AddRows(const ordered_json& found,
-                         const std::vector<const char*>& figures,
-                         std::vector<Agreement>* rows) {
+void ColorFacts::AddRows(const ordered_json& found, std::vector<Agreement>* rows) {
   const std::pair<const char*, const char*> pictures[] = {
       {"rendered", "rendered from the 3D scene"},
       {"colored_views", "the photos in colour"},
       {"bound", "the same 3D scene under all true colours"},
       {"truth", "the true colours"}};
-  for (const auto& [name, what] : pictures) {
+  for (const auto& [name, label] : pictures) {
     if (!found.contains(name)) continue;
-    Agreement row{name, what, {}};
-    for (const char* figure : figures) row.figures[figure] = found.at(name).at(figure);
-    rows->push_back(std::move(row));
+    rows->push_back({name, label, found.at(name).get<std::map<std::string, double>>()});
   }
 }
 
@@ -111,10 +115,10 @@ void ColorFacts::ReadScores() {
   const ordered_json scores = ReadJson(context_, artifact::kScores);
   try {
     if (const auto found = scores.find("consistency"); found != scores.end()) {
-      AddRows(*found, {"me", "me_de00", "tc", "tc_short", "tc_long"}, &agreement_);
+      AddRows(*found, &agreement_);
     }
     if (const auto found = scores.find("temporal"); found != scores.end()) {
-      AddRows(*found, {"tc_chroma", "chroma", "followed", "cdc"}, &steadiness_);
+      AddRows(*found, &steadiness_);
     }
     if (const auto found = scores.find("sources"); found != scores.end()) {
       errors_by_source_ = found->get<std::map<std::string, double>>();
@@ -142,19 +146,23 @@ std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
   for (const auto& [name, value] : errors_by_source_) {
     if (!name.starts_with("share_")) metrics.emplace_back(name, value);
   }
-  // What is delivered first has no suffix: of a film without a model, its frames.
-  const auto add = [&metrics](const std::vector<Agreement>& rows, std::vector<const char*> names) {
+  // The delivered pictures have no suffix: for films without a model, the coloured frames.
+  const auto add = [&metrics](MetricTable table, const std::vector<Agreement>& rows) {
     for (const Agreement& row : rows) {
       const char* suffix = row.pictures == "truth"                 ? "_truth"
                            : row.pictures == "bound"               ? "_bound"
                            : row.pictures == rows.front().pictures ? ""
                                                                    : "_2d";
-      for (const char* name : names)
-        metrics.emplace_back(name + std::string(suffix), row.figures.at(name));
+      for (const std::string& key : ColumnsOf(table, KeysOf(row.figures))) {
+        const Metric* metric = FindMetric(key).metric;
+        if (metric == nullptr || metric->in_metrics) {
+          metrics.emplace_back(key + suffix, row.figures.at(key));
+        }
+      }
     }
   };
-  add(agreement_, {"me", "me_de00", "tc"});
-  add(steadiness_, {"tc_chroma", "cdc"});
+  add(MetricTable::kAgreement, agreement_);
+  add(MetricTable::kSteadiness, steadiness_);
   return metrics;
 }
 
@@ -163,8 +171,9 @@ std::string ColorFacts::SourceSummary() const {
   if (!views_.empty()) {
     const SourceShares mean = MeanShares(/*scored_only=*/false);
     summary = fmt::format(
-        "{} of all pixels show what a key view shows, {} resemble something in it, and {} are a "
-        "guess. ",
+        "{} of all pixels show a surface that a key view shows, {} resemble something in it, and "
+        "{} "
+        "are guessed. ",
         Percent(mean.seen),
         Percent(mean.inferred),
         Percent(mean.guessed));
@@ -217,7 +226,7 @@ ReportTable ColorFacts::ErrorTable() const {
     const auto share = errors_by_source_.find(std::string("share_") + source);
     const auto error = errors_by_source_.find(std::string("delta_e00_") + source);
     if (share == errors_by_source_.end() || error == errors_by_source_.end()) continue;
-    table.rows.push_back({source, Percent(share->second), fmt::format("{:.2f}", error->second)});
+    table.rows.push_back({source, Percent(share->second), MetricText(error->first, error->second)});
   }
   return table;
 }
@@ -256,7 +265,7 @@ ReportSection ColorFacts::SourceSection() const {
   const std::string summary = SourceSummary();
   if (!summary.empty()) section.notes.push_back(summary);
   if (!augmentations_.empty()) {
-    section.notes.push_back(fmt::format("Beside the key views, the colorizer learnt from {}.",
+    section.notes.push_back(fmt::format("Beside the key views, the colorizer was trained on {}.",
                                         fmt::join(augmentations_, ", ")));
   }
   if (next_) {
@@ -281,6 +290,23 @@ ReportSection ColorFacts::SourceSection() const {
   return section;
 }
 
+ReportTable ColorFacts::TableOf(MetricTable which, const std::vector<Agreement>& rows) {
+  std::map<std::string, double> all;
+  for (const Agreement& row : rows) all.insert(row.figures.begin(), row.figures.end());
+  const std::vector<std::string> keys = ColumnsOf(which, KeysOf(all));
+  ReportTable table{{"pictures"}, {}};
+  for (const std::string& key : keys) table.columns.push_back(MetricLabel(key));
+  for (const Agreement& row : rows) {
+    std::vector<std::string> cells = {row.label};
+    for (const std::string& key : keys) {
+      const auto figure = row.figures.find(key);
+      cells.push_back(figure != row.figures.end() ? MetricText(key, figure->second) : "");
+    }
+    table.rows.push_back(std::move(cells));
+  }
+  return table;
+}
+
 ReportSection ColorFacts::AgreementSection() const {
   ReportSection section;
   section.title = "Do the views agree?";
@@ -288,19 +314,9 @@ ReportSection ColorFacts::AgreementSection() const {
   section.notes.push_back(
       "Differences between pictures where two views show the same surface. ME: mean difference of "
       "R, G, B (0 to 1), and in CIEDE2000. TC: mean squared difference between neighbouring views "
-      "and between views 7 apart. Lower is better; the true colours themselves differ by gloss and "
+      "and between views 7 apart. Lower is better; the true colours differ, too, by gloss and "
       "exposure.");
-  ReportTable table{{"pictures", "ME", "ME, CIEDE2000", "TC", "TC, next view", "TC, 7 apart"}, {}};
-  for (const Agreement& row : agreement_) {
-    const auto& f = row.figures;
-    table.rows.push_back({row.what,
-                          fmt::format("{:.4f}", f.at("me")),
-                          fmt::format("{:.2f}", f.at("me_de00")),
-                          fmt::format("{:.5f}", f.at("tc")),
-                          fmt::format("{:.5f}", f.at("tc_short")),
-                          fmt::format("{:.5f}", f.at("tc_long"))});
-  }
-  section.tables.push_back(std::move(table));
+  section.tables.push_back(TableOf(MetricTable::kAgreement, agreement_));
   return section;
 }
 
@@ -309,42 +325,34 @@ ReportSection ColorFacts::SteadinessSection() const {
   section.title = "Are the colours steady?";
   if (steadiness_.empty()) return section;
   section.notes.push_back(
-      "From frame to frame. TC of chroma: mean change of a, b (Lab) along the motion, of the "
-      "pixels "
-      "that it follows there and back; faint colours change little, so mind the chroma beside it. "
-      "CDC: how unlike the colours of frames 1, 2 and 4 apart are spread, whatever moves. Lower is "
-      "better; true colours change, too.");
-  ReportTable table{{"pictures", "TC of chroma", "their chroma", "followed", "CDC"}, {}};
-  for (const Agreement& row : steadiness_) {
-    const auto& f = row.figures;
-    table.rows.push_back({row.what,
-                          fmt::format("{:.2f}", f.at("tc_chroma")),
-                          fmt::format("{:.1f}", f.at("chroma")),
-                          Percent(f.at("followed")),
-                          fmt::format("{:.5f}", f.at("cdc"))});
-  }
-  section.tables.push_back(std::move(table));
+      "From frame to frame. TC of chroma: mean change of a and b (Lab) along the optical flow, "
+      "over "
+      "the pixels that the flow follows there and back; faint colours change little, so compare it "
+      "with the mean chroma. CDC: divergence of the colour histograms of frames 1, 2 and 4 apart, "
+      "regardless of motion. Lower is better; true colours change, too.");
+  section.tables.push_back(TableOf(MetricTable::kSteadiness, steadiness_));
   return section;
 }
 
 namespace {
 
-// What the curves of personalization say, in words; nothing without two points of held-out error.
+// Describes the curves of personalization; empty for fewer than two points of held-out error.
 std::vector<std::string> NotesOnPersonalization(const std::vector<CurvePoint>& curves) {
   std::vector<CurvePoint> errors;
   std::string stopped;
   for (const CurvePoint& point : curves) {
     if (point.error_name == "validation_delta_e00") errors.push_back(point);
     if (point.error_name == "stopped_early_iteration") {
-      stopped = fmt::format(" Training ended at iteration {} because it hardly fell any more.",
-                            point.iteration);
+      stopped =
+          fmt::format(" Training ended at iteration {} because the error hardly fell any more.",
+                      point.iteration);
     }
   }
   if (errors.size() < 2) return {};
   const CurvePoint &first = errors.front(), &last = errors.back();
   return {fmt::format(
-      "Augmentations of the key view are kept from training; their colour error (CIEDE2000) went "
-      "from {:.1f} after {:.0f} s to {:.1f} after {:.0f} s.{}",
+      "The colour error (CIEDE2000) on augmentations of the key view that are kept out of training "
+      "went from {:.1f} after {:.0f} s to {:.1f} after {:.0f} s.{}",
       first.value,
       first.seconds,
       last.value,
@@ -360,7 +368,7 @@ ReportSection ColorFacts::PersonalizationSection(std::vector<CurvePoint> curves)
   section.notes = NotesOnPersonalization(curves);
   section.curves = std::move(curves);
   if (context_.HasInput(artifact::kAugmentationSheet)) {
-    section.wide = {"what it learnt from besides the key view",
+    section.wide = {"training pictures beside the key view",
                     context_.ReadInput(artifact::kAugmentationSheet)};
   }
   return section;

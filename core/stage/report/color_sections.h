@@ -1,5 +1,5 @@
-// The report's chapters about the colour of all views: where it comes from, whether the views
-// agree, how the colorizer was personalized. For the report stage only.
+// Chapters of the report on the colour of all views: its sources, the agreement of the views, the
+// personalized colorizer. For the report stage only.
 #pragma once
 
 #include <map>
@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/catalogue/metrics.h"
 #include "core/report/report_page.h"
 #include "core/scene/scene.h"
 #include "core/stage/context/stage_context.h"
@@ -17,28 +18,29 @@
 
 namespace color3d {
 
-// Mean shares of the colour's sources over a view's pixels; they sum to 1.
+// Mean shares of the sources of the colour over the pixels of a view. They sum to 1.
 struct SourceShares {
   double guessed = 0.0;
   double seen = 0.0;
   double inferred = 0.0;
 };
 
-// Read once from provenance/*, carry.json and scores.json, each of which may be absent.
+// Read once from provenance/*, carry.json and scores.json, each of which may be absent. Not
+// thread-safe.
 class ColorFacts {
  public:
-  // `next`: the view to colour next. Throws Error{kInvalidArgument} when one of them is damaged.
+  // `next`: the view to colour next. Throws Error{kInvalidArgument} if an artifact is damaged.
   ColorFacts(const Scene& scene,
              StageContext& context,
              std::optional<NextKeyViewFacts> next = std::nullopt);
 
-  // For metrics.json, in the order in which people read them: coverage, share_* over all views and
-  // share_*_scored over those that are scored, me, tc, ... and the errors by source.
+  // For metrics.json, in the order in which it is read: coverage, share_* over all views and
+  // share_*_scored over the scored ones, the errors by source, agreement and steadiness.
   std::vector<std::pair<std::string, double>> Metrics() const;
-  // What the colorizer learnt from beside key views: "augment/a.png", "outpaint-1 (embedded)".
+  // Pictures beside the key views that the colorizer was trained on: "augment/a.png",
+  // "outpaint-1 (embedded)".
   const std::vector<std::string>& augmentations() const { return augmentations_; }
-  // `personalization`: the curves of that stage. Chapters that would have nothing to tell are left
-  // out.
+  // `personalization`: the curves of that stage. Empty chapters are left out.
   std::vector<ReportSection> Sections(std::vector<CurvePoint> personalization) const;
 
  private:
@@ -47,21 +49,20 @@ class ColorFacts {
     bool scored = false;
     SourceShares shares;
   };
-  // A row of a table, e.g. "me", "me_de00", "tc_short", "tc_long", "tc".
+  // The metrics of one kind of picture: a row of a table.
   struct Agreement {
-    std::string pictures;  // "rendered", "colored_views" or "truth"
-    std::string what;      // in words
-    std::map<std::string, double> figures;
+    std::string pictures;  // "rendered", "colored_views", "bound" or "truth"
+    std::string label;
+    std::map<std::string, double> figures;  // by key
   };
 
   void ReadProvenance();
   void ReadScores();
   void ReadAugmentations();
   SourceShares MeanShares(bool scored_only) const;
-  // Adds a row to `rows` for each of the pictures that `found` has figures for.
-  static void AddRows(const nlohmann::ordered_json& found,
-                      const std::vector<const char*>& figures,
-                      std::vector<Agreement>* rows);
+  // Adds a row to `rows` for each kind of picture in `found`.
+  static void AddRows(const nlohmann::ordered_json& found, std::vector<Agreement>* rows);
+  static ReportTable TableOf(MetricTable which, const std::vector<Agreement>& rows);
   std::string SourceSummary() const;
   std::vector<ViewFacts> LeastCertainFirst() const;
   ReportTable ShareTable() const;
@@ -79,7 +80,7 @@ class ColorFacts {
   std::optional<NextKeyViewFacts> next_;
   std::vector<std::string> augmentations_;
   std::vector<Agreement> agreement_;
-  std::vector<Agreement> steadiness_;  // of a film or of a scene that moves
+  std::vector<Agreement> steadiness_;  // films and dynamic scenes only
   std::map<std::string, double> errors_by_source_;
 };
 

@@ -12,7 +12,7 @@ namespace {
 
 using ColorSectionsTest = EvaluatedSceneTest;
 
-TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext) {
+TEST_F(ColorSectionsTest, TellsSourcesAndTheNextKeyView) {
   AddProvenance("p1.png", Halves({0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f}));
   AddProvenance("p2.png", Halves({1.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f}));
   AddInput(artifact::kCarryFacts, R"({"coverage": 0.61, "key_views": ["p1.png"]})");
@@ -61,7 +61,7 @@ TEST_F(ColorSectionsTest, TheReportTellsWhereColoursComeFromAndWhatToColourNext)
   EXPECT_THAT(sections[3].notes.front(), testing::HasSubstr("ended at iteration 60"));
 }
 
-TEST_F(ColorSectionsTest, OldJobsHaveNoChaptersAndDamagedFactsAreRefused) {
+TEST_F(ColorSectionsTest, RefusesDamagedFacts) {
   {
     StageContext context = MakeContext();
     EXPECT_TRUE(ColorFacts(scene_, context).Sections({}).empty());

@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-// As people read it: no quotes and braces, numbers with four digits.
+// A JSON value for users: without quotes and braces, numbers with four digits.
 std::string FactText(const ordered_json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number_float()) return fmt::format("{:.4g}", value.get<double>());
@@ -50,7 +50,7 @@ void AddRegions(const std::string& folder, const StageContext& context, ReportKe
   const std::string regions = folder + artifact::kKeyColorRegions;
   if (!context.HasInput(regions)) return;
   report->pictures.pictures.push_back(
-      {"what each colour of the prompt was taken for", context.ReadInput(regions)});
+      {"regions of the words in the prompt", context.ReadInput(regions)});
 }
 
 ReportPicture SmallPicture(std::string caption, const Image& image, int side_px) {
@@ -59,7 +59,7 @@ ReportPicture SmallPicture(std::string caption, const Image& image, int side_px)
 
 }  // namespace
 
-ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context) {
+ReportKeyView KeyViewChapter(ReportRow pictures, const StageContext& context) {
   ReportKeyView report;
   report.pictures = std::move(pictures);
   if (context.HasInput(artifact::kKeyView)) {
@@ -75,9 +75,9 @@ ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context) {
   return report;
 }
 
-std::vector<ReportKeyView> ReportOfAdditionalKeyViews(const Scene& scene,
-                                                      int side_px,
-                                                      const StageContext& context) {
+std::vector<ReportKeyView> AdditionalKeyViewChapters(const Scene& scene,
+                                                     int side_px,
+                                                     const StageContext& context) {
   std::vector<ReportKeyView> reports;
   for (const std::string& folder : AdditionalKeyViewFolders(context)) {
     const ordered_json facts = ReadJson(context, folder + artifact::kKeyColorFacts);
@@ -87,9 +87,7 @@ std::vector<ReportKeyView> ReportOfAdditionalKeyViews(const Scene& scene,
     report.pictures = {
         view.name,
         {SmallPicture("as captured", ReadImage(context.scene_folder() / view.image_file), side_px),
-         SmallPicture("coloured: gives the colours that the key views before it do not give",
-                      DecodeImage(context.ReadInput(colored), colored),
-                      side_px)}};
+         SmallPicture("coloured", DecodeImage(context.ReadInput(colored), colored), side_px)}};
     AddColor(facts, &report);
     AddRegions(folder, context, &report);
     reports.push_back(std::move(report));

@@ -1,4 +1,4 @@
-// The report's chapters on key views.
+// Chapters of the report on key views.
 #pragma once
 
 #include <vector>
@@ -9,14 +9,14 @@
 
 namespace color3d {
 
-// With what the artifacts tell of its choice and of its colour; those that are missing are left
-// out. Throws Error{kInvalidArgument} when one is damaged.
-ReportKeyView ReportOfKeyView(ReportRow pictures, const StageContext& context);
+// The key view: its choice and the source of its colour, as far as there are artifacts. Throws
+// Error{kInvalidArgument} if an artifact is damaged.
+ReportKeyView KeyViewChapter(ReportRow pictures, const StageContext& context);
 
 // The additional key views: the photo, its colours, and their source. Pictures fit within
-// `side_px`. Throws Error{kInvalidArgument} when an artifact is damaged.
-std::vector<ReportKeyView> ReportOfAdditionalKeyViews(const Scene& scene,
-                                                      int side_px,
-                                                      const StageContext& context);
+// `side_px`. Throws Error{kInvalidArgument} if an artifact is damaged.
+std::vector<ReportKeyView> AdditionalKeyViewChapters(const Scene& scene,
+                                                     int side_px,
+                                                     const StageContext& context);
 
 }  // namespace color3d

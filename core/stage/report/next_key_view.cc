@@ -29,7 +29,7 @@ std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
     if (!next) return std::nullopt;
     return NextKeyViewFacts{scene.views[next->view].name, next->error_now, next->error_with};
   }
-  constexpr size_t kMaxViews = 500;  // a minute of rendering; who has more knows what to add
+  constexpr size_t kMaxViews = 500;  // about a minute of rendering
   const std::vector<int> training = scene.TrainingViews();
   if (!context.HasInput(artifact::kModel) || training.size() > kMaxViews) {
     return std::nullopt;

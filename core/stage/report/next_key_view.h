@@ -1,4 +1,4 @@
-// Which view to colour next, after a scene has been coloured. For the report stage only.
+// Proposal of the view to colour next. For the report stage only.
 #pragma once
 
 #include <optional>
@@ -12,14 +12,14 @@ namespace color3d {
 
 struct NextKeyViewFacts {
   std::string name;
-  double error_now = 0.0;   // CIEDE2000 that is expected over all views
-  double error_with = 0.0;  // ... with this view coloured, too
+  double error_now = 0.0;   // expected CIEDE2000 over all views
+  double error_with = 0.0;  // expected CIEDE2000 with this view as a key view
 };
 
-// From the model's geometry and the photos' features (kept from the selection of the key view, or
-// found again); of a film the middle of the shot without a key view of which most is open. Nothing
-// without a model, with more than 500 training views, or when no view would save anything.
-// `key_views`: names.
+// Proposes a view from the geometry of the model and the features of the photos (cached by the
+// selection of the key view, or computed again); for films the middle of the shot without a key
+// view that has the least colour. Returns nullopt without a model, for more than 500 training
+// views, and if no view would reduce the error. `key_views`: names.
 std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
                                                   const std::vector<std::string>& key_views,
                                                   StageContext& context);

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-// One word for a shell, whatever the name has in it.
+// Quotes a name as one word of a shell.
 std::string ShellWord(const std::string& text) {
   std::string word = "'";
   for (const char c : text) word += c == '\'' ? std::string("'\\''") : std::string(1, c);
@@ -23,8 +23,7 @@ void AddDigest(const char* name, const StageContext& context, ReportData* data) 
                            DigestFile(context.Input(name)).sha256);
 }
 
-// The flags that name a source of the key view's colour; empty for one whose text or file is not
-// kept.
+// The flags for the source of the colour of the key view; empty if its text or file is not kept.
 std::string ColorFlags(bool has_truth, const StageContext& context) {
   if (has_truth) return " --benchmark";
   if (!context.HasInput(artifact::kKeyColorFacts)) return "";
@@ -34,7 +33,7 @@ std::string ColorFlags(bool has_truth, const StageContext& context) {
   return source == "automatic" ? " --auto" : "";
 }
 
-// Those of the key views that recolour ranges of a film; `number`: of the first one's picture.
+// The flags for key views that recolour ranges of a film. `number`: that of the first picture.
 std::string RangeFlags(size_t number, const StageContext& context) {
   if (!context.HasInput(artifact::kCorrections)) return "";
   const auto facts = ReadJson(context, artifact::kCorrections);
@@ -79,9 +78,10 @@ void AddHowToRepeat(const std::vector<std::string>& keys,
   if (!data->view_page.empty()) data->repeat.push_back("color3d view OUT");
   if (!data->repeat.empty()) {
     data->repeat_notes.push_back(
-        "PHOTOS is the folder of the photos, OUT one for the results, COLOURED.png the key view as "
-        "it was coloured. Add the preset and other options that differed from the defaults. The "
-        "same seed on the same kind of machine gives the same result.");
+        "PHOTOS is the folder of the photos, OUT a folder for the results, COLOURED.png the "
+        "coloured "
+        "key view. Add the preset and other options that differed from the defaults. The same seed "
+        "on the same kind of machine gives the same result.");
   }
   data->facts.emplace_back("Color3D", COLOR3D_VERSION);
   data->facts.emplace_back("seed", std::to_string(context.seed()));
@@ -91,8 +91,8 @@ void AddHowToRepeat(const std::vector<std::string>& keys,
   data->facts.emplace_back(
       "licence of the embedded weights",
       "The project's code is Apache-2.0. The embedded weights were trained on photographs that are "
-      "given for non-commercial research; use them in that spirit. Weights and backends of your "
-      "own have their own licence.");
+      "provided for non-commercial research; use them accordingly. Your own weights and backends "
+      "have their own licences.");
 }
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// What somebody needs to make a report's scene again. For the report stage only.
+// Facts that are needed to repeat a job. For the report stage only.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace color3d {
 
-// Commands, version, seed, digests of the results, and licences of the weights. `keys`: names of
-// the key views, the first one first.
+// Adds commands, version, seed, digests of the results, and licences of the weights. `keys`: names
+// of the key views in the order in which they were given.
 void AddHowToRepeat(const std::vector<std::string>& keys,
                     bool has_truth,
                     const StageContext& context,

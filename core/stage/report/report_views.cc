@@ -17,7 +17,8 @@ namespace {
 
 constexpr size_t kMaxViews = 50;
 constexpr int kLargestPx = 800, kSmallestPx = 440;  // longer side
-constexpr double kViewsAtLargest = 12.0;            // with more of them the bytes stay the same
+constexpr double kViewsAtLargest =
+    12.0;  // number of views; with more, pictures shrink so that their total size stays the same
 constexpr int kQuality = 82;
 
 bool HasRender(const View& view, const StageContext& context) {
@@ -59,7 +60,7 @@ std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
   const double side = kLargestPx * std::sqrt(kViewsAtLargest / std::max<size_t>(1, chosen.size()));
   const int side_px = std::clamp(static_cast<int>(side), kSmallestPx, kLargestPx);
   const ViewImages photos(scene, context.scene_folder(), side_px, 0);
-  // Views are drawn one after the other, each by all threads; the rest is work for one thread each.
+  // Renders one view at a time with all threads; the other pictures are made by one thread each.
   std::vector<Image> renders(chosen.size());
   for (size_t i = 0; model && i < chosen.size(); ++i) {
     context.cancel().ThrowIfCancelled();

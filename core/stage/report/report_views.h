@@ -1,4 +1,4 @@
-// The views that the report compares. For the report stage only.
+// Views in the report. For the report stage only.
 #pragma once
 
 #include <vector>
@@ -9,10 +9,10 @@
 
 namespace color3d {
 
-// Held-out views first, then training views, each with its photo in grey, the coloured scene (as
-// rendered by an earlier stage, else rendered here from the model), the true colours and the
-// colorizer's picture, as far as there are artifacts for them. At most 50 views, evenly spread;
-// their pictures are the smaller the more there are. Empty without renders and model.
+// Held-out views first, then training views, each with its grey photo, the coloured scene (rendered
+// by an earlier stage, else here from the model), the true colours and the picture of the
+// colorizer, as far as there are artifacts. At most 50 views, evenly spread; pictures are smaller
+// the more there are. Empty without renders and model.
 std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context);
 
 }  // namespace color3d

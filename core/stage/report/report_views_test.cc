@@ -15,7 +15,7 @@ namespace {
 
 class ReportViewsTest : public EvaluatedSceneTest {};
 
-TEST_F(ReportViewsTest, EveryViewHasItsPhotoAndARenderOfTheModel) {
+TEST_F(ReportViewsTest, EveryViewHasPhotoAndRender) {
   AddInput(ViewArtifact(artifact::kTruths, scene_.views[1], ".jpg"),
            EncodeJpeg(Image(48, 32, 3, 0.5f)));
   StageContext context = MakeContext();
@@ -32,7 +32,7 @@ TEST_F(ReportViewsTest, EveryViewHasItsPhotoAndARenderOfTheModel) {
   EXPECT_EQ(with_truth, 1u);
 }
 
-TEST_F(ReportViewsTest, AReportOfHalfFinishedWorkShowsWhatThereIs) {
+TEST_F(ReportViewsTest, ReportsUnfinishedWork) {
   StageContext context = MakeContext();  // no key view, no scores, no export, no import facts
   RunReport({{.kind = "solve_chroma", .state = "SUCCEEDED", .seconds = 2.0}}, context);
   EXPECT_THAT(context.outputs(), testing::Contains(artifact::kReport));
@@ -43,7 +43,7 @@ TEST_F(ReportViewsTest, AReportOfHalfFinishedWorkShowsWhatThereIs) {
   EXPECT_THAT(html, testing::Not(testing::HasSubstr("view.html")));
 }
 
-TEST_F(ReportViewsTest, PlanAndMetricsTellWhetherAPosedFilmMoves) {
+TEST_F(ReportViewsTest, TellsWhetherAPosedFilmMoves) {
   for (int i = 0; i < 3; ++i) scene_.views[i].moment = Moment{0.5 * i, 0};
   AddInput(artifact::kScene, SceneToJson(scene_));
   AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = "film"}));
@@ -68,7 +68,45 @@ TEST_F(ReportViewsTest, PlanAndMetricsTellWhetherAPosedFilmMoves) {
   }
 }
 
-TEST(SourceOverlay, TellsSourcesApartByLightnessAndPatternNotByHueAlone) {
+TEST_F(ReportViewsTest, PlanNamesTheStrategyAndEveryStage) {
+  AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = "photos"}));
+  AddInput(artifact::kKeyView, R"({"view": "p1.png", "strategy": "tracks"})");
+  StageContext context = MakeContext();
+  RunReport({{.kind = "carry_color", .state = "SKIPPED", .skip_reason = "for this test"},
+             {.kind = "export", .state = "SUCCEEDED", .seconds = 2.0}},
+            context);
+  const std::string plan = ReadFile(scratch_.path() / "out" / artifact::kPlan);
+  EXPECT_THAT(plan, testing::HasSubstr("chosen by the sparse points"));
+  EXPECT_THAT(plan, testing::Not(testing::HasSubstr("feature coverage")));
+  for (const auto& step : nlohmann::json::parse(plan)) {
+    if (step.at("step") == "carried_color") {
+      EXPECT_EQ(step.at("needed"), false);
+      EXPECT_EQ(step.at("reason"), "for this test");
+    }
+    if (step.at("step") == "export") {
+      EXPECT_EQ(step.at("measured_seconds"), 2.0);
+    }
+  }
+}
+
+// A metric without a row in core/catalogue/metrics.cc is shown by its key.
+TEST_F(ReportViewsTest, UnknownMetricsDoNotVanish) {
+  AddInput(artifact::kScores,
+           R"({"mean": {"colorfulness_2d": 20.5, "sharpness": 7.25},
+               "consistency": {"rendered": {"pairs": 1, "matches": 1, "me": 0.02, "flicker": 0.125}}})");
+  StageContext context = MakeContext();
+  RunReport({}, context);
+  const auto metrics =
+      nlohmann::json::parse(ReadFile(scratch_.path() / "out" / artifact::kMetrics));
+  EXPECT_EQ(metrics.at("colorfulness_2d"), 20.5);
+  EXPECT_EQ(metrics.at("sharpness"), 7.25);
+  EXPECT_EQ(metrics.at("flicker"), 0.125);
+  EXPECT_FALSE(metrics.contains("pairs"));
+  const std::string html = ReadFile(scratch_.path() / "out" / artifact::kReport);
+  EXPECT_THAT(html, testing::HasSubstr("flicker"));
+}
+
+TEST(SourceOverlay, SourcesDifferByLightnessAndPattern) {
   const Image photo(32, 16, 3, 0.6f);
   const auto shaded = [&](float guessed, float seen, float inferred) {
     Image shares(32, 16, 3);

@@ -21,7 +21,7 @@ Image ShadeBySource(const Image& photo, const Image& provenance) {
     for (int x = 0; x < photo.width; ++x) {
       const float gray =
           0.3f * photo.At(0, y, x) + 0.59f * photo.At(1, y, x) + 0.11f * photo.At(2, y, x);
-      const float base = 0.18f + 0.78f * gray;  // shades are seen on black, too
+      const float base = 0.18f + 0.78f * gray;  // so that shades show on black
       const float guessed = shares.At(kGuessedPlane, y, x),
                   inferred = shares.At(kInferredPlane, y, x);
       const bool stripe = (x + y) / kStripePx % 2 == 0;

@@ -17,17 +17,17 @@ namespace {
 
 constexpr char kFolder[] = "augment/";
 constexpr size_t kMaxFiles = 64;
-constexpr int kReadSidePx = 4096;  // colorizers learn at a fraction of it
+constexpr int kReadSidePx = 4096;  // colorizers are trained at a fraction of it
 constexpr int64_t kMaxAnswerPixels = 16'000'000;
 
 GeneratedPicture PictureOf(const Image& lab) {
   return {lab, Image(lab.width, lab.height, 1, 1.0f)};
 }
 
-// Lab of a picture that must be in colour and of some size.
+// Lab of a picture; checks that it is coloured and large enough.
 Image CheckedLab(const Image& srgb, int max_side_px, const std::string& what) {
   if (std::min(srgb.width, srgb.height) < kMinGeneratedSidePx) {
-    throw InvalidArgument("{} is {} px; at least {} px each way are needed",
+    throw InvalidArgument("{} is {} px; width and height must be at least {} px",
                           what,
                           SizeText(srgb),
                           kMinGeneratedSidePx);
@@ -67,7 +67,7 @@ std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageCon
     }
     if (pictures.size() >= kMaxFiles) {
       throw InvalidArgument(
-          "{} holds more than {} pictures; keep the most telling ones", kFolder, kMaxFiles);
+          "{} holds more than {} pictures; keep the best ones", kFolder, kMaxFiles);
     }
     try {
       const Image lab = CheckedLab(

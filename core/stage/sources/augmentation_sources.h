@@ -1,5 +1,5 @@
-// Training pictures beside the key view that others have made: the user's files, and a model server
-// of the user's. For the stage generate_augmentations, which makes the rest itself.
+// Training pictures from the user's files and from a generator among the user's model servers. For
+// the stage generate_augmentations, which makes all others itself.
 #pragma once
 
 #include <string>
@@ -24,14 +24,14 @@ struct Augmentation {
   GeneratedPicture picture;
 };
 
-// Photos in colour below augment/ of the scene's folder, sorted by name, at most `max_side_px`.
-// Throws Error{kInvalidArgument} naming a file that is no picture, has no colour or is too small,
-// or when there are too many.
+// Reads the coloured photos below augment/ of the scene's folder, sorted by name, and reduces them
+// to `max_side_px`. Throws Error{kInvalidArgument} naming a file that is no picture, has no colour
+// or is too small, and when there are too many.
 std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageContext& context);
 
-// `count` pictures of one kind by the generator `backend`, which must claim it, made from
-// `key_srgb` (3 channels, 0..1). Throws what RemoteColorizer throws; Error{kFailedPrecondition} for
-// answers that are no pictures in colour.
+// Requests `count` pictures of one kind, made from `key_srgb` (3 channels, 0..1), from the
+// generator `backend`, which must claim the kind. Throws what RemoteColorizer throws, and
+// Error{kFailedPrecondition} for answers that are no coloured pictures.
 std::vector<Augmentation> AugmentationsFromBackend(const std::string& backend,
                                                    RemoteColorizer& remote,
                                                    const RemoteInfo& info,

@@ -1,4 +1,4 @@
-// What the chroma of a scene may keep in memory.
+// Memory budgets of the chroma solver.
 #pragma once
 
 #include <algorithm>
@@ -12,9 +12,9 @@ namespace color3d {
 
 inline constexpr size_t kFramesLikePhotos = 64;
 
-// Frames may be many: small budgets, unless they are as few as photos and nothing in them moves.
-// Both budgets stay below shares of `memory_bytes`, which the stage may take. The result is the
-// same.
+// Sets small budgets for frames, unless they are as few as photos and the scene is static. Both
+// budgets stay below shares of `memory_bytes`, the memory of the stage. The result of the solver
+// does not depend on them.
 inline ChromaOptions ChromaWithinMemory(ChromaOptions options,
                                         const Scene& scene,
                                         const GaussianModel& geometry,

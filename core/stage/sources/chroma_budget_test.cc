@@ -15,7 +15,7 @@ Scene SceneOf(size_t views, bool has_times) {
   return scene;
 }
 
-TEST(ChromaBudgetTest, ManyFramesAndThoseInWhichSomethingMovesKeepLess) {
+TEST(ChromaBudgetTest, KeepsLessOfManyOrMovingFrames) {
   GaussianModel still, moving;
   moving.motion.center.resize(1);
   ASSERT_EQ(moving.motion.size(), 1u);
@@ -31,7 +31,7 @@ TEST(ChromaBudgetTest, ManyFramesAndThoseInWhichSomethingMovesKeepLess) {
   EXPECT_EQ(of(64, true, moving), frames);
 }
 
-TEST(ChromaBudgetTest, LittleMemoryMeansSmallBudgets) {
+TEST(ChromaBudgetTest, ShrinksWithMemory) {
   const ChromaOptions little = ChromaWithinMemory({}, SceneOf(8, false), {}, int64_t{1} << 30);
   EXPECT_EQ(little.memory_budget_bytes, int64_t{512} << 20);
   EXPECT_EQ(little.target_budget_bytes, int64_t{128} << 20);

@@ -1,4 +1,4 @@
-// What a view looks at: what one turns around. Stateless.
+// The point that a view looks at, the center of orbits. Stateless.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,8 +8,8 @@
 
 namespace color3d {
 
-// The median of the depths in the middle of the view's picture, on the camera's axis; a unit away
-// where nothing is drawn. `depth`: 1 channel, of the size of `camera`, 0: nothing
+// Returns the point on the camera's axis at the median depth of the middle of the picture; at depth
+// 1 where there is none. `depth`: 1 channel of the size of `camera`, 0: no surface
 // (RenderedView::median_depth).
 Eigen::Vector3d FocusOf(const View& view, const Camera& camera, const Image& depth);
 

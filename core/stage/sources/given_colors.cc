@@ -20,8 +20,9 @@ namespace {
 
 constexpr int64_t kMaxHintsBytes = 1 << 26;
 constexpr float kGivenAlpha = 0.5f;
-constexpr double kSameShape = 0.01;   // relative difference of aspect ratios
-constexpr float kPaintedOver = 6.0f;  // Lab units: less may be 8 bits' rounding in the dark
+constexpr double kSameShape = 0.01;  // relative difference of aspect ratios
+constexpr float kPaintedOver =
+    6.0f;  // Lab units; smaller changes may be rounding of dark 8-bit colours
 
 bool HasTransparentPart(const Image& picture) {
   if (picture.channels != 4) return false;
@@ -36,7 +37,7 @@ Image Channels(const Image& picture, int first, int count) {
   return part;
 }
 
-// A picture that was painted on, at the photo's size.
+// Reads a painted picture and resizes it to the photo.
 Image ReadPainted(const std::filesystem::path& file, const Image& photo) {
   Image painted = ReadImage(file, /*keep_alpha=*/true);
   const int width = photo.width, height = photo.height;

@@ -49,7 +49,7 @@ class GivenColorsTest : public StageTest {
   Image photo_, ab_;
 };
 
-// A box of a strong green over the picture.
+// Paints a box in a strong green.
 void PaintBox(int left, int top, int width, int height, Image* picture) {
   for (int y = top; y < top + height; ++y) {
     for (int x = left; x < left + width; ++x) {

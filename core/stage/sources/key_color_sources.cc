@@ -27,10 +27,10 @@ using Options = ColorizeKeyViewOptions;
 
 constexpr int64_t kMaxPointsBytes = 1 << 26;
 constexpr int kRegionsSidePx = 540;
-// They are compared at a fraction of this.
+// References are compared at a fraction of this size.
 constexpr int kReferenceSidePx = 4096;
 
-// White is 1: any grey or colour picture, by its luminance.
+// Reads a mask from the luminance of any picture; white is 1.
 Image ReadMask(const std::filesystem::path& file) {
   Image mask = LuminanceFromSrgb(ReadImage(file));
   for (float& value : mask.data) value /= 100.0f;
@@ -158,7 +158,7 @@ KeyColorResult FromAutomatic(const Options& options, const KeyPhoto& photo, Stag
   return result;
 }
 
-// The photo with each phrase's colour where the phrase was found: what the user corrects.
+// Draws the regions that were found for each phrase in the phrase's colour.
 Image DrawRegions(const Image& luminance, const std::vector<PromptRegion>& regions) {
   const Image l = FitWithin(luminance, kRegionsSidePx);
   Image ab(l.width, l.height, 2);
@@ -188,7 +188,7 @@ ordered_json RegionFacts(const std::vector<PromptRegion>& regions) {
 KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageContext& context) {
   const auto clip = ClipModel::FromWeightFile(context.Model(options.name));
   context.cancel().ThrowIfCancelled();
-  // What no phrase names is coloured as without a prompt.
+  // Regions of no phrase are coloured automatically.
   const Image rest = AutomaticColorizer::Embedded()->Colorize(photo.luminance).ab;
   PromptOptions prompt;
   prompt.hints = options.hints;

@@ -1,4 +1,4 @@
-// Every way to colour the key view, behind one table: the stage knows none of them by name.
+// All sources of a key view's colours, in one table.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -16,17 +16,17 @@ struct KeyPhoto {
 
 struct KeyColorResult {
   Image ab;  // 2 channels, Lab units, size of the photo
-  // For the report and for programs: what the source tells of itself beyond its name. "warnings" is
-  // a list of lines; those are shown to the user, too.
+  // Details of the source for the report and for programs. "warnings" is a list of lines that are
+  // also shown to the user.
   nlohmann::ordered_json facts = nlohmann::ordered_json::object();
-  Image confidence;  // 1 channel, 0..1; empty: sure everywhere
-  Image regions;     // sRGB of any size, what was taken for what; empty: nothing to show
+  Image confidence;  // 1 channel, 0..1; empty: 1 everywhere
+  Image regions;     // sRGB of any size, the regions of a prompt's phrases; empty: none
 };
 
 // "image", "strokes", ... as in stage.proto.
 const char* KeyColorSourceName(ColorizeKeyViewOptions::Source source);
 
-// Throws Error: what the source throws, kInvalidArgument when an option that it needs is missing.
+// Throws Error: what the source throws, kInvalidArgument when an option of the source is missing.
 KeyColorResult SolveKeyColor(const ColorizeKeyViewOptions& options,
                              const KeyPhoto& photo,
                              StageContext& context);

@@ -11,12 +11,12 @@ namespace {
 constexpr int kColumns = 16, kRows = 12;
 constexpr int kDepthSidePx = 128;
 constexpr float kMinOpacity = 0.5f;
-constexpr double kDepthTolerance = 0.06;  // relative; coarse, as the pictures of depth are
+constexpr double kDepthTolerance = 0.06;  // relative; coarse, as the depth maps are
 
 struct Surface {
   Camera camera;
   Pose pose;
-  Image depth;  // 0: nothing there
+  Image depth;  // 0: no surface
 };
 
 bool Shows(const Surface& view, const Eigen::Vector3d& point) {

@@ -1,5 +1,5 @@
-// What a scene's views see of each other, for the choice of key views. Functions without state;
-// their threads are the pool's.
+// Visibility between the views of a scene, for the choice of key views. Stateless; runs on the
+// pool's threads.
 #pragma once
 
 #include <filesystem>
@@ -13,20 +13,20 @@
 
 namespace color3d {
 
-// Places in a picture: samples of a view, row by row.
+// Sample locations of a view, row by row.
 struct SampleGrid {
   int columns = 0;
   int rows = 0;
   int samples() const { return columns * rows; }
-  // Where sample s lies, 0..1 of the picture's width and height.
+  // Location of sample s, 0..1 of the picture's width and height.
   double X(int s) const { return (s % columns + 0.5) / columns; }
   double Y(int s) const { return (s / columns + 0.5) / rows; }
 };
-// For scenes of so many views.
+// The grid for scenes with this number of views.
 SampleGrid GridFor(int views);
 
-// Sample s of view k is place s of `grid` in scene.views[views[k]]; a view shows it where it shows
-// the surface that the geometry's depth puts there.
+// Samples by the geometry: sample s of view k is location s of `grid` in scene.views[views[k]]. A
+// view shows it if it shows the surface at the geometry's depth there.
 SeenSamples SeenByGeometry(const Scene& scene,
                            const std::vector<int>& views,
                            const GaussianModel& geometry,
@@ -34,10 +34,10 @@ SeenSamples SeenByGeometry(const Scene& scene,
                            ThreadPool& pool,
                            const CancellationToken& cancel);
 
-// Without geometry: the samples of a view are tracked points that it sees, and who else sees them.
+// Samples without geometry: the tracked points of a view, and the other views that observe them.
 SeenSamples SeenByPoints(const Scene& scene, const std::vector<int>& views);
 
-// Where features of photos are kept between jobs; empty: nowhere.
+// Folder that keeps features of photos between jobs; empty: none.
 std::filesystem::path FeatureCache(const StageContext& context);
 
 }  // namespace color3d

@@ -12,7 +12,7 @@
 namespace color3d {
 namespace {
 
-// Far things lie close together: |v| / sqrt(1 + |v|^2 / 9) is at most 3 radii.
+// Compresses far positions: |v| / sqrt(1 + |v|^2 / 9) is at most 3 radii.
 Eigen::Vector3d Bounded(const Eigen::Vector3d& v) {
   return v / std::sqrt(1.0 + v.squaredNorm() / 9.0);
 }

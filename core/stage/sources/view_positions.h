@@ -1,4 +1,4 @@
-// Where in space the surfaces lie that a view shows, for colours that are joined in space.
+// Positions in space of the surfaces that a view shows, to relate colours in space.
 #pragma once
 
 #include <optional>
@@ -13,15 +13,15 @@ namespace color3d {
 // Thread-safe.
 class ViewPositions {
  public:
-  // Without geometry among the inputs nothing is known.
+  // Positions are unknown without geometry among the inputs.
   ViewPositions(const Scene& scene, const StageContext& context);
 
-  // Whether the geometry says that nothing moves: frames of a place are photos of it.
+  // Whether the geometry is static, so that frames are like photos.
   bool NothingMoves() const { return geometry_ && geometry_->motion.size() == 0; }
 
-  // PictureFacts::position, of the size of `luminance`, the view's as `camera` takes it. Known
-  // where the geometry is rendered as the view shows it: elsewhere, and where `mask` (of that size;
-  // null: nowhere) is 0, the view shows something else. Empty without geometry.
+  // Returns PictureFacts::position of the size of `luminance`, which is the view's as taken by
+  // `camera`. Known where the rendered geometry agrees with `luminance` and `mask` (of the same
+  // size; null: 1 everywhere) is not 0. Empty without geometry.
   Image Of(int view, const Camera& camera, const Image& luminance, const Image* mask) const;
 
  private:

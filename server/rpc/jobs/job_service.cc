@@ -70,16 +70,14 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
 }
 
 SceneFacts FactsOf(const SceneRecord& scene) {
-  const bool is_splat = scene.layout == StoredLayout::kSplat;
-  const bool is_film = scene.layout == StoredLayout::kFilm;
-  return {.photos = is_splat ? kSplatViews : scene.photo_count,
-          .has_poses = scene.layout != StoredLayout::kPhotos && !is_film &&
-                       scene.layout != StoredLayout::kFilms,
+  const bool is_splat = scene.layout == CaptureLayout::kSplat;
+  return {.photos = scene.photo_count,
+          .has_poses = InfoOf(scene.layout).has_poses,
           .augment_files = static_cast<int>(
               std::count_if(scene.files.begin(),
                             scene.files.end(),
                             [](const auto& file) { return IsAugmentFile(file.path); })),
-          .is_film = is_film,
+          .is_film = scene.layout == CaptureLayout::kFilm,
           .is_splat = is_splat};
 }
 

@@ -69,15 +69,10 @@ class MappedFile {
 };
 
 std::string BaseName(const std::string& path) { return path.substr(path.rfind('/') + 1); }
-std::string Folder(const std::string& path) {
-  const size_t slash = path.rfind('/');
-  return slash == std::string::npos ? "" : path.substr(0, slash);
-}
-
-std::vector<ColmapPlace> ModelPlaces(const std::vector<SceneFileRecord>& files) {
+std::vector<std::string> PathsOf(const std::vector<SceneFileRecord>& files) {
   std::vector<std::string> paths;
   for (const SceneFileRecord& file : files) paths.push_back(file.path);
-  return ColmapPlaces(paths);
+  return paths;
 }
 
 bool IsTransforms(const std::string& path) {
@@ -103,27 +98,6 @@ int CountFilms(const std::vector<SceneFileRecord>& files) {
   return static_cast<int>(std::count_if(files.begin(), files.end(), [](const auto& file) {
     return HasFilmExtension(file.path) && !IsAugmentFile(file.path);
   }));
-}
-
-bool HasFile(const std::vector<SceneFileRecord>& files, const std::string& path) {
-  return std::any_of(files.begin(), files.end(), [&](const auto& f) { return f.path == path; });
-}
-
-// Cameras of Nerfies and HyperNeRF.
-bool HasNerfiesCameras(const std::vector<SceneFileRecord>& files) {
-  return HasFile(files, "metadata.json") &&
-         std::any_of(files.begin(), files.end(), [](const auto& file) {
-           return file.path.starts_with("camera/") && file.path.ends_with(".json");
-         });
-}
-
-// Returns the folders that hold the frames of a film as pictures; frames/ itself is one.
-std::set<std::string> FrameFolders(const std::vector<SceneFileRecord>& files) {
-  std::set<std::string> folders;
-  for (const SceneFileRecord& file : files) {
-    if (IsFrameFile(file.path) && HasImageExtension(file.path)) folders.insert(Folder(file.path));
-  }
-  return folders;
 }
 
 // Problems of the files of a scene. Equal files are read once.
@@ -295,29 +269,6 @@ SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLim
   return record;
 }
 
-StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files) {
-  const bool has_photos = std::any_of(files.begin(), files.end(), [](const auto& file) {
-    return HasImageExtension(file.path) && !IsAugmentFile(file.path) && !IsMaskFile(file.path);
-  });
-  if (const size_t folders = FrameFolders(files).size(); folders > 0) {
-    return folders > 1 ? StoredLayout::kFilms : StoredLayout::kFilm;
-  }
-  // Several films belong to several cameras, whose poses may be given in a file beside them.
-  if (!has_photos && CountFilms(files) > 1) {
-    if (HasFile(files, std::string(kTransformsFile))) return StoredLayout::kTransforms;
-    if (HasFile(files, std::string(kPosesBoundsFile))) return StoredLayout::kPosesBounds;
-    return StoredLayout::kFilms;
-  }
-  if (!has_photos && CountFilms(files) > 0) return StoredLayout::kFilm;
-  if (!has_photos && CountSplats(files) > 0) return StoredLayout::kSplat;
-  if (!ModelPlaces(files).empty()) return StoredLayout::kColmap;
-  if (HasNerfiesCameras(files)) return StoredLayout::kNerfies;
-  for (const SceneFileRecord& file : files) {
-    if (IsTransforms(file.path)) return StoredLayout::kTransforms;
-  }
-  return StoredLayout::kPhotos;
-}
-
 SceneCheck CheckScene(const SceneRecord& scene,
                       const BlobStore& blobs,
                       const ProjectStore& store,
@@ -329,8 +280,9 @@ SceneCheck CheckScene(const SceneRecord& scene,
   const std::set<std::string> held = store.HeldBlobs(named);
   FileChecks checks(blobs, limits, is_cancelled);
   std::vector<FieldViolation>& violations = checks.violations;
-  check.layout = DetectLayout(scene.files);
-  const std::vector<ColmapPlace> models = ModelPlaces(scene.files);
+  const std::vector<std::string> paths = PathsOf(scene.files);
+  check.layout = DetectCapture(paths);
+  const std::vector<ColmapPlace> models = ColmapPlaces(paths);
   if (!models.empty() && !models[0].whole) {
     violations.push_back({models[0].files[0],
                           "belongs to an incomplete COLMAP model: cameras, images and "
@@ -342,14 +294,14 @@ SceneCheck CheckScene(const SceneRecord& scene,
     checks.Check(file, held.contains(file.digest.sha256), &check);
     missing += violations.size() - before;
   }
-  if (check.layout == StoredLayout::kSplat) {
+  if (check.layout == CaptureLayout::kSplat) {
     if (const int splats = CountSplats(scene.files); splats > 1) {
       violations.push_back({"",
                             fmt::format("the scene holds {} splats and no photos; give one "
                                         "splat per scene",
                                         splats)});
     }
-  } else if (check.layout == StoredLayout::kFilm || check.layout == StoredLayout::kFilms) {
+  } else if (check.layout == CaptureLayout::kFilm || check.layout == CaptureLayout::kFilms) {
     if (CountFilms(scene.files) > 0 && check.photo_count > 0) {
       violations.push_back(
           {"", "the scene holds pictures in frames/ and video files; give one of the two"});

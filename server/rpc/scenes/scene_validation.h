@@ -17,7 +17,7 @@ namespace color3d {
 SceneRecord CheckedScene(const v1::CreateSceneRequest& request, const ServiceLimits& limits);
 
 struct SceneCheck {
-  StoredLayout layout = StoredLayout::kPhotos;
+  CaptureLayout layout = CaptureLayout::kPhotos;
   int photo_count = 0;
 };
 
@@ -30,8 +30,5 @@ SceneCheck CheckScene(const SceneRecord& scene,
                       const ProjectStore& store,
                       const ServiceLimits& limits,
                       const std::function<bool()>& is_cancelled);
-
-// Returns the kind of input that the paths suggest; COLMAP takes precedence over other poses.
-StoredLayout DetectLayout(const std::vector<SceneFileRecord>& files);
 
 }  // namespace color3d

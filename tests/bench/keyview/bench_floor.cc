@@ -153,8 +153,8 @@ void Run(const Arguments& args) {
       const CarryOptions options;
       raw[k] = CarryColor(surfaces[source].rendered, ab, {}, surfaces[target].rendered, options);
       if (surfaces[source].swept && surfaces[target].swept) {
-        TakeSurer(CarryColor(*surfaces[source].swept, ab, {}, *surfaces[target].swept, options),
-                  &raw[k]);
+        KeepMoreConfident(
+            CarryColor(*surfaces[source].swept, ab, {}, *surfaces[target].swept, options), &raw[k]);
       }
     });
     std::vector<CarriedColor> fitted = raw;

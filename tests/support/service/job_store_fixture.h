@@ -28,7 +28,7 @@ class JobStoreTest : public ::testing::Test {
     scene.name = "scenes/test";
     scene.files = {{"a.jpg", {Sha256Hex("a"), 1}}};
     store_->CreateScene(scene, {}, {});
-    store_->ActivateScene("scenes/test", StoredLayout::kPhotos, 1, {});
+    store_->ActivateScene("scenes/test", CaptureLayout::kPhotos, 1, {});
   }
   void Open() {
     StoreOptions options;

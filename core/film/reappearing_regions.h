@@ -16,10 +16,10 @@ struct FilmTrack {
   Image in_frame;  // place in the frame of each pixel of the key frame
 };
 
-class FoundAgain {
+class ReappearingRegions {
  public:
   // `key`: L in 0..100, 1 channel; must outlive the object.
-  explicit FoundAgain(const Image& key);
+  explicit ReappearingRegions(const Image& key);
 
   const Image& key() const { return key_; }
   // Candidate tracks: each is a homography refined by optical flow (DIS), those with most features

@@ -1,4 +1,4 @@
-#include "core/film/found_again.h"
+#include "core/film/reappearing_regions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -107,10 +107,10 @@ Image Refined(const cv::Matx33d& h, const Image& picture, const Image& other) {
 
 }  // namespace
 
-FoundAgain::FoundAgain(const Image& key) : key_(key), features_(FeaturesOf(key)) {}
+ReappearingRegions::ReappearingRegions(const Image& key) : key_(key), features_(FeaturesOf(key)) {}
 
-std::vector<FilmTrack> FoundAgain::TracksTo(const Image& frame,
-                                            const CancellationToken& cancel) const {
+std::vector<FilmTrack> ReappearingRegions::TracksTo(const Image& frame,
+                                                    const CancellationToken& cancel) const {
   std::vector<FilmTrack> tracks;
   try {
     for (const cv::Matx33d& h : PlanesOf(MatchesOf(features_, FeaturesOf(frame), key_))) {

@@ -1,0 +1,70 @@
+// Captures: how the files of a scene are laid out, and what kind of scene import makes of them. All
+// layouts and kinds are listed here; clients, the server and import detect a layout by the same
+// function. Thread-safe.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace color3d {
+
+// The values are those of the API's Scene.Layout, and are kept in stores.
+enum class CaptureLayout {
+  kUnknown = 0,
+  kPhotos = 1,       // photos without poses
+  kColmap = 2,       // photos with COLMAP models
+  kTransforms = 3,   // photos, or films of several cameras, with a transforms.json
+  kSplat = 4,        // one splat
+  kFilm = 5,         // one film: a video file, or pictures in frames/
+  kNerfies = 6,      // photos with the cameras of Nerfies or HyperNeRF
+  kPosesBounds = 7,  // films of several cameras, or photos, with a poses_bounds.npy
+  kFilms = 8,        // films of several cameras without poses
+  // Found by import alone: films of several cameras with poses in a file.
+  kPosedFilms = 9,
+};
+
+struct CaptureLayoutInfo {
+  CaptureLayout layout;
+  const char* name;        // in import.json and on the command line
+  bool has_poses;          // before import
+  bool times_are_seconds;  // times of its frames; else they may be shares of the whole
+};
+
+const std::vector<CaptureLayoutInfo>& CaptureLayouts();
+
+// Throws Error{kInternal} for a value without a row.
+const CaptureLayoutInfo& InfoOf(CaptureLayout layout);
+
+// kUnknown where no layout has that name.
+CaptureLayout LayoutOfName(std::string_view name);
+
+// The layout of a scene's files, which are paths relative to its folder with '/' separators. By
+// names alone: frames/ before photos, photos before films, films before splats. kPhotos where
+// nothing else fits.
+CaptureLayout DetectCapture(const std::vector<std::string>& files);
+
+// What import makes of a capture.
+enum class CaptureKind {
+  kStatic,   // posed views of a place, without times
+  kFilm,     // frames of one camera without poses: coloured, not reconstructed
+  kDynamic,  // posed views with times
+  kRelief,   // frames of one standing camera with assumed depth (2.5D)
+};
+
+struct CaptureKindInfo {
+  CaptureKind kind;
+  const char* name;       // in scene.json
+  bool has_times;         // each view has one
+  bool is_reconstructed;  // Gaussians are made of it
+};
+
+const std::vector<CaptureKindInfo>& CaptureKinds();
+const CaptureKindInfo& InfoOf(CaptureKind kind);
+// Throws Error{kInvalidArgument} naming the kinds that there are.
+CaptureKind KindOfName(std::string_view name);
+
+// Reason why a stage (core/catalogue/stages.h) has nothing to do for a kind; empty where it has.
+std::string_view WhyNothingToDo(CaptureKind kind, std::string_view stage);
+
+}  // namespace color3d
