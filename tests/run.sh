@@ -46,6 +46,7 @@ tests/check_proto.sh "$build"
 cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCOLOR3D_TESTS=ON
 cmake --build "$build"
 tests/check_tidy.sh "$build"
+tests/check_thread_safety.sh "$build"
 if [ -n "$label" ]; then
   run_tests -L "$label"
 else
