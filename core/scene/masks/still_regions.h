@@ -1,4 +1,4 @@
-// What of a film's frame stands still, as its import saw it (METHOD.md "Poses of films"). Pure
+// What of a film's frame stands still, as its import saw it (DYNAMIC.md "Poses of films"). Pure
 // functions, thread-safe.
 #pragma once
 
