@@ -157,7 +157,7 @@ class FilmFileTest : public testing::Test {
   const fs::path secret_ = folder_.path() / "secret.ts";
 };
 
-TEST_F(FilmFileTest, OpensFilmReferencedByOtherFiles) {
+TEST_F(FilmFileTest, ReadsReferencedFilmDirectly) {
   EXPECT_EQ(FilmReader(secret_).times().size(), 30u);
   EXPECT_FALSE(SoundLevels({secret_, 0.0, 1.0}, CancellationToken()).empty());
   const Watch opened(secret_, IN_OPEN);

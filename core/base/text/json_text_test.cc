@@ -42,7 +42,7 @@ TEST(JsonText, KeepsValidJson) {
   }
 }
 
-TEST(JsonText, AcceptsNonStandardNumbers) {
+TEST(JsonText, AcceptsJsonOfOtherPrograms) {
   EXPECT_EQ(Plain("\xef\xbb\xbf{}"), "{}");
   EXPECT_EQ(Plain("[1,\n]"), "[1\n]");
   EXPECT_EQ(Plain("{\"a\": 1 , }"), "{\"a\": 1  }");

@@ -38,7 +38,7 @@ TEST_F(TrainingTargetsTest, CachesWithinBudgetAndRereadsOthers) {
   EXPECT_EQ(asked_, 40 + 30 + 30);
 }
 
-TEST_F(TrainingTargetsTest, ChangeOfLevelClearsCache) {
+TEST_F(TrainingTargetsTest, EvictsPicturesOfOtherLevels) {
   TrainingTargets targets(source_, 1, 1.0f, 10 * kPlaneBytes);
   for (int view = 0; view < 40; ++view) targets.Get(View(view), 1);
   EXPECT_EQ(targets.kept_bytes(), 10 * kPlaneBytes);
