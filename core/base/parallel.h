@@ -1,6 +1,5 @@
 // A persistent pool of threads for data-parallel loops. One loop at a time per pool; the calling
-// thread takes part. The same thread count splits the work in the same way, so results can be
-// reproducible.
+// thread takes part. Same work split for the same thread count, so results can be reproducible.
 #pragma once
 
 #include <atomic>
@@ -16,7 +15,7 @@ namespace color3d {
 
 class ThreadPool {
  public:
-  // `threads` >= 1; 0 uses all cores of the machine.
+  // `threads` >= 1; 0 takes what the machine has.
   explicit ThreadPool(int threads = 0);
   ~ThreadPool();
   ThreadPool(const ThreadPool&) = delete;
@@ -42,7 +41,7 @@ class ThreadPool {
   std::condition_variable start_;
   std::condition_variable done_;
   const std::function<void(int)>* task_ = nullptr;
-  std::atomic<uint64_t> generation_ = 0;  // changed under the mutex, read without it
+  std::atomic<uint64_t> generation_ = 0;  // changed under the mutex, watched without it
   std::atomic<int> running_ = 0;
   bool stopping_ = false;
   std::exception_ptr failure_;
