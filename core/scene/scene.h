@@ -69,7 +69,7 @@ struct Scene {
   // ... or of one or several cameras with poses, or of a relief: a scene that may move. Both false
   // without views.
   bool IsDynamic() const;
-  // Indices of all views in order of time; views of equal time, or without one, keep their order.
+  // Indices of all views; those of one time, or without one, in their order.
   std::vector<int> ViewsInOrderOfTime() const;
   // The distinct times of the views, seconds, ascending.
   std::vector<double> Times() const;
