@@ -3,7 +3,7 @@
 #   - a relative link in a *.md to a file or heading that does not exist;
 #   - a `path/of/a.source`, a `CamelCase`, `snake_case` or `CAPITAL_CASE` name or a `--flag` in code quotes
 #     that the sources do not have (not in CHANGELOG.md, which tells of old names, too);
-#   - a comment that cites a document, or a section of one, that does not exist: METHOD.md "Stage 1a"
+#   - a comment that cites a document, or a section of one, that does not exist: STILL.md "Stage 1a"
 #     means a heading that begins like that in the one METHOD.md of the repository.
 # Names of other projects' things stand in the list below.
 set -euo pipefail

@@ -1,4 +1,4 @@
-// The key view as another camera would see it, through its depth map (METHOD.md "Stage 1c"): a
+// The key view as another camera would see it, through its depth map (STILL.md "Stage 1c"): a
 // z-buffered forward warp of the surface that the key view sees. Pure functions, thread-safe.
 #pragma once
 

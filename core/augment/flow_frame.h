@@ -1,4 +1,4 @@
-// A frame of a film that starts at the key view, without knowing its geometry (METHOD.md
+// A frame of a film that starts at the key view, without knowing its geometry (STILL.md
 // "Stage 1c"): a slow zoom and turn, and a smooth flow. Pure function, thread-safe.
 #pragma once
 

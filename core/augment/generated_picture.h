@@ -1,4 +1,4 @@
-// One more training picture for the colorizer, made from the coloured key view (METHOD.md
+// One more training picture for the colorizer, made from the coloured key view (STILL.md
 // "Stage 1c"). A plain value.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Patch-based outpainting (METHOD.md "Stage 1c"): a quadrant of the key view is put into the
+// Patch-based outpainting (STILL.md "Stage 1c"): a quadrant of the key view is put into the
 // opposite corner of a canvas of the key view's size, and its two outer sides are extended by
 // quilting (Efros & Freeman 2001). Every pixel is a copy whose chroma travels with its own
 // luminance; only small steps of shading between neighbouring patches are evened out, in all three

@@ -1,6 +1,6 @@
 // Surrogates of what a generative model would make of the coloured key view, without any model: the
 // picture continued beyond its border, the next frame of a film, and views from cameras nearby
-// (METHOD.md "Stage 1c"). Thread-safe as far as the renderer is.
+// (STILL.md "Stage 1c"). Thread-safe as far as the renderer is.
 #pragma once
 
 #include <Eigen/Core>

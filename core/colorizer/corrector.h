@@ -1,4 +1,4 @@
-// Corrections of a coloured scene (METHOD.md "Corrections"): what a user wants changed on parts of
+// Corrections of a coloured scene (STILL.md "Corrections"): what a user wants changed on parts of
 // some pictures reaches what is alike and near in all of them. No torch in this interface.
 #pragma once
 

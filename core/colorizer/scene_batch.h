@@ -1,4 +1,4 @@
-// Many scenes in one running batch (METHOD.md "All-in-one"): each scene's thread trains with its
+// Many scenes in one running batch (STILL.md "All-in-one"): each scene's thread trains with its
 // own options, checkpoints, clock and cancellation; here they share one frozen encoder and take
 // turns at the compute slots. A turn goes to the project that has computed least, then to the scene
 // of it that has. Scenes join and leave at any time, and fail alone. Nothing of a scene's

@@ -1,4 +1,4 @@
-// The key view's colours from a coloured picture of it (METHOD.md "Stage 1b"). L of the photo is
+// The key view's colours from a coloured picture of it (STILL.md "Stage 1b"). L of the photo is
 // always kept, only a and b are taken.
 #pragma once
 

@@ -1,5 +1,5 @@
 // How well one view's deep features explain the other views: the score of the coverage strategy
-// (METHOD.md "Stage 1a"). Pure, thread-safe.
+// (STILL.md "Stage 1a"). Pure, thread-safe.
 #pragma once
 
 #include <vector>

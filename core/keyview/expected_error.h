@@ -1,5 +1,5 @@
 // Which views to colour, judged by the error that is expected of the colours of all views
-// (METHOD.md "Stage 1a"): small where a key view shows the same place, larger where colours have to
+// (STILL.md "Stage 1a"): small where a key view shows the same place, larger where colours have to
 // be inferred, the more so the stranger a place is to the key views. Pure, thread-safe.
 #pragma once
 

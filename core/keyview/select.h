@@ -1,4 +1,4 @@
-// Key view selection (METHOD.md "Stage 1a"): which photo the user should colour. First views that
+// Key view selection (STILL.md "Stage 1a"): which photo the user should colour. First views that
 // must not win are set aside, then the strategy's scores rank the rest. Pure, float64, the same
 // answer on every run; thread-safe.
 #pragma once

@@ -1,5 +1,5 @@
 // How much of what the other views show a view sees too, from the tracks of structure-from-motion:
-// the score of the `tracks` strategy (METHOD.md "Stage 1a"). Pure, thread-safe.
+// the score of the `tracks` strategy (STILL.md "Stage 1a"). Pure, thread-safe.
 #pragma once
 
 #include <string>

@@ -70,9 +70,11 @@ int Scene::FindView(std::string_view name) const {
                                  : "; it has " + known + (views.size() > 3 ? ", ..." : "")));
 }
 
-bool Scene::IsFilm() const { return HasMoments(views) && !HasPoses(views) && !relief; }
-
-bool Scene::IsDynamic() const { return HasMoments(views) && (HasPoses(views) || relief); }
+CaptureKind Scene::kind() const {
+  if (!HasMoments(views)) return CaptureKind::kStatic;
+  if (relief) return CaptureKind::kRelief;
+  return HasPoses(views) ? CaptureKind::kDynamic : CaptureKind::kFilm;
+}
 
 std::vector<int> Scene::ViewsInOrderOfTime() const {
   std::vector<int> order(views.size());

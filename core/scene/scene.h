@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/catalogue/captures.h"
 #include "core/scene/camera.h"
 #include "core/scene/relief.h"
 
@@ -63,12 +64,10 @@ struct Scene {
   // Index of a view by name (or by file stem when that is unique); throws Error{kNotFound} naming
   // a few that exist.
   int FindView(std::string_view name) const;
-  // Every view has its moment: frames of a film, whose poses are all the same because nobody knows
-  // them (coloured, not reconstructed) ...
-  bool IsFilm() const;
-  // ... or of one or several cameras with poses, or of a relief: a scene that may move. Both false
-  // without views.
-  bool IsDynamic() const;
+  // Kind of the scene: kFilm, kDynamic and kRelief if each view has a moment. Films have one pose
+  // for all views, which means none. kStatic without views.
+  CaptureKind kind() const;
+  const CaptureKindInfo& capture() const { return InfoOf(kind()); }
   // Indices of all views; those of one time, or without one, in their order.
   std::vector<int> ViewsInOrderOfTime() const;
   // The distinct times of the views, seconds, ascending.

@@ -220,6 +220,7 @@ std::string SceneToJson(const Scene& scene) {
   }
   json root = {{"format", kFormat},
                {"version", kVersion},
+               {"kind", scene.capture().name},
                {"world_from_scene_scale", scene.world_from_scene_scale},
                {"world_offset", Vector3ToJson(scene.world_offset)},
                {"views", std::move(views)},
@@ -267,6 +268,10 @@ Scene SceneFromJson(std::string_view text) {
   scene.points.reserve(point_count);
   for (size_t i = 0; i < point_count; ++i) {
     scene.points.push_back(PointFromJson(points[i], static_cast<int>(view_count)));
+  }
+  if (field.Has("kind")) {  // absent from older files
+    const CaptureKind kind = KindOfName(field["kind"].Text());
+    if (kind != scene.kind()) throw field["kind"].Wrong(scene.capture().name);
   }
   return scene;
 }

@@ -47,14 +47,14 @@ TEST(Scene, FramesOfOnePoseAreAFilmUntilTheyAreARelief) {
     view.cam_from_world = {};
     view.moment = Moment{0.1, 0};
   }
-  EXPECT_TRUE(scene.IsFilm());
-  EXPECT_FALSE(scene.IsDynamic());
+  EXPECT_FALSE(scene.capture().is_reconstructed);
+  EXPECT_FALSE(scene.capture().is_dynamic);
   scene.relief = Relief{0.3, 0.5, 4.0};
   const std::string text = SceneToJson(scene);
   const Scene again = SceneFromJson(text);
   EXPECT_EQ(again.relief, scene.relief);
-  EXPECT_FALSE(again.IsFilm());
-  EXPECT_TRUE(again.IsDynamic());
+  EXPECT_TRUE(again.capture().is_reconstructed);
+  EXPECT_TRUE(again.capture().is_dynamic);
   std::string wrong = text;
   wrong.replace(wrong.find("\"horizon\":0.3"), 13, "\"horizon\":0.6");
   EXPECT_THAT(Refusal([&] { SceneFromJson(wrong); }),

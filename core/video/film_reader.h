@@ -1,5 +1,5 @@
 // Frames of a video file, decoded when they are asked for: memory does not grow with the length of
-// the film (METHOD.md "Film").
+// the film (FILM.md "Film").
 #pragma once
 
 #include <filesystem>

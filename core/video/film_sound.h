@@ -1,4 +1,4 @@
-// The sound of a part of a film as MP4 takes it (METHOD.md "Film"): packets as they are where the
+// The sound of a part of a film as MP4 takes it (FILM.md "Film"): packets as they are where the
 // codec is one that MP4 holds, else coded again as AAC. For this folder only.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Films of high dynamic range (HDR) as pictures of the usual one (METHOD.md "Film"). Pure.
+// Films of high dynamic range (HDR) as pictures of the usual one (FILM.md "Film"). Pure.
 #pragma once
 
 #include <array>

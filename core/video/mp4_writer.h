@@ -1,6 +1,6 @@
 // Movies as people send them: MP4 with H.264, 4:2:0, colours tagged as BT.709, and the sound of the
 // film that they come from. Pictures are coded as they come, so memory does not grow with the
-// length (METHOD.md "Movies", "Film").
+// length (EXPORT.md "Movies").
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// By how much two films of one event began apart, heard in their sound (METHOD.md "Poses of
+// By how much two films of one event began apart, heard in their sound (DYNAMIC.md "Poses of
 // films").
 #pragma once
 

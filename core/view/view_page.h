@@ -1,5 +1,5 @@
 // The page to look at a coloured scene in a browser: one file with the scene, the photos and the
-// viewer in it, which asks no network (METHOD.md "Viewer"). Pure functions.
+// viewer in it, which asks no network (EXPORT.md "Viewer"). Pure functions.
 #pragma once
 
 #include <array>

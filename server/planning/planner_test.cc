@@ -195,8 +195,8 @@ TEST(Planner, SkipsAugmentationsUnlessRequested) {
   with_files.augment_files = 2;
   graph = PlanJob(spec, {}, with_files);
   EXPECT_THAT(graph.jobs[IndexOf(graph, "generate_augmentations")].skip_reason,
-              HasSubstr("2 files, which count where generate_augmentations.files"))
-      << "nobody asked for them";
+              HasSubstr("2 files, which are used if generate_augmentations.files"))
+      << "not requested";
   EXPECT_THAT(InputKinds(graph, "personalize"), Not(Contains("generate_augmentations")));
 
   spec.mutable_colorize_scene()->mutable_generate_augmentations()->set_files(true);
@@ -459,7 +459,8 @@ TEST(PlanColorizeScene, TakesAnAcceptedKeyView) {
   EXPECT_EQ(PlanError(spec, inputs).reason, "INPUT_MISSING");
   inputs[2].state = JobState::kSucceeded;
   inputs.erase(inputs.begin() + 1);
-  EXPECT_THAT(PlanError(spec, inputs).message, HasSubstr("without the select_key_view"));
+  EXPECT_THAT(PlanError(spec, inputs).message,
+              HasSubstr("without its own input, the select_key_view"));
   EXPECT_THAT(PlanError(spec, {Done("import_scene")}).message, HasSubstr("key_color is required"));
   EXPECT_THAT(PlanError(spec, {Done("personalize")}).message, HasSubstr("personalize"));
 }

@@ -1,4 +1,4 @@
-// Colouring a picture without any help from the user (METHOD.md "Stage 1b", `auto`). No torch in
+// Colouring a picture without any help from the user (STILL.md "Stage 1b", `auto`). No torch in
 // this interface. Immutable after construction: any number of threads may colour.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Colours of the key view from hints (METHOD.md "Stage 1b"): strokes, points, lines and regions,
+// Colours of the key view from hints (STILL.md "Stage 1b"): strokes, points, lines and regions,
 // spread along the luminance. All pictures have the key photo's size as captured; the result is the
 // same for any number of threads.
 #pragma once

@@ -1,4 +1,4 @@
-// Colouring by words (METHOD.md "Stage 1b", `prompt`): colour phrases are found in the picture with
+// Colouring by words (STILL.md "Stage 1b", `prompt`): colour phrases are found in the picture with
 // CLIP's dense features and become hints, which are spread along L. No torch in this interface.
 #pragma once
 

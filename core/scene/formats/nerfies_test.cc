@@ -86,7 +86,7 @@ TEST_F(Nerfies, CamerasTimesAndPoints) {
   EXPECT_THAT(warnings, testing::IsEmpty());
   EXPECT_EQ(cameras, (std::vector<std::string>{"0", "1"}));
   ASSERT_EQ(scene.views.size(), 12u);
-  EXPECT_TRUE(scene.IsDynamic());
+  EXPECT_TRUE(scene.capture().is_dynamic);
   const View& view = scene.views[5];
   EXPECT_EQ(view.name, "000005.png");
   EXPECT_EQ(view.image_file, "rgb/2x/000005.png");

@@ -143,7 +143,7 @@ TEST_F(PosesOfPhotos, TimesFollowTheNames) {
   WriteFileAtomic(folder_.path() / "times.txt",
                   "0 images\\0001.PNG\n1 0002\n2 images/0003.jpg\n3 0004.png\n4 gone.png\n");
   const ImportResult result = Run();
-  EXPECT_TRUE(result.scene.IsDynamic());
+  EXPECT_TRUE(result.scene.capture().is_dynamic);
   EXPECT_EQ(result.scene.views[2].time_s(), 2.0);
 }
 

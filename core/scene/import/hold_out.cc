@@ -57,7 +57,7 @@ std::vector<HeldOutAs> HowHeldOut(const Scene& scene) {
   for (size_t i = 0; i < scene.views.size(); ++i) {
     const View& view = scene.views[i];
     if (!view.held_out) continue;
-    if (!scene.IsFilm() && !cameras.contains(view.moment->shot)) {
+    if (scene.capture().is_reconstructed && !cameras.contains(view.moment->shot)) {
       how[i] = HeldOutAs::kCamera;
       continue;
     }

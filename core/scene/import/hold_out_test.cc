@@ -82,7 +82,7 @@ TEST(HowHeldOutTest, TellsCamerasMomentsAndBlocksApart) {
 TEST(HowHeldOutTest, ShotsOfAFilmAreNoCamerasAndPhotosHaveNoTag) {
   Scene film = SceneOf(1, 30, /*film=*/true);
   for (int t = 10; t < 20; ++t) film.views[t].held_out = true;  // a whole shot
-  ASSERT_TRUE(film.IsFilm());
+  ASSERT_FALSE(film.capture().is_reconstructed);
   EXPECT_EQ(HowHeldOut(film)[12], HeldOutAs::kBlock);
   Scene photos = SceneOf(1, 8);
   for (View& view : photos.views) view.moment.reset();

@@ -268,7 +268,7 @@ void HoldOutCamera(const std::string& camera, ImportResult* result) {
 
 // Throws if the scene has times but all its frames are from one place.
 void CheckMoves(const Scene& scene) {
-  if (!scene.IsFilm()) return;
+  if (scene.capture().is_reconstructed) return;
   throw InvalidArgument(
       "the frames are all of one camera that stands still: nothing can be reconstructed of them. "
       "Colour them as a film: leave the poses out and give --film, with --poses as a relief "
@@ -278,7 +278,7 @@ void CheckMoves(const Scene& scene) {
 }  // namespace
 
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings) {
-  if (scene->IsDynamic()) return HoldOutMoments(scene, warnings);
+  if (scene->capture().is_dynamic) return HoldOutMoments(scene, warnings);
   std::vector<View>& views = scene->views;
   const size_t held_out = (views.size() + kHoldOutEvery - 1) / kHoldOutEvery;
   if (views.size() < held_out + kMinTrainingViews) {

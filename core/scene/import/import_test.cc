@@ -127,7 +127,7 @@ TEST_F(Import, TimeStepsOfARigAreHeldOutWithAllTheirCameras) {
   RigScene(14, folder_.path());
   options_.hold_out_every_eighth = true;
   const ImportResult result = Run();
-  EXPECT_TRUE(result.scene.IsDynamic());
+  EXPECT_TRUE(result.scene.capture().is_dynamic);
   EXPECT_EQ(result.cameras, (std::vector<std::string>{"cam00", "cam01", "cam02"}));
   ASSERT_EQ(result.scene.views.size(), 42u);
   for (const View& view : result.scene.views) {
@@ -154,7 +154,7 @@ TEST_F(Import, AWholeCameraIsHeldOut) {
 TEST_F(Import, AColmapModelWithTimesMovesAsAnyOther) {
   const Scene rig = RigScene(14, folder_.path());
   WriteColmapText(rig, folder_.path() / "sparse/0");
-  EXPECT_FALSE(Run().scene.IsDynamic());
+  EXPECT_FALSE(Run().scene.capture().is_dynamic);
   std::string times;
   for (const View& view : rig.views) {
     times += std::to_string(7.0 + view.time_s()) + " " + view.name + "\n";
@@ -164,7 +164,7 @@ TEST_F(Import, AColmapModelWithTimesMovesAsAnyOther) {
   options_.hold_out_camera = "cam1";
   const ImportResult result = Run();
   EXPECT_EQ(result.layout, CaptureLayout::kColmap);
-  EXPECT_TRUE(result.scene.IsDynamic());
+  EXPECT_TRUE(result.scene.capture().is_dynamic);
   EXPECT_EQ(result.cameras, (std::vector<std::string>{"cam0", "cam1", "cam2"}));
   EXPECT_TRUE(result.warnings.empty());
   ASSERT_EQ(result.scene.views.size(), 42u);

@@ -1,4 +1,4 @@
-// Static regions of a film's frames, as found by import (METHOD.md "Poses of films"). Pure
+// Static regions of a film's frames, as found by import (DYNAMIC.md "Poses of films"). Pure
 // functions, thread-safe.
 #pragma once
 

@@ -1,5 +1,5 @@
 // What a viewer's RGB blending loses against our own Lab renders, and a short refinement of the RGB
-// harmonics that wins some of it back (METHOD.md "Export").
+// harmonics that wins some of it back (EXPORT.md "Export").
 #pragma once
 
 #include <vector>

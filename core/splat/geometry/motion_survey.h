@@ -1,4 +1,4 @@
-// Where a scene moves: what Gaussians that stand still cannot explain (METHOD.md "What moves").
+// Where a scene moves: what Gaussians that stand still cannot explain (DYNAMIC.md "Motion").
 // Internal to the splat module. Deterministic whatever the thread count.
 #pragma once
 

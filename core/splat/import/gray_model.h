@@ -19,7 +19,7 @@ struct GraySplat {
 inline constexpr double kColorless = 2.0;
 
 // The luminance of Gaussian i along a direction is that of its colour there; its harmonics are
-// fitted over directions spread evenly over the sphere (METHOD.md "A splat without photos"). The
+// fitted over directions spread evenly over the sphere (STILL.md "A splat without photos"). The
 // order of what stays is kept. Scales and opacities that are infinite become very small, very
 // large, or solid; rotations of length zero the identity. Throws Error{kInvalidArgument} when
 // nothing is left; `name` is that of the file.

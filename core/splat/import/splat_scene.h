@@ -1,5 +1,5 @@
 // A splat as a scene without photos: views chosen around it, and its Gaussians in grey, which need
-// no training (METHOD.md "A splat without photos").
+// no training (STILL.md "A splat without photos").
 #pragma once
 
 #include <cstdint>

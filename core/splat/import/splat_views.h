@@ -1,5 +1,5 @@
 // Where to look at a splat from, when nobody says: cameras around the place where most of the
-// Gaussians are, chosen from candidates by how much of the splat they see (METHOD.md "A splat
+// Gaussians are, chosen from candidates by how much of the splat they see (STILL.md "A splat
 // without photos"). Internal to this folder and tests.
 #pragma once
 

@@ -277,7 +277,7 @@ TEST_F(MovieTest, RefusesPathsThroughFilmsWithoutPoses) {
     scene_.views[i].cam_from_world = Pose{};
     scene_.views[i].moment = Moment{0.1 * i, 0};
   }
-  ASSERT_TRUE(scene_.IsFilm());
+  ASSERT_FALSE(scene_.capture().is_reconstructed);
   AddInput(artifact::kScene, SceneToJson(scene_));
   for (const Path path : {Path::kOrbit, Path::kPhotos, Path::kStill}) {
     EXPECT_THAT(Complaint({.path = path}), HasSubstr("this film has no poses"));

@@ -1,4 +1,4 @@
-// Where the camera of a movie stands, frame by frame (METHOD.md "Movies"). Pure functions.
+// Where the camera of a movie stands, frame by frame (EXPORT.md "Movies"). Pure functions.
 #pragma once
 
 #include <array>

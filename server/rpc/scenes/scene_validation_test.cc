@@ -145,7 +145,7 @@ TEST_F(SceneValidationTest, DetectsPosesWhereImportReadsThem) {
   files.emplace_back("transforms.json", "{\n\"frames\": oops}");
   EXPECT_THAT(Commit(files, &scene).error_message(),
               HasSubstr("transforms.json is not JSON: parse error at line 2"));
-  // Of files with equal bytes only the one that needs frames is refused for missing frames.
+  // If files are equal, only the one that needs frames is refused for missing frames.
   files = photos;
   files.emplace_back("transforms_test.json", R"({"frames": []})");
   files.emplace_back("transforms_train.json", R"({"frames": []})");
