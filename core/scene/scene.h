@@ -68,7 +68,7 @@ struct Scene {
   // for all views, which means none. kStatic without views.
   CaptureKind kind() const;
   const CaptureKindInfo& capture() const { return InfoOf(kind()); }
-  // Indices of all views; those of one time, or without one, in their order.
+  // Indices of all views in order of time; views of equal time, or without one, keep their order.
   std::vector<int> ViewsInOrderOfTime() const;
   // The distinct times of the views, seconds, ascending.
   std::vector<double> Times() const;

@@ -28,7 +28,7 @@ TEST(Scene, HoldsOutAndFindsViews) {
   EXPECT_THROW(Scene().FindView("a"), Error);
 }
 
-TEST(Scene, ExtentIsOfTrainingCameras) {
+TEST(Scene, ExtentUsesTrainingCameras) {
   Scene scene = ArcScene(3);
   for (int i = 0; i < 3; ++i) {
     scene.views[i].cam_from_world = {};
@@ -41,7 +41,7 @@ TEST(Scene, ExtentIsOfTrainingCameras) {
   EXPECT_EQ(Scene().Extent(), 1.0);
 }
 
-TEST(Scene, FramesOfOnePoseAreAFilmUntilTheyAreARelief) {
+TEST(Scene, FramesOfOnePoseAreFilmOrRelief) {
   Scene scene = ArcScene(3);
   for (View& view : scene.views) {
     view.cam_from_world = {};
@@ -86,7 +86,7 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST(Scene, BrokenJsonIsRefusedByField) {
+TEST(Scene, NamesFieldOfBrokenJson) {
   const std::string good = SceneToJson(ArcScene(3));
   EXPECT_EQ(Refusal([&] { SceneFromJson(good); }), "");
   const auto said = [&](const std::string& from, const std::string& to) {
