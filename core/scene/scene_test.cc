@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "tests/support/scenes/test_scenes.h"
 
@@ -126,6 +128,36 @@ TEST(Scene, OldFilesHaveScaleOne) {
       1.0);
   text.replace(text.find(field), field.size(), "\"world_from_scene_scale\":0,");
   EXPECT_THAT(Refusal([&] { SceneFromJson(text); }), HasSubstr("must be positive"));
+}
+
+TEST(Scene, JsonHasKindAndOlderFilesOpenWithoutIt) {
+  Scene photos = ArcScene(3), dynamic = photos;
+  for (View& view : dynamic.views) view.moment = Moment{0.1, 0};
+  Scene film = dynamic;
+  for (View& view : film.views) view.cam_from_world = {};
+  Scene relief = film;
+  relief.relief = Relief{0.3, 0.5, 4.0};
+  const std::pair<Scene, CaptureKind> cases[] = {{photos, CaptureKind::kStatic},
+                                                 {dynamic, CaptureKind::kDynamic},
+                                                 {film, CaptureKind::kFilm},
+                                                 {relief, CaptureKind::kRelief}};
+  for (const auto& [scene, kind] : cases) {
+    EXPECT_EQ(scene.kind(), kind);
+    const std::string text = SceneToJson(scene);
+    const std::string field = std::string("\"kind\":\"") + InfoOf(kind).name + "\",";
+    const size_t at = text.find(field);
+    ASSERT_NE(at, std::string::npos) << text.substr(0, 200);
+    EXPECT_EQ(SceneFromJson(text).kind(), kind);
+    EXPECT_EQ(SceneFromJson(std::string(text).erase(at, field.size())).kind(), kind);
+    for (const CaptureKindInfo& other : CaptureKinds()) {
+      if (other.kind == kind) continue;
+      const std::string wrong = std::string("\"kind\":\"") + other.name + "\",";
+      const std::string changed = std::string(text).replace(at, field.size(), wrong);
+      EXPECT_THAT(Refusal([&] { SceneFromJson(changed); }), HasSubstr("kind")) << other.name;
+    }
+    const std::string unknown = std::string(text).replace(at, field.size(), "\"kind\":\"rig\",");
+    EXPECT_THAT(Refusal([&] { SceneFromJson(unknown); }), HasSubstr("no kind of scene 'rig'"));
+  }
 }
 
 }  // namespace
