@@ -29,7 +29,7 @@ TEST(FrameNumbers, EveryTenthFrameLeavesNoGap) {
   EXPECT_THAT(gap.note, HasSubstr("1 frame is missing between f020.png and f040.png"));
 }
 
-TEST(FrameNumbers, TheNumberMayStandAnywhere) {
+TEST(FrameNumbers, FindsNumberAnywhereInName) {
   EXPECT_THAT(
       PlacesOfFrames({"r2/a1_v3.png", "r2/a2_v3.png", "r2/a3_v3.png", "r2/a5_v3.png"}).places,
       ElementsAre(0, 1, 2, 4));
@@ -37,7 +37,7 @@ TEST(FrameNumbers, TheNumberMayStandAnywhere) {
               ElementsAre(0, 1, 2, 4));
 }
 
-TEST(FrameNumbers, NamesWithoutOneNumberFollowEachOther) {
+TEST(FrameNumbers, NamesWithoutOneNumberAreConsecutive) {
   for (const std::vector<std::string>& names :
        {std::vector<std::string>{"a.png", "b.png", "d.png", "e.png"},
         {"a1.png", "a2.png", "b3.png", "b9.png"},
@@ -53,7 +53,7 @@ TEST(FrameNumbers, NamesWithoutOneNumberFollowEachOther) {
   }
 }
 
-TEST(FrameNumbers, ALeapIsNoGap) {
+TEST(FrameNumbers, LargeJumpIsNoGap) {
   const FrameNumbers numbers = PlacesOfFrames({"0001.png", "0002.png", "0003.png", "9001.png"});
   EXPECT_THAT(numbers.places, ElementsAre(0, 1, 2, 3));
   EXPECT_THAT(numbers.note,

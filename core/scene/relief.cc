@@ -10,9 +10,9 @@ double Relief::Depth(double row) const {
 }
 
 Relief ReliefBehind(std::vector<double> feet) {
-  constexpr double kFarthest = 0.1;  // quantile: limbs and shadows that were torn off aside
-  constexpr double kMargin = 0.02;   // nobody stands in the wall
-  constexpr double kHighest = 0.3, kLowest = 0.9;  // of the backdrop's foot
+  constexpr double kFarthest = 0.1;                // quantile, to ignore detached limbs and shadows
+  constexpr double kMargin = 0.02;                 // keeps feet off the backdrop
+  constexpr double kHighest = 0.3, kLowest = 0.9;  // limits for the backdrop's foot
   constexpr double kDepthRatio = 4.0;              // of the backdrop to the nearest ground
   Relief relief;
   if (!feet.empty()) {

@@ -22,14 +22,14 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// A model's views before their photos are looked at; image numbers by view.
+// Views of a model before their photos are looked up; image numbers by view.
 struct NamedViews {
   std::vector<uint32_t> images;
   std::vector<std::string> files;    // relative to the scene's folder, one for each image
-  std::vector<std::string> missing;  // names of photos that are not there
+  std::vector<std::string> missing;  // names of missing photos
 };
 
-// The views' moments, where a file tells times.
+// Sets the views' moments if there is a file of times.
 FrameMoments ReadMoments(const fs::path& scene_folder,
                          const NamedFiles& photos,
                          const std::vector<View>& views) {
@@ -85,7 +85,8 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
   return MomentsOf(frames);
 }
 
-// In the order of their photos' names, so that it does not depend on the numbers that COLMAP gave.
+// Orders views by the names of their photos, so that the result does not depend on COLMAP's
+// numbers.
 NamedViews NamesOf(const ColmapModel& model, const NamedFiles& photos) {
   std::vector<std::pair<std::string, uint32_t>> order;
   for (const auto& [id, image] : model.images) order.emplace_back(image.name, id);
@@ -126,7 +127,7 @@ NamedViews NamesOf(const ColmapModel& model, const NamedFiles& photos) {
   return named;
 }
 
-// What is left out, or an error where too little is left.
+// Warns of photos that are left out; throws if too few remain.
 void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>* warnings) {
   constexpr size_t kFewest = 2;
   if (named.images.size() < std::min(kFewest, total)) {
@@ -146,7 +147,7 @@ void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>
                   SomeOf(named.missing)));
 }
 
-// Of points that no photo is said to see, those into whose picture they fall count.
+// Points without tracks get the views whose picture they fall into.
 std::vector<SparsePoint> PointsOf(const ColmapModel& model,
                                   const std::map<uint32_t, int>& view_of_image,
                                   const Scene& scene) {

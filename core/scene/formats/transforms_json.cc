@@ -42,7 +42,7 @@ std::string NamesOf(const std::vector<Source>& sources) {
   return names;
 }
 
-// A frame and what its file names, before its photo is looked at.
+// A frame and the names in its file, before its photo is looked up.
 struct Frame {
   const json* root = nullptr;
   const json* frame = nullptr;
@@ -65,7 +65,7 @@ std::vector<Frame> FramesOf(const std::vector<Source>& sources) {
   return frames;
 }
 
-// The photo of each frame; empty where there is none.
+// Returns the photo of each frame; empty if there is none.
 std::vector<std::string> FilesOf(const std::vector<Frame>& frames, const fs::path& scene_folder) {
   std::vector<std::string> names;
   for (const Frame& frame : frames) names.push_back(frame.photo);
@@ -83,7 +83,7 @@ View ReadView(const FrameFields& fields, const std::string& file, const fs::path
   return view;
 }
 
-// When and by which camera, of the frame itself: no file says that of all its frames.
+// Time and camera of the frame itself; the top of a file has no defaults for them.
 FrameTime ReadTime(const json& frame, const std::string& place, const std::string& file) {
   const FrameFields own(frame, frame, place);
   FrameTime time{place, file, own.Number("time"), ""};

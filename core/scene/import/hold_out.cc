@@ -15,7 +15,7 @@ namespace {
 constexpr int64_t kFewestInBlock = 2;
 constexpr int64_t kFewestBeside = 2;
 
-// Times of which a view is learnt from.
+// Times of training views.
 std::set<double> TimesLearntFrom(const Scene& scene) {
   std::set<double> times;
   for (const int view : scene.TrainingViews()) times.insert(scene.views[view].time_s());
@@ -49,7 +49,7 @@ std::vector<HeldOutAs> HowHeldOut(const Scene& scene) {
   if (!AllHaveTimes(scene)) return how;
   const std::vector<double> times = scene.Times();
   const std::set<double> learnt_from = TimesLearntFrom(scene);
-  std::set<int> cameras;  // learnt from
+  std::set<int> cameras;  // of training views
   for (const int view : scene.TrainingViews()) cameras.insert(scene.views[view].moment->shot);
   const auto is_open = [&](std::ptrdiff_t i) {
     return i >= 0 && i < std::ssize(times) && !learnt_from.contains(times[i]);

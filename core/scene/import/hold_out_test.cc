@@ -37,7 +37,7 @@ std::string Said(double share, Scene scene) {
   return "";
 }
 
-TEST(HoldOutBlockTest, IsInTheMiddleWithAllCameras) {
+TEST(HoldOutBlockTest, IsInMiddleWithAllCameras) {
   Scene scene = SceneOf(3, 20);
   HoldOutBlock(0.2, &scene);
   for (const View& view : scene.views) {
@@ -46,7 +46,7 @@ TEST(HoldOutBlockTest, IsInTheMiddleWithAllCameras) {
   }
 }
 
-TEST(HoldOutBlockTest, IsRefusedWhereItLeavesTooLittle) {
+TEST(HoldOutBlockTest, IsRefusedIfTooFewMomentsRemain) {
   EXPECT_EQ(Said(0.5, SceneOf(2, 8)), "");
   EXPECT_THAT(Said(0.05, SceneOf(2, 20)),
               HasSubstr("0.05 of 20 moments, which is less than two of them; give 0.1 or more"));
@@ -79,7 +79,7 @@ TEST(HowHeldOutTest, TellsCamerasMomentsAndBlocksApart) {
   EXPECT_STREQ(NameOf(HeldOutAs::kBlock), "block");
 }
 
-TEST(HowHeldOutTest, ShotsOfAFilmAreNoCamerasAndPhotosHaveNoTag) {
+TEST(HowHeldOutTest, ShotsAreBlocksAndPhotosAreNot) {
   Scene film = SceneOf(1, 30, /*film=*/true);
   for (int t = 10; t < 20; ++t) film.views[t].held_out = true;  // a whole shot
   ASSERT_FALSE(film.capture().is_reconstructed);

@@ -35,8 +35,8 @@ constexpr uint64_t kRandomPointSeed = 1;
 constexpr int kHoldOutEvery = 8;
 constexpr size_t kMinTrainingViews = 2;
 
-// Where no point would be left, as without most of the photos that saw them, those count into whose
-// picture a point falls.
+// If no point would be left, e.g. because most photos that saw the points were removed, points get
+// the views whose picture they fall into.
 void DropWeakPoints(Scene* scene) {
   auto weak = [](const SparsePoint& point) { return point.views.size() < 2; };
   if (std::all_of(scene->points.begin(), scene->points.end(), weak)) {
@@ -75,7 +75,7 @@ void Normalise(ImportResult* result) {
   }
 }
 
-// Finds the photos' masks, for structure-from-motion already, and refuses bad ones.
+// Finds the masks of the photos, before structure-from-motion, and refuses bad ones.
 void FindPhotoMasks(const fs::path& scene_folder,
                     const CancellationToken& cancel,
                     std::vector<Photo>* photos,
@@ -177,8 +177,8 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
       fmt::format("{} photos have no pose and were left out: {}", unposed.size(), SomeOf(unposed)));
 }
 
-// The poses that lie beside the photos: of the kind that places most of them, COLMAP's before
-// others. False where there are none.
+// Reads the poses beside the photos: of the format that places most of them, COLMAP's if no other
+// places more. Returns false if there are none.
 bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
   const std::optional<ColmapChoice> colmap = ChooseColmapModel(scene_folder);
   const bool is_nerfies = IsNerfiesFolder(scene_folder);
@@ -233,8 +233,8 @@ void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
                       : "; transforms.json and metadata.json have times of their own"));
 }
 
-// Of a scene that may move, what all cameras took at every eighth moment from the fifth on: each
-// has moments before and after it.
+// Dynamic scenes: holds out the views of all cameras at every eighth moment from the fifth on, so
+// that each has moments before and after it.
 void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
   std::set<double> times;
   for (const View& view : scene->views) times.insert(view.time_s());
@@ -266,7 +266,7 @@ void HoldOutCamera(const std::string& camera, ImportResult* result) {
   for (View& view : result->scene.views) view.held_out |= view.moment && view.moment->shot == shot;
 }
 
-// Throws unless a scene whose frames have times shows what it is from several places.
+// Throws if the scene has times but all its frames are from one place.
 void CheckMoves(const Scene& scene) {
   if (scene.capture().is_reconstructed) return;
   throw InvalidArgument(
