@@ -210,8 +210,9 @@ class JobStore {
   // for a worker of another release than the server's.
   virtual std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) = 0;
   // A job of this kind to run beside those that the worker holds already: one that no worker was
-  // lost with, that no waiting job of another kind comes before, of the submitted job with the
-  // fewest running jobs, and that `accept` agrees to.
+  // lost with, that no waiting job of another kind comes before, and that `accept` agrees to.
+  // First those of the project with the fewest running jobs, then of the submitted job with the
+  // fewest.
   virtual std::optional<JobRecord> ClaimForBatch(
       const std::string& worker,
       int64_t lease_ms,

@@ -89,7 +89,7 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
     int64_t lease_ms,
     const std::string& kind,
     const std::function<bool(const JobRecord&)>& accept) {
-  // Scenes of one submitted job must not keep out another's.
+  // The jobs of one project do not keep out another's, nor those of one submitted job.
   constexpr char kCandidates[] =
       "where state='QUEUED' and kind=?1 and run_after_ms<=?2 and lost_attempts=0 and not exists("
       "select 1 from job o where o.state='QUEUED' and o.kind<>?1 and o.run_after_ms<=?2 and "
@@ -97,6 +97,7 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
       "not exists(select 1 from meta where meta.name in('hold_paused','hold_storage') and "
       "value<>0) "
       "order by priority, (select count(*) from job r where r.state='RUNNING' and "
+      "r.project=job.project), (select count(*) from job r where r.state='RUNNING' and "
       "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
       "limit 16";
   const auto choose = [&](SqliteDatabase& db) -> std::optional<int64_t> {

@@ -147,7 +147,7 @@ JobError Attempt::OutOfMemory(const std::exception& e) const {
 void Attempt::Prepare() {
   fs::remove_all(scratch_);
   run_.job_name = job_.name;
-  run_.submission = job_.parent.empty() ? job_.name : job_.parent;
+  run_.project = job_.project;
   run_.spec = ParseSpec(job_.spec, job_.name);
   run_.threads = context_.threads;
   run_.trace = job_.trace;
