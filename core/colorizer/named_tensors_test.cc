@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(NamedTensorsTest, TensorsThatDoNotFitAreNamed) {
+TEST(NamedTensorsTest, NamesTensorsThatDoNotFit) {
   TensorFile file;
   PutTensors({{"x", torch::ones({2, 3})}}, "net.", StoredType::kFloat16, &file);
   EXPECT_TRUE(file.half.contains("net.x"));
