@@ -87,7 +87,7 @@ TEST(KeyColorFromImageTest, RefusesUnrelatedPicture) {
   Image other(60, 40, 1);
   Random random(1);
   for (float& value : other.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
-  EXPECT_NE(MessageOf(other, SrgbFromLab(lab)).find("does not look like the key view"),
+  EXPECT_NE(MessageOf(other, SrgbFromLab(lab)).find("does not resemble the key view"),
             std::string::npos);
   // A negative of the picture is another picture, too.
   Image negative = LuminanceOfLab(lab);
