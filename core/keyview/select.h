@@ -65,7 +65,7 @@ struct KeyViewSelection {
   // Margin relative to the distance from the winner to the median of all views that take part,
   // 0..1; 1 if there is no other view.
   double decisiveness = 1.0;
-  std::vector<RankedView> ranking;  // best first, ties by index; views that were set aside last
+  std::vector<RankedView> ranking;  // best first, ties by index; excluded views last
   std::vector<std::string> warnings;
 };
 

@@ -112,7 +112,7 @@ TEST_F(AugmentationStageTest, IsRepeatableForSameSeed) {
 TEST_F(AugmentationStageTest, ReducesFilesToWorkingSize) {
   options_.samples = 0;
   options_.files = true;
-  EXPECT_THAT(Complaint(), HasSubstr("none in augment/"));
+  EXPECT_THAT(Complaint(), HasSubstr("no pictures in augment/"));
   Write("augment/sub/wide.jpg", EncodeJpeg(SrgbFromLab(Painting(300, 100))));
   Write("augment/a.png", EncodePng16(SrgbFromLab(Painting(64, 80))));
   const auto facts = Run();

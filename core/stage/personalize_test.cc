@@ -36,7 +36,7 @@ TEST_F(PersonalizeStageTest, ReportsKeyViewWithoutColor) {
   EXPECT_EQ(warnings_.text, "");
   AddInput(artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, 0.3f)));
   Personalize();
-  EXPECT_THAT(warnings_.text, AllOf(HasSubstr("hardly any colour"), HasSubstr("hints")));
+  EXPECT_THAT(warnings_.text, AllOf(HasSubstr("almost no colour"), HasSubstr("hints")));
 }
 
 TEST_F(PersonalizeStageTest, RefusesKeyColorOfAnotherShape) {
