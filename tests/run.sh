@@ -1,72 +1,39 @@
 #!/usr/bin/env bash
-# Builds Color3D and runs its tests. Installs what is missing (as root or with sudo).
-#   tests/run.sh              all gates, then the default suite: every test but those labelled slow, long,
-#                             chaos, soak and load
-#   tests/run.sh -L LABEL     all gates, then the tests with this label (tests/README.md lists them)
-#   tests/run.sh -R NAME      no gates: builds and runs the test programs that NAME, a regular expression,
-#                             matches; if there is none, the cases "Suite.Case" that it matches
-#   tests/run.sh --changed    quick gates, then the default tests of the folders that differ from the
-#                             branch main (on main: from the commit before)
-# -L fuzz builds with Clang in a folder of its own. BUILD_DIR names another build folder (default: build;
-# build-fuzz for -L fuzz). With CI=true nothing is asked or coloured.
+# Builds Color3D and runs its tests. Installs missing packages (as root or with sudo).
+#   tests/run.sh             checks of the sources, then the default suite: all tests but those with
+#                            the labels slow, long, chaos, soak, load and fuzz
+#   tests/run.sh -L LABEL    only the tests with this label (tests/README.md lists them); fuzz: in a
+#                            Clang build of its own
+#   tests/run.sh -R NAME     builds and runs only the test programs, suites or cases that match the
+#                            regular expression
+#   tests/run.sh --changed [REV]
+#                            builds and runs only the quick test programs of the folders that changed
+#                            since REV (default: since this branch left main)
+# BUILD_DIR: build folder (default: build; build-fuzz for the label fuzz). CI=true: no questions, no
+# colours.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-usage() { sed -n '2,11p' "$0" | cut -c3-; }
-label="" name="" changed=""
-while [ $# -gt 0 ]; do
-  case "$1" in
-    -L | -R)
-      [ $# -ge 2 ] || { usage >&2; exit 2; }
-      if [ "$1" = -L ]; then label=$2; else name=$2; fi
-      shift
-      ;;
-    --changed) changed=yes ;;
-    -h | --help) usage; exit 0 ;;
-    *) usage >&2; exit 2 ;;
-  esac
-  shift
-done
-not_default="slow|long|chaos|soak|load"
+label="" name="" changed="" since=""
+case "${1:-}" in
+  "") ;;
+  -L) label=${2:?"-L needs a label"} ;;
+  -R) name=${2:?"-R needs a regular expression"} ;;
+  --changed) changed=1 since=${2:-} ;;
+  -h | --help) sed -n '2,15p' "$0" | cut -c3-; exit 0 ;;
+  *) echo "run.sh: unknown option $1; see tests/run.sh --help" >&2; exit 2 ;;
+esac
 
-# A label without a test is an error. Tests that use every core run alone (RUN_SERIAL).
+# A label or name without tests is an error.
 run_tests() {
   local result=0
-  ctest --test-dir "$build" -j2 --output-on-failure --no-tests=error --timeout 900 "$@" || result=$?
-  # Programs of many cases pass though some were skipped.
+  ctest --test-dir "$build" --output-on-failure --no-tests=error --timeout 900 "$@" || result=$?
+  # A program passes although some of its cases were skipped: list them.
   grep -hE '^\[  SKIPPED \] .*\(' "$build/Testing/Temporary/LastTest.log" | sort -u || true
   return "$result"
 }
-
 configure() {
-  mkdir -p "$build"
-  cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCOLOR3D_TESTS=ON >"$build/configure.log" || {
-    cat "$build/configure.log" >&2
-    return 1
-  }
-}
-
-# "PROGRAM SOURCE" for each source of each test program, from Ninja's rules and CMake's unity files.
-test_sources() {
-  {
-    sed -nE 's|^build .*CMakeFiles/([A-Za-z0-9_]+(_test\|_replay\|_canary))\.dir/[^ ]*\.o: [^ ]+ ([^ ]+\.cc) .*|\1 \3|p' \
-      "$build/build.ninja"
-    find "$build" -path '*_test.dir/Unity/*.cxx' -exec grep -H '^#include' {} + |
-      sed -nE 's|.*/([A-Za-z0-9_]+)\.dir/Unity/[^:]*:#include "([^"]+)".*|\1 \2|p'
-  } | sed -E "s| $PWD/| |; s| \.\./| |" | sort -u
-}
-
-# Builds the programs named on standard input and runs their tests with the given CTest options.
-build_and_run() {
-  local programs all
-  mapfile -t programs
-  cmake --build "$build" --target "${programs[@]}"
-  # A program of cases has the tests that it lists; a fast one has one test of its own name.
-  all=$(for program in "${programs[@]}"; do
-    echo "$program"
-    "$build/bin/$program" --gtest_list_tests 2>/dev/null | sed -nE 's|^([A-Za-z0-9_]+)\.$|\1\\..*|p' || true
-  done | sort -u | paste -sd'|')
-  run_tests -R "^($all)\$" "$@"
+  cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCOLOR3D_TESTS=ON
 }
 
 if [ "$label" = fuzz ]; then
@@ -80,67 +47,41 @@ if [ "$label" = fuzz ]; then
 fi
 
 build=${BUILD_DIR:-build}
-if [ -n "$name" ]; then
-  configure
-  programs=$(test_sources | cut -d' ' -f1 | sort -u | grep -E -e "$name" || true)
-  if [ -n "$programs" ]; then
-    build_and_run <<<"$programs"
-    exit
-  fi
-  programs=$(test_sources | while read -r program source; do
-    if sed -nE 's/^TEST(_F|_P)?\((\w+), *(\w+)\).*/\2.\3/p' "$source" | grep -qE -e "$name"; then
-      echo "$program"
-    fi
-  done | sort -u)
-  if [ -z "$programs" ]; then
-    echo "run.sh: no test program and no case matches \"$name\"" >&2
-    exit 1
-  fi
-  # shellcheck disable=SC2086 # the programs are words
-  cmake --build "$build" --target $programs
-  for program in $programs; do
-    # Only the matching cases, also of a program that CTest runs as one test.
-    cases=$("$build/bin/$program" --gtest_list_tests | awk '/^[^ ]/ {suite = $1; next} {print suite $1}' |
-      grep -E -e "$name" | paste -sd:)
-    OMP_WAIT_POLICY=PASSIVE "$build/bin/$program" --gtest_filter="$cases"
-  done
-  exit
-fi
-
-if [ -n "$changed" ]; then
-  configure
-  base=$(git merge-base HEAD main 2>/dev/null || git rev-parse HEAD)
-  if [ "$base" = "$(git rev-parse HEAD)" ] && git diff --quiet HEAD; then
-    base=$(git rev-parse HEAD~1)
-  fi
-  tests/check_format.sh
-  tests/check_layers.sh
-  tests/check_docs.sh
-  folders=$({ git diff --name-only "$base"; git ls-files --others --exclude-standard; } | xargs -r -n1 dirname | sort -u)
-  programs=$(test_sources | while read -r program source; do
-    if grep -qxF "$(dirname "$source")" <<<"$folders"; then echo "$program"; fi
-  done | sort -u)
-  if [ -z "$programs" ]; then
-    echo "run.sh: no test program has sources in the changed folders:" ${folders:-none}
-    exit
-  fi
-  echo "run.sh: tests of the changed folders:" $programs "(without the labels $not_default)"
-  build_and_run -LE "^($not_default)\$" <<<"$programs"
-  exit
-fi
-
 deploy/install-deps.sh --tests
+if [ -n "$name$changed" ]; then
+  configure
+  if [ -n "$name" ]; then
+    targets=$(tests/test_targets.py "$build" --name "$name")
+  else
+    targets=$(tests/test_targets.py "$build" --changed "$since")
+  fi
+  [ -n "$targets" ] || { echo "run.sh: no test program matches" >&2; exit 1; }
+  # shellcheck disable=SC2086
+  cmake --build "$build" --target $targets
+  programs="^($(paste -sd'|' <<<"$targets"))\$"
+  if [ -n "$changed" ]; then
+    run_tests -j 2 -L "$programs" -L '^(fast|stability)$'
+  elif grep -qE "$name" <<<"$targets"; then
+    run_tests -L "$programs"
+  else  # cases; a quick program runs whole, as one test
+    run_tests -R "$name|$programs"
+  fi
+  exit
+fi
+
 tests/check_format.sh
 tests/check_layers.sh
 tests/check_docs.sh
 tests/check_proto.sh "$build"
-cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCOLOR3D_TESTS=ON
+configure
 cmake --build "$build"
 tests/check_includes.sh "$build"
 tests/check_tidy.sh "$build"
 tests/check_thread_safety.sh "$build"
 if [ -n "$label" ]; then
-  run_tests -L "^($label)\$"
+  run_tests -L "^$label\$"
 else
-  run_tests -LE "^($not_default)\$"
+  # Quick programs in pairs; others use every core and run one at a time.
+  run_tests -j 2 -L "^(fast|stability)\$"
+  run_tests -LE "^(fast|stability|slow|long|chaos|soak|load)\$"
 fi

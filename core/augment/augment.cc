@@ -223,7 +223,6 @@ float Sample(const float* plane, int stride, const Tap& x, const Tap& y) {
 
 AugmentOptions AugmentOptions::Paper() {
   AugmentOptions options;
-  options.crop_px = 320;
   options.min_scale = 1.0;
   options.max_scale = 1.0;
   options.luminance_jitter = 0.0;

@@ -150,6 +150,11 @@ std::array<float, 2> MeanAb(const Image& ab) {
 
 }  // namespace
 
+void ColorizerOptions::UsePaperRecipe() {
+  recipe = Recipe::kPaper;
+  crop_px = 320;
+}
+
 void ColorizerOptions::Validate() const {
   const RangeCheck check("colorizer option");
   check("iterations", iterations, 0, 100000);

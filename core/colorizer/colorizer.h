@@ -40,7 +40,7 @@ struct ColorizerOptions {
   // batch a scene also waits for its turns, which does not count).
   double time_limit_seconds = 0.0;
   int max_side_px = 400;            // of the key view during training, 64..2048
-  int crop_px = 256;                // 64..1024, clipped to the picture
+  int crop_px = 256;                // side of the training crops, 64..1024, clipped to the picture
   double learning_rate = 0.0;       // at the start of the schedule, 0..1; 0: the recipe's
   double consistency_weight = 0.0;  // the paper's A4 term, 0..1000; 0 = off
   // Exponential mean of the parameters over iterations, 0..0.9999; 0 = off. The better one of mean
@@ -53,6 +53,8 @@ struct ColorizerOptions {
   int adapter_stages = -1;
   double decoder_width = 1.0;  // factor on the decoder's channels, 0.25..4
   uint64_t seed = 1;
+  // Sets the recipe and its crop of 320 px.
+  void UsePaperRecipe();
   void Validate() const;
   bool operator==(const ColorizerOptions&) const = default;
 };
