@@ -14,7 +14,7 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kMinAngle = 3.0 * kDegree;
 constexpr double kMaxAngle = 12.0 * kDegree;
 constexpr double kDepthRange = 3.0;
-// Of the normal equations' eigenvalues: below it the axes are as good as parallel.
+// Minimum ratio of the eigenvalues of the normal equations; below, the axes count as parallel.
 constexpr double kMinConditioning = 1e-3;
 
 Eigen::Vector3d AxisOf(const Pose& pose) {
@@ -66,7 +66,7 @@ Pose OrbitPose(const Pose& cam_from_world,
                const Eigen::Vector3d& center,
                double azimuth,
                double elevation) {
-  // In the camera's frame the scene turns the other way: x right, y down.
+  // In the camera's frame (x right, y down) the scene turns the other way.
   const Eigen::Quaterniond turn = Eigen::AngleAxisd(elevation, Eigen::Vector3d::UnitX()) *
                                   Eigen::AngleAxisd(azimuth, Eigen::Vector3d::UnitY());
   const Eigen::Vector3d pivot = cam_from_world.Apply(center);

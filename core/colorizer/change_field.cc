@@ -12,12 +12,12 @@
 namespace color3d {
 namespace {
 
-constexpr double kUnknownApart = 0.8;  // of places in space from those whose position is not known
+constexpr double kUnknownApart = 0.8;  // distance of known positions from unknown ones
 constexpr double kLeastWeight = 0.05;
-constexpr double kSamePlace = 0.75;  // of the most that two places can be alike
+constexpr double kSamePlace = 0.75;  // share of the maximum covariance
 constexpr double kWorthInferring = 1e-5;
 
-// Places that are not known lie together, away from all others.
+// Unknown positions coincide, away from all known ones.
 torch::Tensor InSpace(const torch::Tensor& positions) {
   const torch::Tensor known = positions.slice(1, 3, 4);
   return torch::cat({positions.slice(1, 0, 3) * known, (1.0 - known) * kUnknownApart}, 1);
@@ -30,13 +30,13 @@ FieldPlaces Rows(const FieldPlaces& places, const torch::Tensor& rows) {
           places.seen.index_select(0, rows)};
 }
 
-// The mean of the wanted colours, the most alike first.
+// Mean of the wanted colours, weighted by similarity.
 torch::Tensor WantedNear(const torch::Tensor& alike, const torch::Tensor& wanted) {
   const torch::Tensor weights = alike.square();
   return torch::matmul(weights, wanted) / weights.sum(1, /*keepdim=*/true).clamp_min(1e-12);
 }
 
-// `change` as far as it leads towards `limit`, and not beyond; rows are pairs.
+// Returns the part of `change` that leads towards `limit`, at most up to it. Rows are (a, b).
 torch::Tensor UpTo(const torch::Tensor& limit, const torch::Tensor& change) {
   const torch::Tensor length = change.square().sum(1, /*keepdim=*/true).clamp_min(1e-9);
   return change * ((limit * change).sum(1, /*keepdim=*/true) / length).clamp(0.0, 1.0);
@@ -93,7 +93,7 @@ std::vector<ChangeField::Proposal> ChangeField::Propose(const FieldPlaces& place
                                                         const torch::Tensor& deviation,
                                                         int count) const {
   const torch::Tensor scale = deviation.unsqueeze(1) * deviation.unsqueeze(0);
-  // What is known of each place from the others, after what was painted.
+  // Posterior covariance of the places, given the painted ones.
   torch::Tensor covariance = Alike(places, places);
   if (inverse_.defined()) {
     const torch::Tensor alike = Alike(places, places_);

@@ -12,7 +12,7 @@ namespace color3d {
 namespace {
 
 constexpr double kWeightFloor = 1e-6;
-constexpr double kMostlyKnown = 0.5;  // share of a cell whose position is known
+constexpr double kMostlyKnown = 0.5;  // minimum share of a cell with known positions
 
 }  // namespace
 
@@ -44,7 +44,7 @@ KnownCells CellsOf(const TapEncoder& encoder,
     cells.weights = torch::ones({count});
     return cells;
   }
-  // Each pixel counts by its weight.
+  // Weighted mean over the pixels.
   const torch::Tensor weight = PaddedTensor(picture.weight);
   const torch::Tensor mean_weight = CellMeans(weight);
   cells.colors = CellMeans(PaddedTensor(color) * weight) / mean_weight.clamp_min(kWeightFloor);

@@ -21,12 +21,12 @@ namespace color3d {
 namespace {
 
 constexpr uint64_t kSeed = 1;
-constexpr int64_t kMostObserved = 800;  // cells of all corrections together
-constexpr int64_t kFewest = 8;          // of each
-constexpr double kTouched = 0.02;       // share of a cell that was painted, to count
-constexpr double kChanged = 3.0;        // Lab units: less is as it was
-// The expected error of a colour, squared, grows with the square of the distance to what was
-// learnt, up to so many times its median.
+constexpr int64_t kMostObserved = 800;  // maximum number of cells over all corrections
+constexpr int64_t kFewest = 8;          // minimum number of cells of each correction
+constexpr double kTouched = 0.02;       // minimum painted share of a cell
+constexpr double kChanged = 3.0;        // minimum change of colour, Lab units
+// The expected squared error of a colour grows with the squared distance to the training cells, up
+// to this multiple of its median.
 constexpr double kLeastVariance = 0.1;
 constexpr double kMostUnlike = 4.0;
 
@@ -46,8 +46,8 @@ torch::Tensor SeenOf(const Image& seen, int64_t count) {
                       : CellMeans(PaddedTensor(seen)).squeeze(1).contiguous();
 }
 
-// Rows to observe: half of them where something changes, so that what the user left as it was
-// counts as well but never outweighs it.
+// Rows to observe. Half of them lie where the colour changes, so that colours that the user kept
+// count too but do not outweigh the changes.
 torch::Tensor RowsToObserve(const torch::Tensor& change,
                             const torch::Tensor& weights,
                             int64_t most,
@@ -77,7 +77,7 @@ std::vector<float> Values(const torch::Tensor& tensor) {
   return {flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel()};
 }
 
-// The expected error of each place's colour.
+// Expected error of the colour of each place.
 torch::Tensor Deviation(const std::vector<float>& unlike) {
   std::vector<float> sorted = unlike;
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
@@ -107,7 +107,7 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
     const Correction& correction = corrections[number];
     const PlacedPicture small = AtSide(correction.picture, max_side_px_);
     const int width = small.luminance.width, height = small.luminance.height;
-    // What is there and what is wanted, where it was painted.
+    // Current and target colours of painted places.
     const auto cells_of = [&](const Image& ab) {
       TrainingPicture picture{"",
                               small.luminance,
@@ -121,7 +121,8 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
     const torch::Tensor rows = RowsToObserve(
         cells.colors - before, cells.weights, std::max(2 * kFewest, kMostObserved / count), random);
     if (rows.size(0) == 0) {
-      throw InvalidArgument("correction {} of {} paints too little to be seen", number + 1, count);
+      throw InvalidArgument(
+          "correction {} of {} paints too small an area; paint a larger one", number + 1, count);
     }
     const KnownCells observed = Select(cells, rows);
     features.push_back(learnt_.whitening().Apply(observed.blocks));
@@ -186,7 +187,7 @@ PlaceSample PersonalCorrector::Sample(const FieldPlaces& places,
                                       int wanted) const {
   const auto x = [&](int64_t cell) { return (cell % columns + 0.5) * kCellPx / luminance.width; };
   const auto y = [&](int64_t cell) { return (cell / columns + 0.5) * kCellPx / luminance.height; };
-  std::vector<int64_t> inside;  // not in the border that was added
+  std::vector<int64_t> inside;  // outside the padding
   for (int64_t cell = 0; cell < places.seen.size(0); ++cell) {
     if (x(cell) < 1.0 && y(cell) < 1.0) inside.push_back(cell);
   }

@@ -11,15 +11,15 @@ namespace color3d {
 namespace {
 
 constexpr int kBlockPx = 8;
-// Of a block: sensor noise and JPEG ringing in a black or white area stay below.
+// Deviation of a block, above that of sensor noise and JPEG ringing in black or white areas.
 constexpr double kFlatDeviation = 0.8;
-// Of a whole frame that shows nothing.
+// Deviation of a blank frame.
 constexpr double kBlankDeviation = 1.5;
 // Shares of the scene's median. A sharp view of a plain corner keeps half; a blur of 1 % of the
 // picture's width leaves a quarter of the detail; a frame half covered has half of the structure.
 constexpr double kMinDetail = 0.33;
 constexpr double kMinStructure = 0.66;
-// Photographs reduced to some hundred px have 0.8 and more.
+// Photographs reduced to a few hundred px have at least 0.8.
 constexpr double kNoiseCorrelation = 0.4;
 
 struct Moments {
@@ -88,7 +88,7 @@ double MedianOf(const std::vector<FrameContent>& frames, Field field) {
   return Median(std::move(values));
 }
 
-// The medians of some frames.
+// Medians over frames.
 struct Usual {
   double detail = 0.0;
   double structure = 0.0;

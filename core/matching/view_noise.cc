@@ -11,8 +11,8 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kCellsOfPair = 1000;
-constexpr double kReach = 0.03;      // radii of the scene, about a cell
-constexpr int64_t kMinPairs = 2000;  // some times the channels of a block
+constexpr double kReach = 0.03;      // maximum distance, in radii of the scene; about a cell
+constexpr int64_t kMinPairs = 2000;  // several times the channels of a block
 
 torch::Tensor PlacedRows(const torch::Tensor& positions) {
   return (positions.select(1, 3) > 0.5).nonzero().squeeze(1);
@@ -50,7 +50,7 @@ void ViewNoise::Add(const PlacedCells& x, const PlacedCells& y, Random& random) 
 std::vector<torch::Tensor> ViewNoise::Covariances() const {
   if (pairs_ < kMinPairs) return {};
   std::vector<torch::Tensor> covariances;
-  // Of a difference twice that of one view.
+  // The variance of a difference is twice that of one view.
   for (const torch::Tensor& moment : moments_) {
     covariances.push_back(moment / (2.0 * static_cast<double>(pairs_)));
   }
