@@ -139,7 +139,7 @@ bool Backoff::Wait(const CancellationToken& cancel, milliseconds at_least) {
 bool FullServerWait::Wait(const RpcError& error, const std::function<bool()>& keep_going) {
   const auto now = steady_clock::now();
   if (!error.IsTurnedAway() || now - since_ > kPatienceWithFullServer) return false;
-  connection_.SayWait(error);
+  connection_.ReportWait(error);
   while (steady_clock::now() < now + error.RetryDelay()) {
     if (keep_going && !keep_going()) return true;
     if (!keep_going) connection_.cancel().ThrowIfCancelled();
@@ -185,7 +185,7 @@ Connection::Connection(const ServerTarget& server, const CancellationToken& canc
   bytes_ = google::bytestream::ByteStream::NewStub(channel_);
 }
 
-void Connection::SayWait(const RpcError& error) const {
+void Connection::ReportWait(const RpcError& error) const {
   if (!on_wait_) return;
   on_wait_(std::string(error.what()) + " (waiting " + std::to_string(error.RetryDelay().count()) +
            " s)");

@@ -71,7 +71,7 @@ class Connection {
   // Returns a Backoff with the target's patience.
   Backoff NewBackoff() const { return Backoff(patience_); }
   // Reports the wait for a busy server to on_wait.
-  void SayWait(const RpcError& error) const;
+  void ReportWait(const RpcError& error) const;
 
   v1::SceneService::Stub& scenes() { return *scenes_; }
   v1::JobService::Stub& jobs() { return *jobs_; }

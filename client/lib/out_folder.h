@@ -11,7 +11,7 @@ namespace color3d::client {
 // Returns out/NAME and creates its folder. `out` itself may be a symbolic link; folders below it
 // may not. Throws Error{kDataLoss} if the name is not a safe relative path, kFailedPrecondition if
 // a folder in the path is a symbolic link or a file, or cannot be created.
-std::filesystem::path PlaceBelow(const std::filesystem::path& out, const std::string& name);
+std::filesystem::path SafePathBelow(const std::filesystem::path& out, const std::string& name);
 
 // Removes `path` unless it is a regular file with a single name, so that opening it for writing
 // changes no other file.

@@ -15,10 +15,10 @@ class OutFolderTest : public testing::Test {
     fs::create_directory(out_);
     fs::create_directory(elsewhere_);
   }
-  // What PlaceBelow throws for the name; empty when it throws nothing.
+  // What SafePathBelow throws for the name; empty when it throws nothing.
   std::string Refusal(const std::string& name) {
     try {
-      PlaceBelow(out_, name);
+      SafePathBelow(out_, name);
       return "";
     } catch (const Error& e) {
       return e.what();
@@ -30,9 +30,9 @@ class OutFolderTest : public testing::Test {
 };
 
 TEST_F(OutFolderTest, CreatesFolders) {
-  EXPECT_EQ(PlaceBelow(out_, "a/b/c.png"), out_ / "a/b/c.png");
+  EXPECT_EQ(SafePathBelow(out_, "a/b/c.png"), out_ / "a/b/c.png");
   EXPECT_TRUE(fs::is_directory(out_ / "a/b"));
-  EXPECT_EQ(PlaceBelow(out_, "a/b/d.png"), out_ / "a/b/d.png");
+  EXPECT_EQ(SafePathBelow(out_, "a/b/d.png"), out_ / "a/b/d.png");
 }
 
 TEST_F(OutFolderTest, RefusesNamesThatLeaveFolder) {
@@ -54,7 +54,7 @@ TEST_F(OutFolderTest, RefusesLinkBelowFolder) {
 
 TEST_F(OutFolderTest, FolderItselfMayBeLink) {
   fs::create_directory_symlink(elsewhere_, scratch_.path() / "link");
-  EXPECT_EQ(PlaceBelow(scratch_.path() / "link", "a/b"), scratch_.path() / "link/a/b");
+  EXPECT_EQ(SafePathBelow(scratch_.path() / "link", "a/b"), scratch_.path() / "link/a/b");
   EXPECT_TRUE(fs::is_directory(elsewhere_ / "a"));
 }
 

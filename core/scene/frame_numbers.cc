@@ -74,7 +74,7 @@ int64_t StepOf(const std::vector<int64_t>& numbers) {
 
 }  // namespace
 
-FrameNumbers PlacesOfFrames(const std::vector<std::string>& names) {
+FrameNumbers FramePositions(const std::vector<std::string>& names) {
   FrameNumbers result;
   result.places.resize(names.size());
   std::iota(result.places.begin(), result.places.end(), int64_t{0});

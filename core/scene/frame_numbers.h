@@ -16,6 +16,6 @@ struct FrameNumbers {
 // nearly always grows by the same step, gaps in it are missing frames and keep their time. Pictures
 // count as consecutive if the names have no such number, or if more frames would be missing than
 // there are; the note says so.
-FrameNumbers PlacesOfFrames(const std::vector<std::string>& names);
+FrameNumbers FramePositions(const std::vector<std::string>& names);
 
 }  // namespace color3d

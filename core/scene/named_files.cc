@@ -144,7 +144,7 @@ std::string ViewNameOf(std::string_view file) {
   return std::string(file);
 }
 
-std::string SomeOf(const std::vector<std::string>& names, size_t most) {
+std::string SummarizeNames(const std::vector<std::string>& names, size_t most) {
   std::string text;
   for (size_t i = 0; i < std::min(names.size(), most); ++i) {
     text += (i == 0 ? "" : ", ") + names[i];

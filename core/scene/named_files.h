@@ -50,6 +50,6 @@ class NamedFiles {
 std::string ViewNameOf(std::string_view file);
 
 // "a, b, c and 4 more"; at most `most` names.
-std::string SomeOf(const std::vector<std::string>& names, size_t most = 5);
+std::string SummarizeNames(const std::vector<std::string>& names, size_t most = 5);
 
 }  // namespace color3d

@@ -83,8 +83,8 @@ TEST(NamedFiles, FindsNothingOutsideOfScene) {
 TEST(NamedFiles, ViewNamesAreShort) {
   EXPECT_EQ(ViewNameOf("images/l/a.jpg"), "l/a.jpg");
   EXPECT_EQ(ViewNameOf("train/a.jpg"), "train/a.jpg");
-  EXPECT_EQ(SomeOf({"a", "b"}), "a, b");
-  EXPECT_EQ(SomeOf({"a", "b", "c", "d"}, 2), "a, b and 2 more");
+  EXPECT_EQ(SummarizeNames({"a", "b"}), "a, b");
+  EXPECT_EQ(SummarizeNames({"a", "b", "c", "d"}, 2), "a, b and 2 more");
 }
 
 }  // namespace

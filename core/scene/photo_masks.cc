@@ -115,7 +115,7 @@ std::vector<std::string> FindMasks(const fs::path& scene_folder,
         "(a.png or a.jpg.png for a.jpg)",
         unused.size(),
         files.all().size(),
-        SomeOf(unused)));
+        SummarizeNames(unused)));
   }
   return masks;
 }

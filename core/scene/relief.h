@@ -23,9 +23,9 @@ struct Relief {
 // Places moving objects on the ground in front of the backdrop. `feet`: rows where they touch the
 // ground, any order; if empty, the backdrop's foot is slightly below the middle. The lowest row of
 // the picture is never nearer than a quarter of the backdrop's depth.
-Relief ReliefBehind(std::vector<double> feet);
+Relief FitRelief(std::vector<double> feet);
 
 // Returns about `count` points on it, one for each cell of a regular grid on the picture.
-std::vector<Eigen::Vector3d> PointsOn(const Relief& relief, const Camera& camera, int count);
+std::vector<Eigen::Vector3d> ReliefPoints(const Relief& relief, const Camera& camera, int count);
 
 }  // namespace color3d

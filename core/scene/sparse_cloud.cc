@@ -38,7 +38,7 @@ bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
   return view.camera.Contains(view.camera.Project(p));
 }
 
-std::vector<int> AllThatFace(const Scene& scene, const Eigen::Vector3d& world, double near) {
+std::vector<int> AllViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
   std::vector<int> views;
   for (size_t i = 0; i < scene.views.size(); ++i) {
     if (Sees(scene.views[i], world, near)) views.push_back(static_cast<int>(i));
@@ -93,8 +93,8 @@ Eigen::Vector3d FocusPoint(const Scene& scene) {
   return MostLookAt(scene, focus) ? focus : fallback;
 }
 
-std::vector<int> ViewsThatFace(const Scene& scene, const Eigen::Vector3d& world, double near) {
-  return EvenlyOf(AllThatFace(scene, world, near), kMaxListedViews);
+std::vector<int> ViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
+  return EvenlyOf(AllViewsFacing(scene, world, near), kMaxListedViews);
 }
 
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed) {
@@ -122,7 +122,7 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     const double v = random.NextUniform(0.0, view.camera.height);
     SparsePoint point;
     point.position = view.cam_from_world.WorldFromCamera(z * view.camera.Ray(u, v));
-    point.views = AllThatFace(scene, point.position, near);
+    point.views = AllViewsFacing(scene, point.position, near);
     const bool relaxed = attempt >= patience;
     if (point.views.size() < (relaxed ? 1 : std::min(wanted_views, scene.views.size()))) continue;
     point.views = EvenlyOf(std::move(point.views), kMaxListedViews);

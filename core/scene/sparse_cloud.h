@@ -15,11 +15,11 @@ Eigen::Vector3d FocusPoint(const Scene& scene);
 
 // Returns the views, ascending, whose picture contains a point that is farther than `near` (scene
 // units) from them; if there are more than 64, an even selection, to bound the size of long films.
-std::vector<int> ViewsThatFace(const Scene& scene, const Eigen::Vector3d& world, double near);
+std::vector<int> ViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near);
 
 // Returns up to `count` points that at least two views, or a quarter of them if that is more, see:
 // on random pixels, uniform in inverse depth around the focus. Deterministic for a seed. Each lists
-// ViewsThatFace; the reprojection error is -1 (unknown).
+// ViewsFacing; the reprojection error is -1 (unknown).
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed);
 
 }  // namespace color3d

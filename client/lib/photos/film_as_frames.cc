@@ -49,7 +49,7 @@ void RequireColor(FilmReader* film, int frames, const std::string& name) {
 
 }  // namespace
 
-FilmAsFrames TakeFramesOfFilm(const PhotoFolder& folder,
+FilmAsFrames DecodeFilmFrames(const PhotoFolder& folder,
                               std::optional<double> end_s,
                               const fs::path& scratch,
                               const CancellationToken& cancel,

@@ -23,7 +23,7 @@ struct FilmAsFrames {
 // server would. Damaged frames are left out, with a note; so are irregular times. `on_frame`:
 // frames done, of the total. Throws Error{kInvalidArgument} as FilmReader, for more than
 // kMostBenchmarkFrames frames, for monochrome frames, and for fewer than three.
-FilmAsFrames TakeFramesOfFilm(const PhotoFolder& folder,
+FilmAsFrames DecodeFilmFrames(const PhotoFolder& folder,
                               std::optional<double> end_s,
                               const std::filesystem::path& scratch,
                               const CancellationToken& cancel,

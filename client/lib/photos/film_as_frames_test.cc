@@ -41,7 +41,7 @@ class FilmAsFramesTest : public testing::Test {
     return file;
   }
   FilmAsFrames Take(std::optional<double> end_s = std::nullopt) {
-    return TakeFramesOfFilm(CollectPhotos(folder_.path() / "film.mp4"),
+    return DecodeFilmFrames(CollectPhotos(folder_.path() / "film.mp4"),
                             end_s,
                             scratch_.path(),
                             CancellationToken(),

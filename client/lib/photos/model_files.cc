@@ -168,7 +168,7 @@ void AddNerfiesFiles(const fs::path& root, std::vector<LocalFile>* files) {
   }
 }
 
-std::set<std::string> FoldersThatTransformsNames(const fs::path& root) {
+std::set<std::string> FoldersInTransforms(const fs::path& root) {
   std::set<std::string> folders;
   for (const std::string& file : TransformsIn(root)) {
     const json transforms = ReadTransforms(root / file);

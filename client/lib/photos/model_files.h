@@ -20,7 +20,7 @@ void AddNerfiesFiles(const std::filesystem::path& root, std::vector<LocalFile>* 
 // Returns the folders below `root` that transforms.json, or Blender's transforms_train.json and the
 // like, names. Empty without such a file. Throws Error{kInvalidArgument} that names a file that is
 // not JSON or has no frames.
-std::set<std::string> FoldersThatTransformsNames(const std::filesystem::path& root);
+std::set<std::string> FoldersInTransforms(const std::filesystem::path& root);
 
 // Returns the folder that becomes images/ of the scene: `images`, ignoring case; empty if there is
 // none.

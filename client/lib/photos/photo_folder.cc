@@ -76,7 +76,7 @@ void CollectNerfies(const fs::path& root, PhotoFolder* result, PassedOver* passe
 // the poses of their cameras, if there is one. Empty if there is only one film.
 void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
   std::set<std::string> folders = {""};
-  folders.merge(FoldersThatTransformsNames(root));
+  folders.merge(FoldersInTransforms(root));
   std::vector<LocalFile> films;
   std::error_code none;
   for (const std::string& folder : folders) {
@@ -91,7 +91,7 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
   std::ranges::sort(films, {}, &LocalFile::path);
   // If a file names or counts the films, the server reports copies.
   const bool are_named = IsFile(root / kTransformsFile) || IsFile(root / kPosesBoundsFile);
-  if (!are_named) LeaveOutCopies(&films, &result->notes);
+  if (!are_named) RemoveCopies(&films, &result->notes);
   if (films.size() == 1) result->film = films[0];
   if (films.size() > 1) result->camera_films = std::move(films);
 }
@@ -118,7 +118,7 @@ void CollectImages(const fs::path& root, PhotoFolder* result, PassedOver* passed
   if (!result->photos.empty()) return;
   AddPhotos(root, "", /*with_subfolders=*/false, result, passed_over);
   std::vector<std::string> used;
-  for (const std::string& folder : FoldersThatTransformsNames(root)) {
+  for (const std::string& folder : FoldersInTransforms(root)) {
     used.push_back(folder.substr(0, folder.find('/')));
     if (IsFolder(root / folder)) {
       AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);

@@ -69,7 +69,7 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
     none.note = fmt::format(
         "{} names no photo as the COLMAP model does ({}): the scene is taken to stand still",
         kTimesFile,
-        SomeOf(without, 3));
+        SummarizeNames(without, 3));
     return none;
   }
   if (!without.empty()) {
@@ -79,7 +79,7 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
         kTimesFile,
         without.size(),
         views.size(),
-        SomeOf(without, 3),
+        SummarizeNames(without, 3),
         frames[0].file);
   }
   return MomentsOf(frames);
@@ -136,7 +136,7 @@ void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>
         "the photos that the poses were computed from",
         total,
         named.images.size(),
-        SomeOf(named.missing));
+        SummarizeNames(named.missing));
   }
   if (named.missing.empty() || warnings == nullptr) return;
   warnings->push_back(
@@ -144,7 +144,7 @@ void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>
                   "were left out: {}",
                   named.missing.size(),
                   total,
-                  SomeOf(named.missing)));
+                  SummarizeNames(named.missing)));
 }
 
 // Points without tracks get the views whose picture they fall into.
@@ -169,7 +169,7 @@ std::vector<SparsePoint> PointsOf(const ColmapModel& model,
     point.views.assign(views.begin(), views.end());
     if (from.image_ids.empty()) {
       point.reprojection_error_px = -1.0;
-      point.views = ViewsThatFace(scene, point.position, 0.0);
+      point.views = ViewsFacing(scene, point.position, 0.0);
     }
     points.push_back(std::move(point));
   }
@@ -262,7 +262,7 @@ std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
         "there are {} COLMAP models; the one in {} is used, since it has most photos ({})",
         counts.size(),
         Shown(choice->folder),
-        SomeOf(counts, 8)));
+        SummarizeNames(counts, 8)));
   }
   return choice;
 }

@@ -91,7 +91,7 @@ std::optional<Eigen::Affine3d> AppliedTransform(const json& transforms) {
 double ShareSeen(const Scene& scene, const Positions& points, const Eigen::Affine3d& transform) {
   size_t seen = 0;
   for (const Eigen::Vector3d& point : points) {
-    seen += ViewsThatFace(scene, transform * point, 0.0).size() >= kFewestViews;
+    seen += ViewsFacing(scene, transform * point, 0.0).size() >= kFewestViews;
   }
   return static_cast<double>(seen) / static_cast<double>(std::max<size_t>(1, points.size()));
 }
@@ -143,7 +143,7 @@ std::vector<SparsePoint> ReadGivenPoints(const json& transforms,
     point.position = transform * position;
     if (!point.position.allFinite()) continue;
     point.reprojection_error_px = -1.0;
-    point.views = ViewsThatFace(scene, point.position, 0.0);
+    point.views = ViewsFacing(scene, point.position, 0.0);
     if (point.views.size() >= kFewestViews) points.push_back(std::move(point));
   }
   Warn(warnings,

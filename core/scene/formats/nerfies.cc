@@ -147,7 +147,7 @@ std::vector<SparsePoint> ReadPoints(const fs::path& scene_folder, const Scene& s
   for (size_t i = 0; i < points.size(); ++i) {
     points[i].position = Eigen::Map<const Eigen::Vector3d>(&array.values[3 * i]);
     points[i].reprojection_error_px = -1.0;
-    points[i].views = ViewsThatFace(scene, points[i].position, 0.0);
+    points[i].views = ViewsFacing(scene, points[i].position, 0.0);
   }
   return points;
 }
@@ -204,7 +204,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
                     missing.size(),
                     frames.size(),
                     kMetadata,
-                    SomeOf(missing)));
+                    SummarizeNames(missing)));
   }
   if (cameras != nullptr) *cameras = std::move(moments.cameras);
   std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {

@@ -104,7 +104,7 @@ void NoteMissing(const std::vector<std::string>& missing,
         file_name,
         total,
         found,
-        missing.empty() ? "" : fmt::format(" (missing: {})", SomeOf(missing)));
+        missing.empty() ? "" : fmt::format(" (missing: {})", SummarizeNames(missing)));
   }
   if (missing.empty() || warnings == nullptr) return;
   warnings->push_back(
@@ -113,7 +113,7 @@ void NoteMissing(const std::vector<std::string>& missing,
                   missing.size(),
                   total,
                   file_name,
-                  SomeOf(missing)));
+                  SummarizeNames(missing)));
 }
 
 void RefuseTwice(const std::vector<Frame>& frames,

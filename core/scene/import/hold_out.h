@@ -18,7 +18,7 @@ enum class HeldOutAs {
 const char* NameOf(HeldOutAs how);
 
 // Returns one entry for each view. Shots of a film without poses do not count as cameras.
-std::vector<HeldOutAs> HowHeldOut(const Scene& scene);
+std::vector<HeldOutAs> HeldOutKinds(const Scene& scene);
 
 // Holds out all views of a run of moments in the middle of the scene's time: `share`, 0..0.5, of
 // all moments. Call it after all other ways of holding out. Throws Error{kInvalidArgument} with the

@@ -41,7 +41,7 @@ void DropWeakPoints(Scene* scene) {
   auto weak = [](const SparsePoint& point) { return point.views.size() < 2; };
   if (std::all_of(scene->points.begin(), scene->points.end(), weak)) {
     for (SparsePoint& point : scene->points) {
-      if (point.position.allFinite()) point.views = ViewsThatFace(*scene, point.position, 0.0);
+      if (point.position.allFinite()) point.views = ViewsFacing(*scene, point.position, 0.0);
     }
   }
   scene->points.erase(std::remove_if(scene->points.begin(), scene->points.end(), weak),
@@ -159,7 +159,7 @@ void ImportPhotos(const fs::path& scene_folder,
                   few ? "only " : "",
                   result->scene.views.size(),
                   photos.size(),
-                  SomeOf(sfm.unplaced)));
+                  SummarizeNames(sfm.unplaced)));
 }
 
 void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
@@ -173,8 +173,8 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
     if (!std::binary_search(files.begin(), files.end(), photo.file)) unposed.push_back(photo.name);
   }
   if (unposed.empty()) return;
-  result->warnings.push_back(
-      fmt::format("{} photos have no pose and were left out: {}", unposed.size(), SomeOf(unposed)));
+  result->warnings.push_back(fmt::format(
+      "{} photos have no pose and were left out: {}", unposed.size(), SummarizeNames(unposed)));
 }
 
 // Reads the poses beside the photos: of the format that places most of them, COLMAP's if no other
@@ -260,14 +260,14 @@ void HoldOutCamera(const std::string& camera, ImportResult* result) {
   if (found == result->cameras.end()) {
     throw InvalidArgument("hold_out_camera: there is no camera '{}'; the scene has {}",
                           camera,
-                          SomeOf(result->cameras, 8));
+                          SummarizeNames(result->cameras, 8));
   }
   const int shot = static_cast<int>(found - result->cameras.begin());
   for (View& view : result->scene.views) view.held_out |= view.moment && view.moment->shot == shot;
 }
 
 // Throws if the scene has times but all its frames are from one place.
-void CheckMoves(const Scene& scene) {
+void RequireSeveralPositions(const Scene& scene) {
   if (scene.capture().is_reconstructed) return;
   throw InvalidArgument(
       "the frames are all of one camera that stands still: nothing can be reconstructed of them. "
@@ -346,7 +346,7 @@ void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
     throw InvalidArgument("the scene has only {} posed view; at least 2 are needed",
                           scene.views.size());
   }
-  CheckMoves(scene);
+  RequireSeveralPositions(scene);
   result->photos_registered = static_cast<int>(scene.views.size());
   result->masked_views = static_cast<int>(std::count_if(
       scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));

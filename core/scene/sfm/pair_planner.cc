@@ -228,8 +228,8 @@ PairPlan PlanPairs(const SimilarityTable& similarity,
           CountRelated(similarity)};
 }
 
-std::vector<PhotoPair> PairsOfUnplaced(const std::vector<bool>& placed,
-                                       const std::vector<PhotoPair>& tried) {
+std::vector<PhotoPair> UnregisteredPairs(const std::vector<bool>& placed,
+                                         const std::vector<PhotoPair>& tried) {
   const std::set<PhotoPair> known(tried.begin(), tried.end());
   std::vector<PhotoPair> pairs;
   for (const PhotoPair& pair : AllPairs(static_cast<int>(placed.size()))) {

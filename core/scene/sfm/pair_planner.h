@@ -54,7 +54,7 @@ PairPlan PlanPairs(const SimilarityTable& similarity,
 
 // Returns the pairs with an unregistered photo that `tried` lacks. `placed`: one entry for each
 // photo.
-std::vector<PhotoPair> PairsOfUnplaced(const std::vector<bool>& placed,
-                                       const std::vector<PhotoPair>& tried);
+std::vector<PhotoPair> UnregisteredPairs(const std::vector<bool>& placed,
+                                         const std::vector<PhotoPair>& tried);
 
 }  // namespace color3d

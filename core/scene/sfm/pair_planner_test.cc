@@ -135,9 +135,9 @@ TEST(PairPlanner, FindsSequenceOrderFromNames) {
 }
 
 TEST(PairPlanner, PairsUnregisteredPhotosWithAll) {
-  EXPECT_THAT(PairsOfUnplaced({true, true, false, true}, {{0, 2}}),
+  EXPECT_THAT(UnregisteredPairs({true, true, false, true}, {{0, 2}}),
               ElementsAre(PhotoPair{1, 2}, PhotoPair{2, 3}));
-  EXPECT_TRUE(PairsOfUnplaced({true, true}, {}).empty());
+  EXPECT_TRUE(UnregisteredPairs({true, true}, {}).empty());
 }
 
 }  // namespace

@@ -142,7 +142,7 @@ class Solver {
     Match(plan.pairs);
     Attempt("planned", Strictness::kDefault);
     if (Placed() == copies_.names.size() || IsHopeless(plan)) return;
-    const std::vector<PhotoPair> more = PairsOfUnplaced(PlacedPhotos(), plan.pairs);
+    const std::vector<PhotoPair> more = UnregisteredPairs(PlacedPhotos(), plan.pairs);
     if (AreWorthMatching(more)) {
       colmap_.Note(
           fmt::format("{} photos found a place; matching the others with all: {} more pairs",

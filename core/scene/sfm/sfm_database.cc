@@ -47,7 +47,7 @@ void SfmDatabase::NumberPhotosByName() {
       "COMMIT");
 }
 
-std::string SfmDatabase::DescriptorsOf(const std::string& photo) {
+std::string SfmDatabase::ReadDescriptors(const std::string& photo) {
   sqlite3_stmt* statement = nullptr;
   if (sqlite3_prepare_v2(connection_->db,
                          "SELECT data FROM descriptors JOIN images USING (image_id) WHERE name = ?",

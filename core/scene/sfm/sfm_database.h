@@ -23,7 +23,7 @@ class SfmDatabase {
   void NumberPhotosByName();
 
   // Descriptors of a photo as bytes; empty if it has none.
-  std::string DescriptorsOf(const std::string& photo);
+  std::string ReadDescriptors(const std::string& photo);
 
  private:
   struct Connection;

@@ -52,9 +52,9 @@ TEST_F(SfmDatabaseTest, NumbersPhotosByName) {
   EXPECT_EQ(Run("SELECT image_id, data FROM keypoints ORDER BY image_id"), "1|ka 2|kb 4|kd ");
   EXPECT_EQ(Run("SELECT image_id, data FROM descriptors ORDER BY image_id"), "1|da 2|db 4|dd ");
   SfmDatabase database(file());
-  EXPECT_EQ(database.DescriptorsOf("d"), "dd");
-  EXPECT_EQ(database.DescriptorsOf("c"), "");
-  EXPECT_EQ(database.DescriptorsOf("nothing"), "");
+  EXPECT_EQ(database.ReadDescriptors("d"), "dd");
+  EXPECT_EQ(database.ReadDescriptors("c"), "");
+  EXPECT_EQ(database.ReadDescriptors("nothing"), "");
 }
 
 // As a worker: it may write beside the database and nowhere else.

@@ -50,7 +50,7 @@ std::map<int, SiftDescriptors> DescriptorsFor(const SfmWorkspace& work,
   for (const PhotoPair& pair : pairs) {
     for (const int photo : {pair.first, pair.second}) {
       if (descriptors.contains(photo)) continue;
-      descriptors.emplace(photo, SiftDescriptors(database.DescriptorsOf(photos.names[photo])));
+      descriptors.emplace(photo, SiftDescriptors(database.ReadDescriptors(photos.names[photo])));
     }
   }
   return descriptors;
