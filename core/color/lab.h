@@ -1,4 +1,4 @@
-// sRGB <-> CIE Lab, D65 / 2 degrees (METHOD.md "Colour"). Pure functions, thread-safe.
+// sRGB <-> CIE Lab, D65 / 2 degrees (STILL.md "Colour"). Pure functions, thread-safe.
 // sRGB values are 0..1 (gamma-encoded); L is 0..100, a and b are Lab units (sRGB spans about
 // a -86..98, b -108..95). Image conversions agree with the float64 functions to 1e-4 in Lab.
 #pragma once

@@ -1,5 +1,5 @@
 // Random access to the frames of a video file, decoded on demand: memory does not grow with the
-// length of the film (METHOD.md "Film").
+// length of the film (FILM.md "Film").
 #pragma once
 
 #include <filesystem>

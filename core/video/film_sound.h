@@ -1,4 +1,4 @@
-// The sound of a part of a film for MP4 (METHOD.md "Film"): packets are copied if MP4 supports the
+// The sound of a part of a film for MP4 (FILM.md "Film"): packets are copied if MP4 supports the
 // codec, else re-encoded as AAC. For this folder only.
 #pragma once
 

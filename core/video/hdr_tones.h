@@ -1,4 +1,4 @@
-// Tone mapping of high dynamic range (HDR) films to SDR (METHOD.md "Film"). Pure.
+// Tone mapping of high dynamic range (HDR) films to SDR (FILM.md "Film"). Pure.
 #pragma once
 
 #include <array>

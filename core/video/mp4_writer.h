@@ -1,6 +1,5 @@
 // Writes MP4 movies: H.264, 4:2:0, tagged as BT.709, with the sound of the source film. Pictures
-// are encoded as they are added, so memory does not grow with the length (METHOD.md "Movies",
-// "Film").
+// are encoded as they are added, so memory does not grow with the length (EXPORT.md "Movies").
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Time offset between two films of one event, estimated from their sound (METHOD.md "Poses of
+// Time offset between two films of one event, estimated from their sound (DYNAMIC.md "Poses of
 // films").
 #pragma once
 

@@ -1,5 +1,5 @@
 // A self-contained page that shows a coloured scene in a browser: scene, photos and viewer in one
-// file, without network access (METHOD.md "Viewer"). Pure functions.
+// file, without network access (EXPORT.md "Viewer"). Pure functions.
 #pragma once
 
 #include <array>

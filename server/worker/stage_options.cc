@@ -117,9 +117,7 @@ AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec&
 ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t seed) {
   ColorizerOptions options;
   options.seed = seed;
-  if (spec.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) {
-    options.recipe = ColorizerOptions::Recipe::kPaper;
-  }
+  if (spec.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) options.UsePaperRecipe();
   if (spec.has_iterations()) options.iterations = spec.iterations();
   if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();

@@ -65,6 +65,14 @@ TEST(ColorizerOptionsFromTest, UnsetFieldsKeepTheMethodsDefaults) {
   EXPECT_EQ(ColorizerOptionsFrom(v1::PersonalizeSpec(), 17), defaults);
 }
 
+TEST(ColorizerOptionsFromTest, PaperRecipeCrops320PxUnlessGiven) {
+  v1::PersonalizeSpec spec;
+  spec.set_recipe(v1::PersonalizeSpec::RECIPE_PAPER);
+  EXPECT_EQ(ColorizerOptionsFrom(spec, 1).crop_px, 320);
+  spec.set_crop_px(128);
+  EXPECT_EQ(ColorizerOptionsFrom(spec, 1).crop_px, 128);
+}
+
 TEST(ColorizerOptionsFromTest, WhatIsSetArrives) {
   v1::PersonalizeSpec spec;
   spec.set_precision(v1::PersonalizeSpec::PRECISION_FLOAT32);

@@ -110,7 +110,7 @@ void RunPipeline(const PipelineArguments& args) {
     });
   }
   ColorizerOptions colorizer = args.colorizer;
-  if (args.paper) colorizer.recipe = ColorizerOptions::Recipe::kPaper;
+  if (args.paper) colorizer.UsePaperRecipe();
   run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
   run(kind::kColorizeViews, [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
   run(kind::kSolveChroma, [&](StageContext& c) { RunSolveChroma(args.chroma, c); });

@@ -1,4 +1,4 @@
-// Lab Gaussian reconstruction, second half: chroma on fixed geometry (METHOD.md "Stage 2").
+// Lab Gaussian reconstruction, second half: chroma on fixed geometry (STILL.md "Stage 2").
 // Deterministic for a seed and a thread count.
 #pragma once
 

@@ -1,5 +1,5 @@
 // Measures the error of RGB blending in viewers against our Lab renders, and refines the RGB
-// harmonics to reduce it (METHOD.md "Export").
+// harmonics to reduce it (EXPORT.md "Export").
 #pragma once
 
 #include <vector>

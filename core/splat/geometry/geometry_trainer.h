@@ -1,5 +1,5 @@
 // Lab Gaussian reconstruction, first half: luminance geometry (the paper's warm-up, one channel;
-// METHOD.md "Stage 2"). Deterministic for a seed and a thread count.
+// STILL.md "Stage 2"). Deterministic for a seed and a thread count.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Detection of motion as residuals that static Gaussians cannot explain (METHOD.md "What moves").
+// Detection of motion as residuals that static Gaussians cannot explain (DYNAMIC.md "Motion").
 // Internal to the splat module. Deterministic whatever the thread count.
 #pragma once
 

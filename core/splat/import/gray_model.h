@@ -20,7 +20,7 @@ struct GraySplat {
 inline constexpr double kColorless = 2.0;
 
 // The luminance of Gaussian i along a direction is that of its colour there; its harmonics are
-// fitted over directions spread evenly over the sphere (METHOD.md "A splat without photos").
+// fitted over directions spread evenly over the sphere (STILL.md "A splat without photos").
 // Preserves the order of the remaining Gaussians. Infinite scales and opacities become very small,
 // very large, or solid; rotations of length zero become the identity. Throws
 // Error{kInvalidArgument} if no Gaussian remains; `name` is the file's name.

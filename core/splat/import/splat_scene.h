@@ -1,5 +1,5 @@
 // Builds a scene without photos from a splat: views chosen around it, and its Gaussians in grey,
-// which need no training (METHOD.md "A splat without photos").
+// which need no training (STILL.md "A splat without photos").
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Default views of a splat: cameras around the region that contains most of the Gaussians, selected
-// from candidates by the share of the splat that they see (METHOD.md "A splat without photos").
+// from candidates by the share of the splat that they see (STILL.md "A splat without photos").
 // Internal to this folder and tests.
 #pragma once
 

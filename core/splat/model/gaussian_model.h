@@ -1,4 +1,4 @@
-// Lab-space Gaussians as structure-of-arrays float buffers (METHOD.md "Stage 2"). A plain value.
+// Lab-space Gaussians as structure-of-arrays float buffers (STILL.md "Stage 2"). A plain value.
 #pragma once
 
 #include <cstddef>
@@ -10,7 +10,7 @@
 
 namespace color3d {
 
-// Motion and lifetime of the last size() Gaussians of a model (METHOD.md "What moves"). With t = -1
+// Motion and lifetime of the last size() Gaussians of a model (DYNAMIC.md "Motion"). With t = -1
 // at begin_s and 1 at end_s, and tau = t - center:
 //   position + velocity tau + acceleration tau^2,  rotation + spin tau,
 //   opacity exp(-(tau / exp(log_width))^2 / 2)

@@ -1,4 +1,4 @@
-// Camera of a movie, frame by frame (METHOD.md "Movies"). Pure functions.
+// Camera of a movie, frame by frame (EXPORT.md "Movies"). Pure functions.
 #pragma once
 
 #include <array>

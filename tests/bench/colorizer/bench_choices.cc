@@ -93,7 +93,7 @@ const std::map<std::string, Setter>& Setters() {
       {"recipe",
        [](const std::string& value, Choice* c) {
          if (value != "paper") throw InvalidArgument("the other recipe is \"paper\"");
-         c->options.recipe = ColorizerOptions::Recipe::kPaper;
+         c->options.UsePaperRecipe();
        }},
       {"pictures", [](const std::string& value, Choice* c) { c->pictures = value; }},
       {"geometry_first",

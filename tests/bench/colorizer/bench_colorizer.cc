@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "core/base/files.h"
@@ -32,6 +33,7 @@ struct ColorizerArguments {
   std::string photos_folder;
   std::vector<std::string> all_in_one;
   std::string key;
+  std::optional<int> crop_px;  // unset: the recipe's
   std::string out_folder;
   std::string json_file;
   int side_px = 400;
@@ -77,7 +79,8 @@ double SecondsSince(std::chrono::steady_clock::time_point start) {
 
 ColorizerOptions OptionsFrom(const ColorizerArguments& args) {
   ColorizerOptions options = args.options;
-  if (args.paper) options.recipe = ColorizerOptions::Recipe::kPaper;
+  if (args.paper) options.UsePaperRecipe();
+  if (args.crop_px) options.crop_px = *args.crop_px;
   if (args.precision == "float32") options.precision = ColorizerOptions::Precision::kFloat32;
   if (args.precision == "bfloat16") options.precision = ColorizerOptions::Precision::kBfloat16;
   return options;
@@ -289,7 +292,7 @@ void AddColorizerCommand(CLI::App& app) {
                       "what color3d-bench augmentations left: trained on beside the key view");
   command->add_option("--kinds", args->kinds, "only these of them, e.g. outpaint,novel_view");
   command->add_option("--picture-share", args->picture_share, "of them all, against the key's 1");
-  command->add_option("--crop", args->options.crop_px, "px");
+  command->add_option("--crop", args->crop_px, "px");
   command->add_option("--seed", args->options.seed);
   command->add_option("--average-decay", args->options.average_decay, "0: off");
   command->add_option("--min-improvement", args->options.min_improvement, "0: no early stop");

@@ -30,7 +30,7 @@ std::vector<ChoicePoint> TwoScenes() {
           PointOf("fox", "crop", "128", 60, 5.5)};
 }
 
-TEST(ChoiceResults, SurviveKillInMiddleOfLine) {
+TEST(ChoiceResults, IgnoreTruncatedLine) {
   const ScratchFolder folder;
   const auto file = folder.path() / "choices.jsonl";
   EXPECT_TRUE(ReadChoicePoints(file).empty());

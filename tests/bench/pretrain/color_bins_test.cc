@@ -25,7 +25,7 @@ TEST(ColorBinsTest, CountsShares) {
   EXPECT_DOUBLE_EQ(bins[1].share, 0.25);
 }
 
-TEST(ColorBinsTest, OmitsRareBinsAndNormalizesShares) {
+TEST(ColorBinsTest, OmitsRareBinsAndSharesSumToOne) {
   ColorHistogram histogram;
   for (int i = 0; i < 99; ++i) histogram.Add(Uniform(0.0f, 0.0f));
   histogram.Add(Uniform(60.0f, 0.0f));
@@ -34,7 +34,7 @@ TEST(ColorBinsTest, OmitsRareBinsAndNormalizesShares) {
   EXPECT_DOUBLE_EQ(bins[0].share, 1.0);
 }
 
-TEST(ColorBinsTest, ClampsColorsToGrid) {
+TEST(ColorBinsTest, CountsOuterColorsAtTheBorder) {
   ColorHistogram histogram;
   histogram.Add(Uniform(1e6f, -1e6f));
   const auto bins = histogram.Bins(0.0);
@@ -52,7 +52,7 @@ TEST(ColorBinsTest, RebalancingLiftsRareBinsAndKeepsMean) {
   EXPECT_FLOAT_EQ(none[1], 1.0f);
 }
 
-TEST(ColorBinsTest, RejectsImageOtherThanAb) {
+TEST(ColorBinsTest, RefusesOtherChannelCounts) {
   ColorHistogram histogram;
   EXPECT_THROW(histogram.Add(Image(4, 4, 3)), Error);
 }

@@ -35,7 +35,7 @@ torch::Tensor SamePlaces() {
   return torch::stack({at.repeat({cells}), at.unsqueeze(1).expand({cells, cells}).flatten()}, 1);
 }
 
-TEST(CopyLossTest, UsesMatchingSpace) {
+TEST(CopyLossTest, UsesSpaceOfMatching) {
   torch::manual_seed(1);
   const torch::Tensor mix = torch::randn({24, 24});
   const torch::Tensor cells = torch::mm(torch::randn({300, 24}), mix);
@@ -57,7 +57,7 @@ TEST(CopyLossTest, AcceptsFewerSamplesThanChannels) {
   EXPECT_LT((white.square().mean(0) - 2.0 / 8).abs().max().item<float>(), 0.02f);
 }
 
-TEST(CopyLossTest, ViewCopiesItselfButNotAnother) {
+TEST(CopyLossTest, SameViewHasLowerLossThanAnother) {
   torch::manual_seed(3);
   const CopyView view = RandomView();
   CopyView other = RandomView();
@@ -75,7 +75,7 @@ TEST(CopyLossTest, ViewCopiesItselfButNotAnother) {
   EXPECT_LT(same.contrast.item<double>(), 0.5 * wrong.contrast.item<double>());
 }
 
-TEST(CopyLossTest, NoMatchesGiveNoContrast) {
+TEST(CopyLossTest, HasNoContrastWithoutMatches) {
   torch::manual_seed(4);
   const CopyView view = RandomView();
   Random random(1);
@@ -89,7 +89,7 @@ TEST(CopyLossTest, NoMatchesGiveNoContrast) {
   EXPECT_EQ(losses.contrast.item<double>(), 0.0);
 }
 
-TEST(CopyLossTest, OptimizationLearnsToCopyColors) {
+TEST(CopyLossTest, DescentImprovesCopiedColors) {
   torch::manual_seed(5);
   CopyView first = RandomView(), second = RandomView();
   for (CopyView* view : {&first, &second}) {

@@ -40,7 +40,7 @@ class PhotoSetTest : public testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(PhotoSetTest, MatchedPixelsOfPairAgree) {
+TEST_F(PhotoSetTest, MatchesOfPairShowSamePlace) {
   Write("photo.png", Ramps(200, 150, 0.2f));
   const PhotoSet photos({{folder_, 1.0}});
   Random random(4);
@@ -73,7 +73,7 @@ TEST_F(PhotoSetTest, MatchedPixelsOfPairAgree) {
   EXPECT_LT(mirrored, 10);  // the world is not: one of seven
 }
 
-TEST_F(PhotoSetTest, PairsFramesOfClip) {
+TEST_F(PhotoSetTest, PairsFramesOfClips) {
   for (int i = 0; i < 3; ++i) {
     Write("clips/one/" + std::to_string(i) + ".png", Ramps(60, 60, 0.3f * static_cast<float>(i)));
   }
