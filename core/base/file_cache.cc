@@ -24,7 +24,7 @@ constexpr uintmax_t kReserveBytes = uintmax_t{512} << 20;
 constexpr char kTemporary[] = ".put-";
 constexpr auto kTemporaryAge = std::chrono::hours(1);
 
-// Covers the key too: an entry under another's name is no entry.
+// Covers the key, too: an entry under another key's name is invalid.
 std::string Seal(const std::string& key, std::string_view bytes) {
   Sha256 hash;
   hash.Update(key);
@@ -46,7 +46,7 @@ struct Entry {
   int64_t bytes = 0;
 };
 
-// Entries, and leftovers of writers that died are removed.
+// Lists entries and removes temporary files of crashed writers.
 std::vector<Entry> ListEntries(const fs::path& folder) {
   std::vector<Entry> entries;
   std::error_code error;

@@ -48,15 +48,15 @@ class FileDescriptor {
   int fd_;
 };
 
-// The new file's rights and owner become those of the file that it will replace. Who may not give
-// files away keeps the file as his own, and only the rights.
+// Gives the new file the mode and owner of the file that it replaces. Without permission to change
+// the owner, keeps the mode only.
 void TakeAfter(int fd, const fs::path& replaced) {
   struct stat before {
   }, now{};
   if (::stat(replaced.c_str(), &before) != 0 || !S_ISREG(before.st_mode)) return;
   if (::fstat(fd, &now) != 0) return;
   if (before.st_uid != now.st_uid || before.st_gid != now.st_gid) {
-    // Not both at once: the group can often be kept where the owner cannot.
+    // Separate calls: the group can often be kept where the owner cannot.
     [[maybe_unused]] const int group = ::fchown(fd, static_cast<uid_t>(-1), before.st_gid);
     [[maybe_unused]] const int owner = ::fchown(fd, before.st_uid, static_cast<gid_t>(-1));
   }
@@ -127,7 +127,7 @@ void WriteFileAtomic(const fs::path& path, std::string_view bytes) {
       fmt::format(".{}.{}.{}.part", path.filename().string(), ::getpid(), counter.fetch_add(1));
   try {
     {
-      // What lies there, a link perhaps, is never written to.
+      // Never writes to an existing file or link.
       ::unlink(temporary.c_str());
       FileDescriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
       if (fd.get() < 0) ThrowErrno("cannot create", temporary);

@@ -27,7 +27,7 @@ struct Walk {
       if (depth == WalkDepth::kFolder) continue;
       std::error_code unknown;
       const bool is_folder = fs::is_directory(it->symlink_status(unknown));
-      // What was removed meanwhile is no fault.
+      // An entry removed in the meantime is not an error.
       if (unknown && unknown != std::errc::no_such_file_or_directory) Note(it->path(), unknown);
       if (is_folder) Folder(it->path());
       if (stopped) return;

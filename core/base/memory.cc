@@ -22,7 +22,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// The first number of a file; nullopt for "max" and for files that are not there.
+// The first number of a file; nullopt for "max" and for missing files.
 std::optional<int64_t> NumberIn(const fs::path& file) {
   std::ifstream in(file);
   std::string word;
@@ -43,7 +43,7 @@ int64_t StatusBytes(const std::string& field) {
   return 0;
 }
 
-// What a control group leaves, or INT64_MAX when it has no limit.
+// Memory left in a control group, or INT64_MAX without a limit.
 int64_t LeftInGroup(const fs::path& folder, const char* limit_file, const char* usage_file) {
   const std::optional<int64_t> limit = NumberIn(folder / limit_file);
   if (!limit) return INT64_MAX;
@@ -63,7 +63,7 @@ int64_t MemInfo(const fs::path& root, std::string_view name) {
 }
 
 // Calls `consider` with the folder of each control group of the process and with the names of the
-// files that tell its limit and its use.
+// files that contain its limit and its use.
 void ForEachGroup(
     const fs::path& root,
     const std::function<void(const fs::path&, const char* limit, const char* usage)>& consider) {

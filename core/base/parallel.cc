@@ -6,8 +6,8 @@
 namespace color3d {
 namespace {
 
-// Loops follow one another within microseconds, and waking a sleeping thread takes up to 100 us: it
-// is worth looking for this long before going to sleep. Others get the core meanwhile.
+// Loops follow each other within microseconds, and waking a sleeping thread takes up to 100 us:
+// spin for this long before sleeping. Other threads get the core meanwhile.
 constexpr std::chrono::microseconds kWatchFor(50);
 
 template <class Condition>

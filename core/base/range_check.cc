@@ -6,7 +6,7 @@ namespace color3d {
 
 void RangeCheck::operator()(const char* field, double value, double low, double high) const {
   if (value >= low && value <= high) return;
-  // Nine digits tell a value just beyond the range from the end of it.
+  // Nine digits distinguish a value just beyond the range from its end.
   throw InvalidArgument(
       "{} {} is {:.9g}; it must be {:.9g} to {:.9g}", options_, field, value, low, high);
 }

@@ -154,7 +154,7 @@ void AggregateCycle::FactorCoarsest() {
       a(i, i) += g.weight[k];
       a(i, g.neighbor[k]) -= g.weight[k];
     }
-    // A part of the picture that is connected to nothing known: any solution will do.
+    // A part of the picture without known pixels: any solution will do.
     a(i, i) = a(i, i) > 0.0 ? a(i, i) * (1.0 + 1e-12) : 1.0;
   }
   coarsest_.compute(a);
@@ -264,7 +264,7 @@ void AggregateCycle::Solve(size_t index) {
   Pair of_k{}, of_u{};
   for (int c = 0; c < 2; ++c) {
     const double rho = uau[c] - Quotient(gamma[c] * gamma[c], kak[c]);
-    // Below rounding the second direction says nothing new.
+    // Below rounding the second direction adds no information.
     of_u[c] = rho > 1e-7 * uau[c] ? uf[c] / rho : 0.0;
     of_k[c] = t[c] - Quotient(gamma[c] * of_u[c], kak[c]);
   }

@@ -58,7 +58,7 @@ class RangeClusterer {
 
   int64_t Run() {
     for (int64_t i = begin_; i < end_; ++i) Place(i);
-    // Nodes without an edge go anywhere.
+    // Nodes without an edge join any cluster.
     if (sizes_.empty()) sizes_.push_back(0);
     for (int64_t i = begin_; i < end_; ++i) {
       if (of_node_[i] < 0) of_node_[i] = 0;
@@ -156,7 +156,7 @@ struct Rows {
   std::vector<float> weight;
 };
 
-// Where a coarse neighbour stands in the row that is being built, by the row's number.
+// Position of a coarse neighbour in the current row, by the row's number.
 struct Marker {
   std::vector<int32_t> row;
   std::vector<int64_t> position;

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-// Binomial 3x3 filter, borders repeated: grain is no edge.
+// Binomial 3x3 filter with repeated borders, so that grain forms no edges.
 Image Smoothed(const Image& luminance, ThreadPool& pool) {
   const int w = luminance.width, h = luminance.height;
   Image smooth(w, h, 1);

@@ -41,7 +41,7 @@ Image PlanarFromMat(const cv::Mat& mat, float scale) {
   return image;
 }
 
-// The same, averaged over areas on the way: only what it is reduced to is held as floats.
+// The same with area averaging on the way: only the reduced picture is held as floats.
 template <typename Sample>
 Image ReducedFromMat(const cv::Mat& mat, float scale, const PictureSize& size) {
   const int channels = mat.channels();
@@ -73,7 +73,7 @@ cv::Mat MatFromPlanar(const Image& image, int type, float scale) {
       const float* in =
           image.Plane(PlaneOfChannel(c, channels)) + static_cast<size_t>(y) * image.width;
       for (int x = 0; x < image.width; ++x) {
-        // The comparison's order sends NaN to 0.
+        // The order of the comparison maps NaN to 0.
         const float v = in[x] > 0.0f ? std::min(in[x], 1.0f) : 0.0f;
         row[x * channels + c] = static_cast<Sample>(v * scale + 0.5f);
       }
@@ -82,7 +82,7 @@ cv::Mat MatFromPlanar(const Image& image, int type, float scale) {
   return mat;
 }
 
-// EXIF 2.3, tag 274: where the stored row 0 and column 0 belong in the picture.
+// EXIF 2.3, tag 274: position of the stored row 0 and column 0 in the picture.
 Image Oriented(Image stored, int orientation) {
   if (orientation == 1) return stored;
   const bool swap = OrientationSwapsSides(orientation);
@@ -104,8 +104,8 @@ Image Oriented(Image stored, int orientation) {
   return image;
 }
 
-// Keeps the colour planes (and alpha, when wanted) that the file really has: OpenCV expands grey
-// with alpha to four channels.
+// Keeps the colour planes (and alpha, if wanted) of the file: OpenCV expands grey with alpha to
+// four channels.
 Image SelectChannels(Image image, const ImageInfo& info, bool keep_alpha) {
   const bool gray = info.channels <= 2;
   const bool has_alpha = image.channels == 4;
@@ -119,8 +119,8 @@ Image SelectChannels(Image image, const ImageInfo& info, bool keep_alpha) {
   return out;
 }
 
-// By OpenCV, which chooses a decoder by how the bytes begin: only for formats whose beginning no
-// other decoder of OpenCV's (GDAL's are among them) takes.
+// Decodes with OpenCV, which chooses a decoder by the first bytes: only for formats that no other
+// decoder of OpenCV (including GDAL's) accepts.
 cv::Mat DecodeByOpenCv(std::string_view bytes, const std::string& file_name, int flags) {
   try {
     const cv::Mat input(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
@@ -148,7 +148,7 @@ cv::Mat DecodeStored(std::string_view bytes,
       mat = DecodeByOpenCv(bytes, file_name, flags);
       break;
     case ImageFormat::kBmp:
-      // OpenCV 4.6 takes the colours of some BMPs for greys, unless it is told.
+      // OpenCV 4.6 reads the colours of some BMPs as grey by default.
       mat = DecodeByOpenCv(bytes, file_name, info.channels == 3 ? cv::IMREAD_COLOR : flags);
       break;
     case ImageFormat::kTiff:
@@ -195,12 +195,12 @@ void CheckEncodable(const Image& image, bool alpha_allowed) {
   }
 }
 
-// Floats that take no more than this are reduced as Resize does it, larger ones before they are
+// Images of at most this size as floats are reduced by Resize, larger ones before conversion to
 // floats.
 constexpr int64_t kMaxFloatBytes = int64_t{256} << 20;
 
-// The size at which the stored picture becomes floats: its own, or `size` where that saves much
-// memory. Both as stored, before orientation.
+// The size at which the stored picture is converted to floats: its own, or `size` if that saves
+// much memory. Both as stored, before orientation.
 PictureSize FloatSize(const cv::Mat& mat, const ImageInfo& info, const PictureSize& size) {
   if (FloatBytes(info, mat.cols, mat.rows) <= kMaxFloatBytes) return {mat.cols, mat.rows};
   return {std::clamp(size.width, 1, mat.cols), std::clamp(size.height, 1, mat.rows)};
@@ -210,14 +210,14 @@ PictureSize Turned(const PictureSize& size, bool swap) {
   return swap ? PictureSize{size.height, size.width} : size;
 }
 
-// What is decoded when its sides are divided by `reduction`.
+// Decoded size with sides divided by `reduction`.
 ImageInfo ReducedInfo(ImageInfo info, int reduction) {
   info.width = (info.width + reduction - 1) / reduction;
   info.height = (info.height + reduction - 1) / reduction;
   return info;
 }
 
-// Of Decode at its peak, where `wanted` (as stored) is the size of its result.
+// Peak memory of Decode if `wanted` (as stored) is the size of its result.
 int64_t BytesOfDecoding(const ImageInfo& info, const PictureSize& wanted, bool copies) {
   const int64_t whole = DecodingBytes(info, copies);
   const int64_t floats = FloatBytes(info, info.width, info.height);
@@ -253,7 +253,7 @@ Image Decode(std::string_view bytes,
       image = FloatsFromMat<uint8_t>(mat, 1.0f / 255.0f, size);
     } else if (mat.depth() == CV_16U) {
       image = FloatsFromMat<uint16_t>(mat, 1.0f / 65535.0f, size);
-      // OpenCV turns 8-bit ones over, but not these (scans of film).
+      // OpenCV inverts 8-bit ones, but not these (film scans).
       if (info.min_is_white) {
         for (float& v : image.data) v = 1.0f - v;
       }
@@ -262,7 +262,7 @@ Image Decode(std::string_view bytes,
     }
   }
   image = SelectChannels(std::move(image), info, request.keep_alpha);
-  // A tag that cannot be followed is told by PictureNotes.
+  // PictureNotes reports tags that cannot be followed.
   if (!request.keep_stored_values) ConvertToSrgb(ReadColorTag(bytes), bits, &image);
   image = Oriented(std::move(image), orientation);
   if (image.width == wanted.width && image.height == wanted.height) return image;

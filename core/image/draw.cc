@@ -67,7 +67,7 @@ void DrawText(
   RequireColor(*canvas);
   const std::string ascii = Ascii(text);
   if (ascii.empty() || height_px < 1) return;
-  // Room for what hangs below the line and for the pen's width.
+  // Space for descenders and the width of the pen.
   const int below = height_px / 2 + kMarginPx;
   cv::Mat mask(height_px + below + kMarginPx,
                TextWidth(ascii, height_px) + 2 * kMarginPx,

@@ -40,7 +40,7 @@ Image UpsampleGuided(const Image& ab, const Image& luminance, int radius, float 
     }
   }
   slope = BoxMean(slope, radius);
-  // Keeps the coarse prediction: only what L adds within a cell comes from the fit.
+  // Keeps the coarse prediction; the fit adds only the variation of L within a cell.
   for (int c = 0; c < ab.channels; ++c) {
     for (size_t i = 0; i < ab.PlaneSize(); ++i) {
       offset.Plane(c)[i] = ab.Plane(c)[i] - slope.Plane(c)[i] * guide.data[i];

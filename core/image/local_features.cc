@@ -36,7 +36,7 @@ LocalFeatures DetectLocalFeatures(const Image& gray, int max_count, double least
     const cv::Mat picture = Bytes(gray);
     std::vector<cv::KeyPoint> points;
     sift->detect(picture, points);
-    // A strict order, so that which of two equal ones stays does not depend on the sort.
+    // A strict order, so that the choice among equal ones does not depend on the sort.
     std::sort(points.begin(), points.end(), [](const cv::KeyPoint& a, const cv::KeyPoint& b) {
       if (a.response != b.response) return a.response > b.response;
       if (a.pt.y != b.pt.y) return a.pt.y < b.pt.y;

@@ -40,7 +40,7 @@ Image ReadImageWithin(const std::filesystem::path& path, int max_side_px) {
   DecodeRequest request;
   request.wanted = [&](const PictureSize& own) { return SizeWithin(own, max_side_px); };
   if (info.format == ImageFormat::kJpeg) {
-    // Twice the wanted size is left, so that the last step still averages areas.
+    // Keeps twice the wanted size, so that the last step still averages areas.
     const int side = std::max(info.width, info.height);
     int& reduction = request.jpeg_reduction;
     while (reduction < 8 && side / (2 * reduction) >= 2 * max_side_px) reduction *= 2;

@@ -46,7 +46,7 @@ Image Resize(const Image& image, int width, int height) {
         "cannot resize {} x {} px to {} x {} px", image.width, image.height, width, height);
   }
   if (width == image.width && height == image.height) return image;
-  // Down first, each side on its own, then up: area averaging is for shrinking only.
+  // Shrinks first, each side on its own, then enlarges: area averaging only shrinks.
   const int down_width = std::min(width, image.width);
   const int down_height = std::min(height, image.height);
   Image out = down_width == image.width && down_height == image.height

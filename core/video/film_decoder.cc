@@ -9,7 +9,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Decoders hold back up to 16 pictures; more only wait where stamps are nonsense.
+// Decoders delay up to 16 pictures; longer queues mean invalid timestamps.
 constexpr size_t kMostWaiting = 32;
 constexpr size_t kFewestWaiting = 4;
 constexpr size_t kWaitingBytes = size_t{512} << 20;
@@ -18,10 +18,11 @@ size_t MostWaiting(const AVCodecContext& codec) {
   return std::clamp(kWaitingBytes / (3 * pixels), kFewestWaiting, kMostWaiting);
 }
 
-// After damage in the file packets may come otherwise than when it was read through.
+// After damage in the file, packets may differ from those of the index.
 constexpr int kResyncPackets = 250;
 
-// Of other codecs packets may rightly bring no picture: "as before", or one that is never shown.
+// In other codecs packets may legitimately produce no picture: a repeat, or a picture that is never
+// shown.
 bool EveryPacketIsAPicture(AVCodecID codec) {
   return codec == AV_CODEC_ID_H264 || codec == AV_CODEC_ID_HEVC ||
          codec == AV_CODEC_ID_MPEG2VIDEO || codec == AV_CODEC_ID_MPEG1VIDEO;
@@ -60,14 +61,15 @@ FilmDecoder::FilmDecoder(fs::path file, const CancellationToken* cancel)
   }
   codec_->pkt_timebase = packets_->stream()->time_base;
   if (index_.keys.empty() || index_.keys.front() == 0) return;
-  // Of the group within which a recording began the key packet is lost.
+  // The key packet of the group within which a recording began is missing.
   for (size_t frame = 0; frame < is_damaged_.size(); ++frame) {
     is_damaged_[frame] = GroupOf(index_.packet_of_frame[frame]) < 0;
   }
 }
 
-// A group: a key packet and those up to the next one. -1: before the first key packet. What is
-// shown before the key packet is predicted from the group before, and counts as part of it.
+// A group: a key packet and the packets up to the next one. -1: before the first key packet.
+// Pictures shown before the key packet are predicted from the previous group and count as part of
+// it.
 int FilmDecoder::GroupOf(int packet) const {
   const auto after = std::upper_bound(index_.keys.begin(), index_.keys.end(), packet);
   const int group = static_cast<int>(after - index_.keys.begin()) - 1;
@@ -82,7 +84,7 @@ void FilmDecoder::NoteDamage(int packet) {
   if (!is_new) first->second = std::min(first->second, packet);
 }
 
-// Is it, or what it may be predicted from, known to be damaged?
+// Returns true if the frame, or one that it may be predicted from, is known to be damaged.
 bool FilmDecoder::IsBroken(int packet) const {
   const auto is_hit = [&](int group) {
     const auto first = damage_.find(group);
@@ -97,22 +99,22 @@ bool FilmDecoder::IsLike(int packet) const {
   return packet_->size == that.size && packet_->pos == that.pos;
 }
 
-// Times of decoding are no help where there is a place: after a seek in Matroska they are others.
+// Positions are preferred to decoding times, which differ after a seek in Matroska.
 bool FilmDecoder::IsThat(int packet) const {
   const FilmPacket& that = index_.packets[packet];
   return IsLike(packet) && (that.is_placed || packet_->dts == that.dts);
 }
 
-// The nearest one, up to `packet`, whose place tells it from others; `packet` where there is none:
-// then it is told by its time.
+// The nearest packet up to `packet` with a unique position; `packet` without one: it is then
+// recognized by its time.
 int FilmDecoder::PlacedBefore(int packet) const {
   int placed = packet;
   while (placed > 0 && !index_.packets[placed].is_placed) --placed;
   return index_.packets[placed].is_placed ? placed : packet;
 }
 
-// Reads up to `packet`, which stays in packet_; false where it does not come, or, unless it is
-// looked for `to_the_end`, what comes lies behind it.
+// Reads up to `packet`, which stays in packet_. Returns false if it is not found or, without
+// `to_the_end`, if the packet read is already behind it.
 bool FilmDecoder::ReadUpTo(int packet, bool to_the_end) {
   int placed = PlacedBefore(packet);
   const FilmPacket& that = index_.packets[placed];
@@ -142,7 +144,7 @@ bool FilmDecoder::SeekTo(int packet, int goal) {
   return packets_->Seek(stamp) && ReadUpTo(goal, /*to_the_end=*/false);
 }
 
-// Begins a run.
+// Starts a run.
 void FilmDecoder::StartAt(int packet) {
   avcodec_flush_buffers(codec_.get());
   waiting_.clear();
@@ -150,7 +152,7 @@ void FilmDecoder::StartAt(int packet) {
   has_packet_ = false;
   begin_ = next_ = packet;
   passed_ = reached_ = packet == 0 ? -1 : index_.packets[packet].frame - 1;
-  // Files whose pictures do not all say when they are decoded are not always found at once.
+  // Files in which some pictures have no decoding time may need several attempts.
   const int placed = PlacedBefore(packet);
   const int before = FirstPacketOf(std::max(-1, GroupOf(placed) - 1));
   if (!SeekTo(placed, packet) && !SeekTo(before, packet)) {
@@ -161,7 +163,7 @@ void FilmDecoder::StartAt(int packet) {
   has_ended_ = !has_packet_;
 }
 
-// Which one lies in packet_; -1: none that is known.
+// Index of the packet in packet_; -1: unknown.
 int FilmDecoder::Recognize() {
   if (next_ < static_cast<int>(index_.packets.size()) && IsLike(next_)) return next_;
   const int end = std::min(next_ + kResyncPackets, static_cast<int>(index_.packets.size()));
@@ -171,14 +173,14 @@ int FilmDecoder::Recognize() {
   return -1;
 }
 
-// Gives the decoder the next packet, or the end; false when it takes no more.
+// Sends the decoder the next packet, or the end; returns false if it takes no more.
 bool FilmDecoder::Feed() {
   if (!has_packet_ && !packets_->Read(packet_.get())) {
     return avcodec_send_packet(codec_.get(), nullptr) >= 0;
   }
   has_packet_ = false;
   const int packet = Recognize();
-  // By this its picture is known when it comes out.
+  // Identifies the picture when it is output.
   packet_->pts = packet < 0 ? AV_NOPTS_VALUE : packet;
   packet_->dts = AV_NOPTS_VALUE;
   if (packet != next_ && next_ < static_cast<int>(index_.packets.size())) NoteDamage(next_);
@@ -189,7 +191,7 @@ bool FilmDecoder::Feed() {
   return true;
 }
 
-// Frames up to `frame` that have not come out are missing.
+// Marks frames up to `frame` that were not output as missing.
 void FilmDecoder::PassTo(int frame) {
   if (EveryPacketIsAPicture(codec_->codec_id)) {
     for (int missing = passed_ + 1; missing < frame; ++missing) {
@@ -199,7 +201,7 @@ void FilmDecoder::PassTo(int frame) {
   passed_ = frame;
 }
 
-// What the decoder hands out waits for its turn.
+// Queues the decoder's output.
 void FilmDecoder::Take(std::unique_ptr<AVFrame, FreeFrame> picture) {
   const int64_t packet = picture->pts;
   if (packet < begin_ || packet >= static_cast<int64_t>(index_.packets.size())) return;
@@ -212,7 +214,7 @@ void FilmDecoder::Take(std::unique_ptr<AVFrame, FreeFrame> picture) {
   waiting_.push_back({static_cast<int>(packet), is_flagged, std::move(picture)});
 }
 
-// Lets the decoder go on by a picture; false at the end.
+// Advances the decoder by a picture; returns false at the end.
 bool FilmDecoder::Receive() {
   while (!has_ended_) {
     std::unique_ptr<AVFrame, FreeFrame> picture(av_frame_alloc());
@@ -230,8 +232,8 @@ bool FilmDecoder::Receive() {
   return false;
 }
 
-// The first of waiting_ is there, and it is known whether it is damaged: what it is predicted from
-// may be shown after it. False at the end.
+// Waits until the first of waiting_ exists and its damage is known; a frame that it is predicted
+// from may be shown after it. Returns false at the end.
 bool FilmDecoder::Await() {
   while (waiting_.empty() || (passed_ < index_.packets[waiting_.front().packet].latest &&
                               waiting_.size() < MostWaiting(*codec_))) {
@@ -240,12 +242,12 @@ bool FilmDecoder::Await() {
   return !waiting_.empty();
 }
 
-// Takes `frame` from the run; false when it does not come out whole.
+// Takes `frame` from the run; returns false if it is damaged.
 bool FilmDecoder::Find(int frame) {
   reached_ = frame;
   while (Await()) {
     Waiting& first = waiting_.front();
-    // A later picture that comes out in its place stays for its own turn.
+    // A later picture in its place is kept for its own frame.
     if (index_.packets[first.packet].frame > frame) return false;
     picture_ = std::move(first.picture);
     at_ = index_.packets[first.packet].frame;
@@ -265,8 +267,8 @@ bool FilmDecoder::Decode(int frame) {
                        reached_ >= index_.packets[start].frame - 1;
   if (!goes_on) StartAt(start);
   bool is_whole = Find(frame);
-  // A key packet may need what comes before it after all; and decoders learn on the way how many
-  // pictures they have to hold back.
+  // A key packet may depend on earlier packets after all, and decoders learn during decoding how
+  // many pictures they must delay.
   if (!is_whole && ((begin_ == start && start > 0) || group != tried_again_)) {
     tried_again_ = group;
     StartAt(FirstPacketOf(group - 1));

@@ -16,8 +16,8 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// FFmpeg's names of the containers behind kFilmEndings (catalogue/scene_files.h), and of the bare
-// streams that are found under them. None of these readers needs a second file.
+// FFmpeg's names of the containers behind kFilmEndings (catalogue/scene_files.h), and of raw
+// streams with such extensions. None of these demuxers needs a second file.
 constexpr std::string_view kContainers[] = {"mov,mp4,m4a,3gp,3g2,mj2",
                                             "matroska,webm",
                                             "avi",
@@ -33,7 +33,7 @@ constexpr std::string_view kContainers[] = {"mov,mp4,m4a,3gp,3g2,mj2",
                                             "h264",
                                             "hevc"};
 
-// Kinds of files that say where a film is, and hold none.
+// File types that refer to a film but contain none.
 constexpr std::string_view kLists[] = {
     "hls", "dash", "webm_dash_manifest", "concat", "sdp", "rtsp", "imf"};
 constexpr std::string_view kSounds[] = {
@@ -60,11 +60,11 @@ void RefuseFilm(const fs::path& file, const std::string& why) {
   throw InvalidArgument("{} is no film that can be read: {}", file.filename().string(), why);
 }
 
-// The file as FFmpeg's libraries read it.
+// File access for FFmpeg's libraries.
 class FilmFile::Bytes {
  public:
   Bytes(const fs::path& file, const CancellationToken* cancel) : cancel_(cancel) {
-    // Not to wait where it is a pipe.
+    // Does not block on a pipe.
     descriptor_ = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
     struct stat facts {};
     if (descriptor_ < 0 || fstat(descriptor_, &facts) != 0 || !S_ISREG(facts.st_mode)) {
@@ -144,7 +144,7 @@ FilmFile::FilmFile(const fs::path& file, const CancellationToken* cancel)
   container->interrupt_callback = {&IsCancelled, const_cast<CancellationToken*>(cancel)};
   container->format_whitelist = av_strdup(kind->name);
   container->protocol_whitelist = av_strdup("file");
-  // Of a failure it is freed.
+  // On failure FFmpeg frees it.
   if (const int result = avformat_open_input(&container, name.c_str(), kind, nullptr); result < 0) {
     RefuseContainer(result);
   }
@@ -183,7 +183,7 @@ void FilmFile::FindStreams() {
   const int result = avformat_find_stream_info(container_.get(), options.data());
   for (AVDictionary*& of_stream : options) av_dict_free(&of_stream);
   if (result < 0) RefuseContainer(result);
-  // Of those that are only found now the container states nothing.
+  // For streams found later the container states nothing.
   ranges_.resize(container_->nb_streams, AVCOL_RANGE_UNSPECIFIED);
   CheckSizes();
 }

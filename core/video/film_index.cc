@@ -14,21 +14,21 @@ struct CloseParser {
   void operator()(AVCodecParserContext* parser) const { av_parser_close(parser); }
 };
 
-// Where times of decoding fall back by more, films were put behind one another.
+// A larger step back in decoding time means concatenated films.
 constexpr double kFallbackS = 1.0;
 constexpr size_t kMostPackets = 4'000'000;  // more than any part and stride asks for
 
 struct Scanned {
   FilmPacket packet;
   int64_t dts = AV_NOPTS_VALUE;  // without such falls
-  // What the picture says of itself, where it is asked:
+  // Properties that the picture states, if parsed:
   bool is_b = false;         // shown as soon as it is decoded
   int number = 0;            // its place among those shown since the numbers began anew
   bool begins_anew = false;  // with this one
   bool is_second = false;    // field, of the frame that the packet before it began
 };
 
-// Numbers tell the order of pictures, and B pictures may be kept for others.
+// Presentation order follows picture numbers; B pictures may be reference pictures.
 bool HasNumbers(AVCodecID codec) { return codec == AV_CODEC_ID_H264 || codec == AV_CODEC_ID_HEVC; }
 
 bool HasTypes(AVCodecID codec) {
@@ -85,7 +85,7 @@ class PictureHeaders {
   int last_number_ = 0;
 };
 
-// Lets each of several films behind one another begin where the one before it ends.
+// Shifts concatenated films so that each begins where the previous one ends.
 void RaiseFalls(double tick, std::vector<Scanned>* scanned) {
   int64_t rise = 0, last = AV_NOPTS_VALUE, step = 0;
   for (Scanned& picture : *scanned) {
@@ -107,8 +107,8 @@ int64_t MeanStep(int64_t first, int64_t last, size_t steps) {
   return steps == 0 ? 0 : (last - first) / static_cast<int64_t>(steps);
 }
 
-// A B picture is shown when it is decoded, any other when the next one that is no B is. Where there
-// are none, pictures are shown as they are decoded.
+// A B picture is shown when it is decoded, any other picture when the next one that is not B is
+// decoded. Without B pictures, pictures are shown as they are decoded.
 void StampByType(const std::vector<Scanned*>& pictures, bool has_b) {
   int64_t next = pictures.back()->dts;
   if (next != AV_NOPTS_VALUE && pictures.front()->dts != AV_NOPTS_VALUE) {
@@ -121,7 +121,7 @@ void StampByType(const std::vector<Scanned*>& pictures, bool has_b) {
   }
 }
 
-// In the order in which they are shown.
+// In presentation order.
 std::vector<Scanned*> ByNumber(std::vector<Scanned*> pictures) {
   for (auto begin = pictures.begin(); begin != pictures.end();) {
     const auto end = std::find_if(
@@ -133,9 +133,9 @@ std::vector<Scanned*> ByNumber(std::vector<Scanned*> pictures) {
   return pictures;
 }
 
-// H.264 in AVI tells when pictures are decoded, not when they are shown: the same times, dealt out
-// in the order `shown`, and `delay` pictures later or so much that none is shown before it is
-// decoded.
+// H.264 in AVI has decoding times, but no presentation times: the same times are assigned in the
+// order `shown`, `delay` pictures later or as late as necessary for no picture to be shown before
+// it is decoded.
 void DealStamps(const std::vector<Scanned*>& decoded,
                 const std::vector<Scanned*>& shown,
                 int delay) {
@@ -147,8 +147,8 @@ void DealStamps(const std::vector<Scanned*>& decoded,
   for (size_t i = 0; i < shown.size(); ++i) shown[i]->packet.stamp = stamps[i] + late;
 }
 
-// Those without a stamp are spread evenly between those with. (A stamp that does not fit was given
-// to the wrong one of several pictures in a pack.)
+// Pictures without a timestamp are spread evenly between those with one. (A timestamp out of order
+// belongs to another picture of the pack.)
 void SpreadStamps(const std::vector<Scanned*>& shown) {
   std::vector<size_t> known;
   for (size_t i = 0; i < shown.size(); ++i) {
@@ -205,7 +205,7 @@ void FindPlaced(std::vector<FilmPacket>* packets) {
   }
 }
 
-// Frames, keys and what follows from the stamps.
+// Derives frames, keys and other fields from the timestamps.
 void NumberFrames(FilmIndex* index) {
   std::vector<int64_t>& stamps = index->stamps;
   for (const FilmPacket& packet : index->packets) {
@@ -232,7 +232,7 @@ void NumberFrames(FilmIndex* index) {
     }
     packet.latest = latest;
   }
-  // MPEG-TS says it a packet early: while that one is cut off the next one is read.
+  // MPEG-TS reports it one packet early, before the truncated packet is complete.
   for (size_t i = index->packets.size() - 1; i > 0; --i) {
     index->packets[i].is_torn |= index->packets[i - 1].is_torn;
   }
@@ -257,7 +257,7 @@ FilmIndex IndexFilm(FilmPackets* packets) {
     next.packet.size = packet->size;
     next.packet.is_key = (packet->flags & AV_PKT_FLAG_KEY) != 0;
     next.packet.is_torn = (packet->flags & AV_PKT_FLAG_CORRUPT) != 0;
-    // What an edit list cuts off is decoded for what follows it, and never shown.
+    // Pictures cut off by an edit list are decoded for the following ones, and never shown.
     next.packet.is_shown = (packet->flags & AV_PKT_FLAG_DISCARD) == 0;
     if (!next.is_second && packet->duration > 0) index.last_duration = packet->duration;
     scanned.push_back(next);
@@ -267,7 +267,8 @@ FilmIndex IndexFilm(FilmPackets* packets) {
   if (packets->container()->iformat->flags & AVFMT_TS_DISCONT) {
     RaiseFalls(av_q2d(packets->stream()->time_base), &scanned);
   } else {
-    // Only recordings begin between key packets; elsewhere the first one just lacks the mark.
+    // Only recordings begin between key packets; in other files the first packet just lacks the
+    // flag.
     scanned.front().packet.is_key = true;
   }
   StampPictures(&scanned, packets->codec());

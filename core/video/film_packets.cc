@@ -10,7 +10,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Streams of pictures; a picture in a sound file, its cover, and thumbnails are none.
+// Picture streams, without cover art and thumbnails.
 std::vector<AVStream*> FilmStreams(AVFormatContext* container) {
   std::vector<AVStream*> streams;
   for (unsigned i = 0; i < container->nb_streams; ++i) {
@@ -24,8 +24,8 @@ std::vector<AVStream*> FilmStreams(AVFormatContext* container) {
   return streams;
 }
 
-// Players take the one that is marked as the default; of several, or of none, the largest one, and
-// of those the first one.
+// Players take the stream marked as default; among several, or without one, the largest, and among
+// equals the first.
 bool IsPreferred(const AVStream* one, const AVStream* other) {
   const auto rank = [](const AVStream* stream) {
     return std::pair((stream->disposition & AV_DISPOSITION_DEFAULT) != 0,
@@ -57,7 +57,7 @@ void FilmPackets::UnpackPictures() {
   }
 }
 
-// Containers give a palette once, with the packet that it begins with, and not again after a seek.
+// Containers store a palette once, with the first packet that uses it, and not again after a seek.
 void FilmPackets::KeepPalette(AVPacket* packet) {
   size_t size = 0;
   const uint8_t* palette = av_packet_get_side_data(packet, AV_PKT_DATA_PALETTE, &size);

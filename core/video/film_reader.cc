@@ -22,15 +22,16 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Times of frames that differ by less than this share of their mean distance are one rate.
+// Frame times whose intervals differ by less than this share of the mean have a constant rate.
 constexpr double kRateTolerance = 0.2;
-// First frames that are asked what kind of pictures the film has, until one is whole.
+// Maximum number of first frames decoded to find an undamaged one, which gives the pictures'
+// format.
 constexpr int kFirstTries = 250;
 
 int QuarterTurns(const AVStream& stream) {
   const uint8_t* matrix = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, nullptr);
   if (matrix == nullptr) return 0;
-  // Anticlockwise, degrees; NaN for a matrix that is no rotation.
+  // Anticlockwise, degrees; NaN if the matrix is no rotation.
   const double turn = av_display_rotation_get(reinterpret_cast<const int32_t*>(matrix));
   if (!std::isfinite(turn)) return 0;
   return ((static_cast<int>(std::lround(-turn / 90.0)) % 4) + 4) % 4;
@@ -67,7 +68,7 @@ FilmTransfer TransferOf(const AVFrame& frame) {
   return FilmTransfer::kUsual;
 }
 
-// Data beside the frame, else beside its stream; null: there is none, or less than a `Facts`.
+// Side data of the frame, else of its stream; null if there is none or it is smaller than `Facts`.
 template <typename Facts>
 const Facts* DataBeside(const AVFrame& frame,
                         AVFrameSideDataType of_frame,
@@ -82,7 +83,7 @@ const Facts* DataBeside(const AVFrame& frame,
   return data != nullptr && size >= sizeof(Facts) ? reinterpret_cast<const Facts*>(data) : nullptr;
 }
 
-// The brightest light of a PQ film, cd/m2: as the film says, else as its grading display shows it.
+// Peak luminance of a PQ film, cd/m2: as stated, else that of its mastering display.
 double PeakNits(const AVFrame& frame, const AVStream& stream) {
   double peak = 0.0;
   if (const auto* light = DataBeside<AVContentLightMetadata>(
@@ -180,7 +181,7 @@ class FilmReader::Impl {
                                                            : "the largest"));
   }
 
-  // What only decoded frames tell. One that is damaged says nothing; recordings begin with some.
+  // Facts known only from decoded frames. Damaged frames are skipped; recordings begin with some.
   void TakeFirstFrame() {
     const int tries = std::min(kFirstTries, static_cast<int>(times_.size()));
     int frame = 0;
@@ -217,9 +218,9 @@ class FilmReader::Impl {
                     peak_nits));
   }
 
-  // Decoders say of greys that their range is limited where their file says nothing (MagicYUV,
-  // HEVC, AV1), and who writes them seldom means it: the container is believed, and H.264, whose
-  // decoder says only what is stated.
+  // Some decoders report limited range for grey if the file states none (MagicYUV, HEVC, AV1),
+  // which is rarely intended: the container is trusted, and H.264, whose decoder reports only
+  // stated values.
   AVColorRange RangeOf(const AVFrame& picture) const {
     const bool is_stated = film_.packets().stated_range() == AVCOL_RANGE_MPEG ||
                            film_.codec().codec_id == AV_CODEC_ID_H264;

@@ -18,7 +18,7 @@ extern "C" {
 namespace color3d {
 namespace {
 
-// What players of MP4 play.
+// Codecs that MP4 players support.
 constexpr AVCodecID kCopied[] = {
     AV_CODEC_ID_AAC, AV_CODEC_ID_MP3, AV_CODEC_ID_AC3, AV_CODEC_ID_EAC3, AV_CODEC_ID_OPUS};
 constexpr int64_t kBitsPerChannel = 96000;
@@ -67,7 +67,7 @@ class FilmSound::Impl {
  private:
   double Tick() const { return av_q2d(stream_->time_base); }
 
-  // Some of it more than is asked for: decoders need what comes before.
+  // Includes a little before the part, as preroll for decoders.
   void SeekTo(double begin_s) {
     constexpr double kBeforeS = 1.0;
     const auto stamp = static_cast<int64_t>((begin_s - kBeforeS) / Tick());
@@ -75,7 +75,7 @@ class FilmSound::Impl {
     av_seek_frame(file_->container(), stream_->index, stamp, AVSEEK_FLAG_BACKWARD);
   }
 
-  // The next packet of the file that has a time.
+  // The next packet of the file with a time.
   bool ReadPacket() {
     while (file_->ReadPacket(packet_.get())) {
       if (packet_->stream_index == stream_->index && packet_->size > 0) {
@@ -92,7 +92,7 @@ class FilmSound::Impl {
     const auto end = static_cast<int64_t>(std::llround(part_.end_s / Tick()));
     while (ReadPacket()) {
       if (packet_->pts >= end) break;
-      // A decoder's first packet is not heard in full.
+      // A decoder's first packet is not output in full.
       if (packet_->pts + 2 * packet_->duration > zero &&
           (last_ == AV_NOPTS_VALUE || packet_->pts > last_)) {
         last_ = packet_->pts;
@@ -158,7 +158,7 @@ class FilmSound::Impl {
     }
   }
 
-  // A frame of what waits, the last one perhaps short; or the end.
+  // Encodes a queued frame, the last one perhaps short; or the end.
   void EncodeWaiting() {
     const int samples = std::min<int>(encoder_->frame_size, static_cast<int>(waiting_[0].size()));
     if (samples == 0) {
@@ -191,7 +191,7 @@ class FilmSound::Impl {
       PlaceFrame();
     } else if (result == AVERROR(EAGAIN)) {
       const bool more = ReadPacket();
-      // What the decoder refuses is damaged: silence takes its place.
+      // Packets that the decoder refuses are damaged and replaced by silence.
       avcodec_send_packet(decoder_.get(), more ? packet_.get() : nullptr);
       av_packet_unref(packet_.get());
     } else {
@@ -214,8 +214,7 @@ class FilmSound::Impl {
     if (!follows) begins_at_ = at;
   }
 
-  // Of the frame what lies within the part, at its time; before it some of the silence where
-  // nothing was.
+  // The part of the frame within the range, at its time; preceded by silence for gaps.
   void Append() {
     constexpr int64_t kSilence = 1 << 16;
     int64_t next = NextSample();
@@ -248,7 +247,7 @@ class FilmSound::Impl {
   AVRational time_base_{1, 1};
   std::string warning_;
   int64_t last_ = AV_NOPTS_VALUE;  // time of the packet copied last
-  // Where it is coded again:
+  // For re-encoding:
   std::unique_ptr<AVCodecContext, FreeCodec> decoder_, encoder_;
   std::unique_ptr<AVFrame, FreeFrame> frame_;
   AVCodecParameters* coded_as_ = nullptr;

@@ -47,7 +47,7 @@ void FrameConverter::Prepare(const Shape& shape) {
                 name != nullptr ? name : "unknown");
   }
   shape_ = shape;
-  // A new converter has the range that its format has by itself.
+  // A new converter has the default range of its format.
   int *matrix = nullptr, *out_matrix = nullptr;
   int is_full = 0, out_is_full = 0, brightness = 0, contrast = 0, saturation = 0;
   sws_getColorspaceDetails(converter_.get(),
@@ -62,7 +62,7 @@ void FrameConverter::Prepare(const Shape& shape) {
 }
 
 Image FrameConverter::Convert(const AVFrame& frame, AVColorRange range, int width, int height) {
-  // Of interlaced film the lines of one moment count: every second.
+  // Uses every second line of interlaced frames, those of one field.
   const int step = frame.interlaced_frame != 0 && frame.height > 1 ? 2 : 1;
   const int lines = frame.height / step;
   Prepare({frame.width, lines, frame.format, width, height});

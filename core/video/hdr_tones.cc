@@ -31,7 +31,7 @@ double HlgScene(double value) {
   return value <= 0.5 ? value * value / 3.0 : (std::exp((value - kC) / kA) + kB) / 12.0;
 }
 
-// `at` in 0..1 along the table.
+// Interpolates the table at `at` in 0..1.
 float Interpolated(const std::vector<float>& table, float at) {
   const float place = std::clamp(at, 0.0f, 1.0f) * kSteps;
   const auto before = std::min(static_cast<size_t>(place), static_cast<size_t>(kSteps - 1));
@@ -94,7 +94,7 @@ void HdrTones::Apply(Image* rgb) const {
   for (size_t i = 0; i < rgb->PlaneSize(); ++i) {
     float r = light_of(red[i]), g = light_of(green[i]), b = light_of(blue[i]);
     if (transfer_ == FilmTransfer::kHlg) {
-      // As a display of 1000 cd/m2 shows the scene (BT.2100, table 5: gamma 1.2).
+      // As displayed at 1000 cd/m2 (BT.2100, table 5: gamma 1.2).
       const float scene = kRed * r + kGreen * g + kBlue * b;
       const float display =
           static_cast<float>(kUsualPeakNits) * std::pow(std::max(scene, 0.0f), 0.2f);

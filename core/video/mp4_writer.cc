@@ -22,7 +22,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// The best first. Others that FFmpeg may know need a graphics card or are closed.
+// Best first. Other encoders of FFmpeg need a graphics card or are proprietary.
 constexpr const char* kEncoders[] = {"libx264", "libopenh264", "mpeg4"};
 constexpr int kKeyFrameSeconds = 2;  // a player that is moved has this much to decode at most
 
@@ -130,7 +130,7 @@ class Mp4Writer::Impl {
           options_.width,
           options_.height);
     }
-    // The encoder may still need the last one.
+    // The encoder may still reference the last one.
     Require(av_frame_make_writable(frame_.get()), "go on with");
     YuvFromSrgb(srgb,
                 {frame_->data[0], frame_->linesize[0]},
@@ -234,7 +234,7 @@ class Mp4Writer::Impl {
     }
     movie->flags |= AVFMT_FLAG_BITEXACT;  // equal pictures, equal bytes
     Require(avio_open(&movie->pb, part_.c_str(), AVIO_FLAG_WRITE), "write");
-    // The index comes first, so that a browser can begin before it has all.
+    // The index comes first, so that browsers can start before the download ends.
     AVDictionary* options = nullptr;
     av_dict_set(&options, "movflags", "+faststart", 0);
     const int result = avformat_write_header(movie, &options);
@@ -257,7 +257,7 @@ class Mp4Writer::Impl {
     }
   }
 
-  // All that is heard up to a time.
+  // Writes all sound up to a time.
   void WriteSound(double until_s) {
     if (sound_stream_ == nullptr) return;
     while (heard_s_ <= until_s) {

@@ -15,11 +15,11 @@ namespace {
 
 constexpr float kSilence = -8.0f;
 constexpr int kTrend = 20;  // levels to either side: what is slower is the room's and the gain's
-// Levels that follow each other are alike: so many tell as much as one.
+// Adjacent levels are correlated: this number of them counts as one observation.
 constexpr double kLevelsPerSample = 5.0;
 constexpr double kLeastOverlapS = 2.0;
-// The correlation in its own deviations, of sounds that have nothing in common: one lag of many
-// must stand out, and by far.
+// Minimum correlation in standard deviations of unrelated sounds: one lag of many must stand out
+// clearly.
 constexpr double kLeastScore = 7.0;
 constexpr double kLeastLead = 1.4;  // over the best lag elsewhere
 constexpr int kPeakReach = 25;      // levels about the best lag that are still its peak
@@ -43,7 +43,7 @@ class SoundDecoder {
     if (is_open_) decoder_->pkt_timebase = stream_->time_base;
   }
 
-  // Null behind the last one.
+  // Null after the last one.
   const AVFrame* Next() {
     while (is_open_) {
       const int result = avcodec_receive_frame(decoder_.get(), frame_.get());
@@ -56,7 +56,7 @@ class SoundDecoder {
     return nullptr;
   }
 
-  // When the last frame begins, by the file's own time, s.
+  // Time of the last frame in the file, s.
   double TimeOf(const AVFrame& frame) const {
     return static_cast<double>(frame.best_effort_timestamp) * av_q2d(stream_->time_base);
   }
@@ -78,7 +78,7 @@ class SoundDecoder {
   bool is_open_ = false;
 };
 
-// None where the file is none that can be read.
+// None if the file cannot be read.
 std::unique_ptr<SoundDecoder> OpenSound(const SoundPart& part, const CancellationToken& cancel) {
   try {
     return std::make_unique<SoundDecoder>(part, cancel);
@@ -88,7 +88,7 @@ std::unique_ptr<SoundDecoder> OpenSound(const SoundPart& part, const Cancellatio
   }
 }
 
-// Levels less their mean over the time around.
+// Levels minus their moving average.
 std::vector<double> WithoutTrend(const std::vector<float>& levels) {
   const auto count = static_cast<int>(levels.size());
   std::vector<double> sum(count + 1, 0.0), change(count);
@@ -164,7 +164,7 @@ std::optional<double> SoundOffset(const std::vector<float>& one, const std::vect
   const std::vector<double> sum_a = SumsOfSquares(a), sum_b = SumsOfSquares(b);
   const std::vector<double> sums = CrossSums(a, b);
   const auto size = static_cast<int64_t>(sums.size());
-  // Correlation of what overlaps, in deviations.
+  // Correlation over the overlap, in standard deviations.
   const auto score = [&](int64_t lag) {
     const int64_t begin = std::max<int64_t>(0, lag), end = std::min(n, m + lag);
     if (end - begin < least) return 0.0;
@@ -182,7 +182,7 @@ std::optional<double> SoundOffset(const std::vector<float>& one, const std::vect
     if (std::abs(lag - best) > kPeakReach) elsewhere = std::max(elsewhere, score(lag));
   }
   if (best_score < kLeastScore || best_score < kLeastLead * elsewhere) return std::nullopt;
-  // The top of the parabola through the peak.
+  // Vertex of the parabola through the peak.
   const double before = score(best - 1), behind = score(best + 1);
   const double bend = before - 2.0 * best_score + behind;
   const double shift = bend < 0.0 ? std::clamp(0.5 * (before - behind) / bend, -0.5, 0.5) : 0.0;

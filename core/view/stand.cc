@@ -13,7 +13,7 @@ constexpr double kKeyDistance = 2.0;   // of the key view's camera, in the page'
 constexpr double kTiltWeight = 0.1;    // of the mean up vector against level horizons
 constexpr double kOneDirection = 0.3;  // length of a mean of unit vectors that agree a little
 
-// Axis of the camera's frame in the scene.
+// An axis of the camera, in the scene's frame.
 Vector3d AxisOf(const View& view, const Vector3d& in_camera) {
   return view.cam_from_world.rotation.conjugate() * in_camera;
 }
@@ -66,7 +66,7 @@ StandingCamera CameraOn(const Stand& stand, const View& view) {
   camera.rotation = stand.rotation * view.cam_from_world.rotation.conjugate() * flip;
   const Vector3d look = stand.rotation * AxisOf(view, Vector3d::UnitZ());
   const double ahead = -camera.position.dot(look);
-  // What lies behind a camera, or close before it, is no good to turn around.
+  // Points behind a camera or very close to it are unsuitable as centre.
   const double least = 0.2 * kKeyDistance;
   camera.target = camera.position + (ahead > least ? ahead : kKeyDistance) * look;
   return camera;

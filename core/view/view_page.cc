@@ -59,7 +59,7 @@ std::string ConfidenceBytes(const std::vector<float>& confidence) {
   return bytes;
 }
 
-// JSON that may stand in a script element of HTML.
+// JSON escaped for a script element of HTML.
 std::string InHtml(const ordered_json& json) {
   std::string text;
   for (const char c : json.dump(-1, ' ', true)) {
@@ -81,7 +81,7 @@ std::string Facts(const Scene& scene, const ViewPage& page) {
     photos.push_back(PhotoJson(stand, scene.views.at(photo.view), photo.jpeg));
   }
   if (key < 0) throw InvalidArgument("the key view is not among the photos of the page");
-  // page = stand of ((file - offset) / scale).
+  // page = placement of ((file - offset) / scale).
   const double scale = stand.scale / page.file_scale;
   const Eigen::Vector3d center = page.file_scale * stand.center + page.file_offset;
   return InHtml({{"scene", page.file_name},

@@ -5,7 +5,7 @@ extern char** environ;
 namespace color3d {
 
 bool IsHandedOn(std::string_view variable) {
-  // With "=": the whole name; without: how names begin.
+  // With "=": the whole name; without: a prefix of names.
   for (const std::string_view name : {"PATH=",
                                       "LANG=",
                                       "LC_",

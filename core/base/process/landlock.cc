@@ -39,7 +39,8 @@ constexpr uint64_t kWrite =
 constexpr uint64_t kOfFiles = LANDLOCK_ACCESS_FS_EXECUTE | LANDLOCK_ACCESS_FS_READ_FILE |
                               LANDLOCK_ACCESS_FS_WRITE_FILE | kTruncate;
 
-// What programs need of the system. Of /etc no more than this: keys and tokens lie there, too.
+// Parts of the system that programs need. Of /etc no more than this, because it also contains keys
+// and tokens.
 constexpr const char* kSystem[] = {"/usr",
                                    "/bin",
                                    "/sbin",
@@ -91,7 +92,7 @@ class Ruleset {
     return fd_;
   }
 
-  // What is not there, or may not be seen, needs no rule.
+  // Missing or invisible paths need no rule.
   void Allow(const fs::path& path, uint64_t access) const {
     const int parent = ::open(path.c_str(), O_PATH | O_CLOEXEC);
     if (parent < 0) return;

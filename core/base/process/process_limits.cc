@@ -12,7 +12,7 @@
 namespace color3d {
 namespace {
 
-// Both limits, the soft one and the hard one, which cannot be raised again.
+// Sets the soft and the hard limit; the latter cannot be raised again.
 bool Lower(int resource, rlim_t value) noexcept {
   rlimit limit{};
   if (::getrlimit(resource, &limit) != 0) return false;
@@ -36,7 +36,7 @@ bool LimitProcess(const ProcessLimits& limits) noexcept {
 }
 
 bool BeEndedFirstWhenMemoryRunsOut() noexcept {
-  // Of -1000 to 1000; what a process takes of the machine adds up to 1000.
+  // Range -1000 to 1000; the kernel adds up to 1000 for the process's share of memory.
   constexpr std::string_view kScore = "500";
   const int fd = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
   if (fd < 0) return false;

@@ -20,7 +20,7 @@
 namespace color3d {
 namespace {
 
-// The program's full path, found as a shell would; empty when there is none.
+// The program's full path, found as by a shell; empty if there is none.
 std::string FindProgram(const std::string& name) {
   if (name.find('/') != std::string::npos) return ::access(name.c_str(), X_OK) == 0 ? name : "";
   const char* path = std::getenv("PATH");
@@ -43,7 +43,7 @@ std::vector<char*> Pointers(std::vector<std::string>& texts) {
   return pointers;
 }
 
-// What was given goes before what is handed on.
+// Given variables override inherited ones.
 std::vector<std::string> VariablesOf(const SubprocessOptions& options) {
   std::vector<std::string> variables = options.environment;
   for (const std::string& variable : EnvironmentToHandOn()) {
@@ -63,7 +63,7 @@ std::unique_ptr<Sandbox> PrepareSandbox(const SubprocessOptions& options,
   return std::make_unique<Sandbox>(rules);
 }
 
-// In the child, between fork and exec: what is to be said is written out beforehand.
+// Called in the child between fork and exec; the message is prepared in advance.
 [[noreturn]] void GiveUp(std::string_view message) {
   [[maybe_unused]] const ssize_t written = ::write(2, message.data(), message.size());
   ::_exit(127);

@@ -15,10 +15,9 @@
 namespace color3d {
 
 struct SubprocessOptions {
-  std::vector<std::string> arguments;  // arguments[0] is searched in PATH
-  std::vector<std::string>
-      environment;  // "NAME=value", in addition to the inherited ones (environment.h)
-  std::filesystem::path log_path;  // stdout and stderr are appended here; empty: discarded
+  std::vector<std::string> arguments;    // arguments[0] is searched in PATH
+  std::vector<std::string> environment;  // "NAME=value", added to those inherited (environment.h)
+  std::filesystem::path log_path;        // stdout and stderr are appended here; empty: discarded
   std::chrono::seconds timeout{3600};
   ProcessLimits limits;
   std::optional<SandboxRules> sandbox;  // the program itself is readable in addition

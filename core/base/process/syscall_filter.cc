@@ -101,7 +101,7 @@ class Filter {
     Require(::seccomp_attr_set(context_.get(), SCMP_FLTATR_ACT_BADARCH, kRefuse), "architecture");
   }
 
-  // Calls that this architecture or library does not know are passed over.
+  // Skips calls unknown to this architecture or library.
   void Add(uint32_t action, const char* name, std::initializer_list<scmp_arg_cmp> when = {}) {
     const int number = ::seccomp_syscall_resolve_name(name);
     if (number == __NR_SCMP_ERROR) return;
@@ -136,7 +136,7 @@ class Filter {
 void RefuseSockets(Filter* filter, Sockets allowed) {
   std::vector<int> families;
   if (allowed != Sockets::kNone) families = {AF_UNIX};
-  // Names of hosts are looked up with the help of AF_NETLINK.
+  // Host name lookup uses AF_NETLINK.
   if (allowed == Sockets::kAll) families = {AF_UNIX, AF_INET, AF_INET6, AF_NETLINK};
   for (int family = 0; family < AF_MAX; ++family) {
     if (std::find(families.begin(), families.end(), family) != families.end()) continue;
@@ -155,7 +155,7 @@ bool HasSyscallFilters() {
 std::vector<sock_filter> CompileSyscallFilter(const SandboxRules& rules) {
   Filter filter;
   for (const char* name : kRefused) filter.Add(kRefuse, name);
-  // Its flags lie in memory, where no filter looks; who calls it falls back to clone.
+  // Its flags are in memory, which filters cannot read; callers fall back to clone.
   filter.Add(SCMP_ACT_ERRNO(ENOSYS), "clone3");
   for (const int flag : kNamespaces) {
     const auto bits = static_cast<scmp_datum_t>(flag);
@@ -167,7 +167,7 @@ std::vector<sock_filter> CompileSyscallFilter(const SandboxRules& rules) {
     filter.Add(kRefuse, "clone", {SCMP_A0(SCMP_CMP_MASKED_EQ, CLONE_THREAD, 0)});
   }
   RefuseSockets(&filter, rules.sockets);
-  // Keystrokes into the terminal that the server was started from.
+  // Would inject keystrokes into the server's terminal.
   for (const int request : {TIOCSTI, TIOCLINUX}) {
     filter.Add(kRefuse,
                "ioctl",

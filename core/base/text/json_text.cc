@@ -18,7 +18,7 @@ bool IsOfToken(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '+' || c == '.';
 }
 
-// A word that stands for a number, but that JSON does not have.
+// A word for a number that JSON lacks.
 bool IsNoJsonNumber(std::string_view token) {
   if (token.front() == '-' || token.front() == '+') token.remove_prefix(1);
   const std::string word = LowerCase(token.substr(0, 16));
@@ -26,7 +26,7 @@ bool IsNoJsonNumber(std::string_view token) {
   if (word.empty() || std::isdigit(static_cast<unsigned char>(word[0])) == 0) return false;
   double value = 0.0;
   const auto [end, error] = std::from_chars(token.data(), token.data() + token.size(), value);
-  // Out of range is what is too small, too, and that is as good as 0 for JSON.
+  // Too small numbers are out of range, too, and are equivalent to 0.
   return error == std::errc::result_out_of_range && end == token.data() + token.size() &&
          token.find("e-") == token.npos && token.find("E-") == token.npos;
 }

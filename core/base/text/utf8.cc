@@ -37,7 +37,7 @@ size_t CharacterLength(std::string_view text, uint32_t* code_point = nullptr) {
   return value < kSmallest[length] || surrogate || value > 0x10ffff ? 0 : length;
 }
 
-// C0, DEL and C1; the ends of lines and paragraphs; what turns the direction of writing.
+// C0, DEL and C1; line and paragraph separators; controls of the writing direction.
 bool IsControl(uint32_t c) {
   return c < 0x20 || (c >= 0x7f && c < 0xa0) || c == 0x061c || c == 0x200e || c == 0x200f ||
          (c >= 0x2028 && c <= 0x202e) || (c >= 0x2066 && c <= 0x2069);

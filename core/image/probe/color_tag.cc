@@ -105,7 +105,7 @@ bool IsSrgb(const Chromaticities& c) {
   });
 }
 
-// Chunks that say less than others that are there do not count (PNG, 11.3.2).
+// Ignores chunks that a more specific chunk overrides (PNG, 11.3.2).
 ColorTag TagOfPng(std::string_view bytes) {
   const ByteReader reader(bytes);
   ColorTag tag, weak;
@@ -127,7 +127,7 @@ ColorTag TagOfPng(std::string_view bytes) {
   }
   tag.is_srgb = is_srgb;
   if (is_srgb || !tag.profile.empty() || !tag.problem.empty()) return tag;
-  // Primaries alone say nothing without a curve. Programs that mean sRGB write a gamma of 1 / 2.2.
+  // Primaries without a curve are unusable. Programs that mean sRGB write a gamma of 1 / 2.2.
   if (weak.gamma == 0.0) return {};
   if (!(weak.gamma >= 0.2 && weak.gamma <= 5.0)) {
     return {.problem = fmt::format("its gamma is {:g}", weak.gamma)};
@@ -156,7 +156,7 @@ ColorTag TagOfTiff(std::string_view bytes) {
   return tag;
 }
 
-// BITMAPV5HEADER, whose bV5CSType says where the profile is.
+// BITMAPV5HEADER, whose bV5CSType gives the location of the profile.
 ColorTag TagOfBmp(std::string_view bytes) {
   constexpr size_t kHeader = 14, kVersion5Bytes = 124;
   ColorTag tag;
@@ -174,7 +174,7 @@ ColorTag TagOfBmp(std::string_view bytes) {
   return tag;
 }
 
-// The Design rule for Camera File system: photos of the option file "R03" are Adobe RGB.
+// Design rule for Camera File system: photos of the option file "R03" are Adobe RGB.
 ColorTag TagOfExif(std::string_view bytes) {
   constexpr unsigned kInteroperability = 40965, kIndex = 1;
   constexpr double kAdobeGamma = 563.0 / 256.0;

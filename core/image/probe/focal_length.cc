@@ -29,7 +29,7 @@ double ReadFocalLengthPx(std::string_view bytes, int width, int height) {
   ExifDirectory first, photo;
   if (!FirstExifDirectory(FindExifBlock(bytes), &first)) return 0.0;
   if (!PhotoExifDirectory(first, &photo)) {
-    // Of a TIFF with a preview before the picture.
+    // In TIFFs with a preview before the picture.
     if (const size_t chosen = ChosenTiffDirectory(bytes); chosen != 0) first.at = chosen;
     if (!PhotoExifDirectory(first, &photo)) return 0.0;
   }
@@ -37,7 +37,7 @@ double ReadFocalLengthPx(std::string_view bytes, int width, int height) {
   double focal_px =
       ReadExifNumber(photo, kFocalLengthIn35mmFilm) * std::hypot(width, height) / kFilmDiagonalMm;
   if (focal_px == 0.0) {
-    // The resolution counts pixels as taken; the file may be a reduced copy.
+    // The resolution refers to the pixels as taken; the file may be a reduced copy.
     const double taken_width = ReadExifNumber(photo, kPixelXDimension);
     const double px_per_mm = ReadExifNumber(photo, kFocalPlaneXResolution) /
                              UnitMm(ReadExifNumber(photo, kFocalPlaneResolutionUnit));

@@ -7,7 +7,7 @@ namespace {
 
 constexpr size_t kMaxEntries = 65'536;  // of each list, against lists that repeat themselves
 
-// Reads one field after the other; the end of the bytes is the end of the box.
+// Reads one field after another; the end of the bytes is the end of the box.
 class Fields {
  public:
   Fields(const ProbeContext& context, std::string_view bytes)
@@ -41,7 +41,7 @@ struct Box {
   std::string_view body;
 };
 
-// The boxes in `bytes`, one behind the other. `is_file`: what ends too early is a truncated file.
+// The boxes in `bytes`, in order. `is_file`: data that ends too early means a truncated file.
 std::vector<Box> ListBoxes(const ProbeContext& context, std::string_view bytes, bool is_file) {
   const ByteReader reader(bytes);
   std::vector<Box> boxes;
@@ -61,7 +61,7 @@ std::vector<Box> ListBoxes(const ProbeContext& context, std::string_view bytes, 
     if (size < header) throw context.Damaged("a box is smaller than its header");
     if (!reader.Has(at, size)) {
       if (!is_file) throw context.Damaged("a box is larger than the one around it");
-      // What is cut off of the picture's data is missed where its parts are checked.
+      // Truncated picture data is detected when its parts are checked.
       if (boxes.empty() || bytes.substr(at + 4, 4) == "meta") {
         throw context.Truncated("it ends inside its header");
       }

@@ -12,7 +12,7 @@ constexpr unsigned kOrientationTag = 274;
 }  // namespace
 
 int ReadOrientation(std::string_view bytes) {
-  // HEIC pictures are turned by properties of their own, which decoders obey.
+  // HEIC pictures are rotated by properties, which decoders apply.
   if (probe_internal::IsHeif(bytes)) return 1;
   ExifDirectory directory;
   if (!FirstExifDirectory(FindExifBlock(bytes), &directory)) return 1;

@@ -64,7 +64,7 @@ constexpr Ending kEndings[] = {{"jpg", ImageFormat::kJpeg},
 
 bool IsReadable(ImageFormat format) { return format != ImageFormat::kHeif || ReadsHeif(); }
 
-// How files that people take for photographs begin.
+// First bytes of files that users mistake for photographs.
 struct Beginning {
   std::string_view bytes;
   const char* kind;

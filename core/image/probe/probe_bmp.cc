@@ -33,7 +33,7 @@ void CheckKind(const ProbeContext& context, uint32_t bits, uint32_t compression)
   throw context.Damaged("it claims {} bits a pixel and compression {}", bits, compression);
 }
 
-// Colours that are not there are black.
+// Missing colours are black.
 bool HasGrayPalette(const ByteReader& reader, uint32_t header, uint32_t bits) {
   const size_t entry_bytes = header == kOs2HeaderBytes ? 3 : 4;
   const uint32_t used = header == kOs2HeaderBytes ? 0 : reader.U32(kFileHeaderBytes + 32);
@@ -47,7 +47,7 @@ bool HasGrayPalette(const ByteReader& reader, uint32_t header, uint32_t bits) {
 
 }  // namespace
 
-// "BM" begins many a text, too: what follows must fit as far as it is there.
+// Many texts begin with "BM", too: all available header fields must be plausible.
 bool IsBmp(std::string_view bytes) {
   if (bytes.size() < 6 || bytes.substr(0, 2) != "BM") return false;
   const ByteReader reader(bytes, /*big_endian=*/false);
@@ -76,7 +76,7 @@ ImageInfo ProbeBmp(const ProbeContext& context) {
   if (data < kFileHeaderBytes + header) throw context.Damaged("its data begins in its header");
   const uint64_t row_bytes = (static_cast<uint64_t>(width) * bits + 31) / 32 * 4;
   const bool runs = compression == kRle8 || compression == kRle4;
-  // A run of two bytes is 255 pixels at most; rows may be left out, but hardly all of them.
+  // A run of two bytes is 255 pixels at most; rows may be skipped, but hardly all of them.
   const uint64_t least = runs ? 2 : row_bytes * static_cast<uint64_t>(height);
   if (!reader.Has(data, least)) {
     throw context.Truncated("it ends inside its image data");

@@ -16,7 +16,7 @@ bool IsBrand(std::string_view brand) {
   return std::find(std::begin(kBrands), std::end(kBrands), brand) != std::end(kBrands);
 }
 
-// The item with its bytes in this file, and those of all that it is put together from.
+// Checks the item's bytes in this file, and those of all items that form it.
 void CheckItem(const ProbeContext& context,
                const HeifBoxes& boxes,
                uint32_t id,
@@ -55,7 +55,7 @@ struct Outline {
   std::string_view profile;
 };
 
-// What the properties of the picture say, in their order.
+// Properties of the picture, in order.
 Outline ReadOutline(const HeifBoxes& boxes, const HeifItem& item) {
   Outline outline;
   for (const size_t index : item.properties) {

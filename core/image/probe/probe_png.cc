@@ -57,7 +57,7 @@ void ReadHeader(const ProbeContext& context,
   }
 }
 
-// Deflate shrinks at most 1032-fold: less data than that cannot hold the image that is claimed.
+// Deflate shrinks at most 1032-fold: less data cannot hold the claimed image.
 void CheckDataSize(const ProbeContext& context, const ImageInfo& info, int64_t data_bytes) {
   const int64_t pixels = static_cast<int64_t>(info.width) * info.height;
   const int64_t bits = pixels * info.bits_per_channel;  // of at least one channel
@@ -69,7 +69,7 @@ void CheckDataSize(const ProbeContext& context, const ImageInfo& info, int64_t d
 }  // namespace
 
 bool IsPng(std::string_view bytes) {
-  // Four bytes are enough to be sure that it was meant to be one.
+  // Four bytes suffice to recognize the intended format.
   const size_t n = std::min(bytes.size(), kSignature.size());
   return n >= 4 && bytes.substr(0, n) == kSignature.substr(0, n);
 }

@@ -20,7 +20,7 @@ constexpr uint32_t kTileOffsets = 324;
 constexpr uint32_t kTileByteCounts = 325;
 constexpr uint32_t kSampleFormat = 339;
 
-// Where the values of one directory entry lie; they are inside the file.
+// Location of the values of one directory entry, inside the file.
 struct Entry {
   uint32_t type = 0;
   uint32_t count = 0;

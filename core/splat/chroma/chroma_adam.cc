@@ -67,7 +67,7 @@ class ChromaTrainer {
   }
 
  private:
-  // Everything that the course of training depends on, but for the targets themselves.
+  // All inputs of the fit except the targets.
   std::string Fingerprint() const {
     return fmt::format("chroma adam {} {} {} {} {} {} {}",
                        options_.iterations,
@@ -93,7 +93,7 @@ class ChromaTrainer {
     }
   }
 
-  // Share of the schedule that is over, by iterations or by time.
+  // Completed share of the schedule, by iterations or by time.
   double Done() const {
     const double by_count =
         static_cast<double>(state_.iteration) / std::max(1, options_.iterations);

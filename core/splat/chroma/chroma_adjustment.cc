@@ -44,7 +44,7 @@ void ChromaAdjustment::Validate() const {
 void AdjustChroma(const ChromaAdjustment& adjustment, GaussianModel* model) {
   adjustment.Validate();
   if (adjustment == ChromaAdjustment{}) return;
-  // What a neutral grey gains for each unit of L + 16, and the factor on X or Z that gives that.
+  // Gain of a neutral grey per unit of L + 16, and the factor on X or Z that produces it.
   const double a_per_l = adjustment.tint / (kMiddle + kOffset);
   const double b_per_l = adjustment.warmth / (kMiddle + kOffset);
   const double x_scale = 1.0 + a_per_l * kRange / kA;

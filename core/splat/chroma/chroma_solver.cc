@@ -14,7 +14,7 @@
 namespace color3d {
 namespace {
 
-// Of the ordered-subsets sweeps: the first step, and the factor from sweep to sweep. Measured.
+// First step of the ordered-subsets sweeps, and its factor from sweep to sweep. Measured.
 constexpr double kFirstRelaxation = 1.0;
 constexpr double kRelaxationDecay = 0.9;
 
@@ -64,7 +64,7 @@ class ChromaSolver {
   }
 
  private:
-  // How far the solver is: with the coefficients, all that it has to remember between rounds.
+  // Progress of the solver: with the coefficients, its complete state between rounds.
   struct State {
     int32_t sweep = 0;      // sweeps that are done
     int32_t round = 0;      // rounds of reweighting that are done
@@ -88,8 +88,8 @@ class ChromaSolver {
     return x;
   }
 
-  // Rounded to float, so that going on from a checkpoint gives the same bytes. Splats that hide
-  // each other can cancel with chroma that no colour has: kept within what Lab needs.
+  // Rounded to float, so that resuming from a checkpoint gives the same bytes. Splats that occlude
+  // each other can cancel with impossible chroma, so values are limited to the range of Lab.
   void ToParameters() {
     const int n = parameters_.coefficients();
     for (int64_t i = 0; i < system_.count(); ++i) {
@@ -207,7 +207,7 @@ class ChromaSolver {
     }
   }
 
-  // Everything that the course of the fit depends on, but for the targets themselves.
+  // All inputs of the fit except the targets.
   std::string Fingerprint() const {
     return fmt::format("chroma cg {} {} {} {} {} {} {} {} {} {} {} {}",
                        options_.iterations,

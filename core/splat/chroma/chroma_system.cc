@@ -32,7 +32,7 @@ struct ChromaSystem::View {
     mask = AlignedFloats();
     d = AlignedFloats();
   }
-  // That are held, used or not.
+  // Size of the allocation, used or not.
   int64_t Bytes() const {
     auto bytes =
         static_cast<int64_t>(sizeof(float) * (target.capacity() + mask.capacity() + d.capacity()));
@@ -143,8 +143,8 @@ int64_t ChromaSystem::kept_bytes() const {
   return bytes;
 }
 
-// visit(view, planes) for every view, one after the other, the k-th of them order(k). `planes`: the
-// targets of one that is not kept; some views' are read at once.
+// Calls visit(view, planes) for every view, the k-th of them order(k). `planes`: the targets of a
+// view that is not cached; several views are read concurrently.
 template <class Order, class Visitor>
 void ChromaSystem::ForViews(const CancellationToken& cancel,
                             const Order& order,
@@ -166,7 +166,7 @@ void ChromaSystem::ForViews(const CancellationToken& cancel,
   }
 }
 
-// visit(thread, tile) for every tile; a thread's tiles are always the same.
+// Calls visit(thread, tile) for every tile; the assignment of tiles to threads is fixed.
 template <class Visitor>
 void ChromaSystem::ForTiles(View& view, const ChromaPlanes* planes, const Visitor& visit) {
   if (!view.kept) BinView(view.camera);
@@ -228,7 +228,7 @@ ChromaSystem::PixelSums ChromaSystem::SumOfThreads() {
   return sum;
 }
 
-// y += Y^T (sums over the threads), and the sums are zero again.
+// y += Y^T (sums over the threads), and resets the sums to zero.
 void ChromaSystem::AddSums(const RasterCamera& camera, Sums& sums, ChromaVector& y) {
   pool_.ForRanges(count(), [&](int64_t begin, int64_t end, int) {
     float basis[kMaxShCoefficients];
@@ -275,7 +275,7 @@ void ChromaSystem::AddBlocks(const RasterCamera& camera, std::vector<double>& bl
   });
 }
 
-// x += relaxation * sums / B, and the sums are zero again.
+// x += relaxation * sums / B, and resets the sums to zero.
 void ChromaSystem::Step(const RasterCamera& camera,
                         double relaxation,
                         double rest_weight,
@@ -319,7 +319,7 @@ double ChromaSystem::Sweep(const RobustWeights& robust,
                            ChromaVector& x) {
   ResetSums(sums_);
   ResetSums(right_);
-  // Views in the order of a path would drag the colours along it: a stride that is coprime to their
+  // Sweeping views in the order of a path would drag colours along it: a stride coprime to their
   // number mixes them.
   const size_t n = views_.size();
   size_t stride = std::max<size_t>(1, static_cast<size_t>(0.618 * static_cast<double>(n)));

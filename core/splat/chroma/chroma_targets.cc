@@ -36,7 +36,7 @@ void CheckSizes(const ChromaTarget& target, const PosedCamera& view) {
       view.camera.height);
 }
 
-// Comparisons that NaN fails.
+// These comparisons are false for NaN.
 void CheckValues(const Image& image, float low, float high, const char* what, int view) {
   for (int c = 0; c < image.channels; ++c) {
     const float* plane = image.Plane(c);

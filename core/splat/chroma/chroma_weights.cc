@@ -22,8 +22,8 @@ using simd::F32;
 using simd::Mask;
 
 constexpr float kUnit = 1.0f / 65535.0f;
-// Entries whose weights sum to less than this many pixels are left out: a twentieth of the entries
-// of real scenes, 1e-4 of their light.
+// Drops entries whose weights sum to less than this many pixels: a twentieth of the entries of real
+// scenes, 1e-4 of their light.
 constexpr float kMinStoredPixels = 1e-3f;
 
 // Blocks of four cells from `first` to `last` that [center - reach, center + reach] meets.
@@ -34,7 +34,7 @@ inline void BlockRange(float center, float reach, float origin, int* first, int*
   *last = static_cast<int>(std::floor(std::clamp(high, -1.0f, 3.0f)));
 }
 
-// Gaussians of a tile lie anywhere in memory: fetched this many entries ahead.
+// Gaussians of a tile are scattered in memory: prefetched this many entries ahead.
 constexpr size_t kAhead = 12;
 
 // Ranges of blocks of a splat's bounding box.
@@ -54,7 +54,7 @@ Box BoundingBlocks(const float* row, float tile_x, float tile_y) {
   return box;
 }
 
-// Nothing when all weights are zero.
+// Adds nothing if all weights are zero.
 HWY_INLINE void AddItem(F32 w, int block, std::vector<WeightItem>& items) {
   if (!(simd::HorizontalSum(w) > kUnit)) return;
   WeightItem item;

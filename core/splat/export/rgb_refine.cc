@@ -99,7 +99,7 @@ class Refiner {
     return loss;
   }
 
-  // False when a value was not finite.
+  // Returns false if a value was not finite.
   bool Refine() {
     std::vector<size_t> order;
     for (size_t v = 0; v < views_.size(); ++v) {
@@ -148,7 +148,7 @@ class Refiner {
     return rates;
   }
 
-  // Clamped picture minus target into residual_; returns the mean square.
+  // Writes clamped picture minus target to residual_; returns the mean square.
   double Residual(size_t v) {
     const PlaneBuffer& picture = pipeline_.color();
     const PlaneBuffer& target = targets_[v];

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kFramesBeside = 8;  // before and behind, that tell of a thing's depth
 
-// A region of what moves, or several that are one thing.
+// A moving region, or several that form one object.
 struct Thing {
   int left = 0, right = 0;  // columns, both included
   int foot = 0;             // its lowest row
@@ -23,7 +23,7 @@ struct Things {
   std::vector<Thing> list;
 };
 
-// The connected regions of what moves.
+// Connected components of the moving pixels.
 Things RegionsOf(const SurveyedView& view) {
   const Image& moving = view.moving;
   const double usual = MedianDepth(view);
@@ -70,7 +70,7 @@ int SharedColumns(const Thing& a, const Thing& b) {
 
 int Columns(const Thing& thing) { return thing.right - thing.left + 1; }
 
-// Limbs that are torn off, and the shadow below, belong to what they hang over.
+// Torn-off limbs, and the shadow below, belong to the object above which they hang.
 void JoinOneAboveTheOther(Things* things) {
   std::vector<int> joined(things->list.size());
   std::vector<int> order(things->list.size());
@@ -98,7 +98,7 @@ void JoinOneAboveTheOther(Things* things) {
   things->list = std::move(list);
 }
 
-// The depth of what is in the same place in `frame`; 0 where nothing is.
+// Depth of the object at the same position in `frame`; 0 without one.
 double DepthInPlaceOf(const Thing& thing, const Things& frame) {
   double depth = 0.0;
   int most = 0;

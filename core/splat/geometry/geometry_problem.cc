@@ -25,9 +25,9 @@ bool PixelOf(const PosedCamera& view, const Eigen::Vector3d& world, int* x, int*
   return true;
 }
 
-// Colour of each sparse point where training views observe it, as a better start than grey. View by
-// view, so that each picture is read once. Returns how many points some training view has before
-// it.
+// Colour of each sparse point in the training views that observe it, as a better start than grey.
+// Iterates over views, so that each picture is read once. Returns the number of points in front of
+// some training view.
 size_t SampleInitialColors(const Scene& scene, GeometryProblem& problem) {
   const bool srgb = static_cast<bool>(problem.colors);
   const int channels = srgb ? 3 : 1;
@@ -82,7 +82,7 @@ GeometryProblem GeometryProblemOf(const Scene& scene,
     problem.mask = [&images](int view) { return images.Mask(view); };
   }
   if (colors == TrainingColors::kSrgb) {
-    // Decoded once; every level of the pyramid asks again.
+    // Decoded once, because every pyramid level reads it.
     problem.colors = [&images,
                       kept = std::map<int, std::shared_ptr<const Image>>()](int view) mutable {
       std::shared_ptr<const Image>& picture = kept[view];

@@ -17,8 +17,8 @@ struct GeometryProblem {
   std::vector<PosedCamera> held_out;
   PictureSource luminance;  // 1 channel, L in 0..100
   PictureSource colors;     // 3 channels, sRGB 0..1; when set, trained on in place of luminance
-  PictureSource
-      mask;  // 1 channel, 1 where a pixel counts, else 0; may be empty or return null: all
+  // 1 channel, 1 where a pixel counts, else 0; may be empty or return null: all pixels count.
+  PictureSource mask;
   // As `mask`: 0 where motion was detected before; may be empty or return null: unknown.
   PictureSource still;
   // 1 or 3 channels of any degree; its spherical harmonics are cut or extended to the options'

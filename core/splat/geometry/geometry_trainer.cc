@@ -130,7 +130,7 @@ class GeometryTrainer {
 
   float UnitTime(const PosedCamera& view) const { return times_.UnitTime(view.time_s); }
 
-  // All Gaussians at the view's moment.
+  // All Gaussians at the view's time.
   const ParameterBlock& At(const PosedCamera& view, float hidden = 0.0f) {
     if (state_.moving.parameters.count() == 0) return state_.parameters;
     ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_, hidden);
@@ -158,7 +158,7 @@ class GeometryTrainer {
     state_.statistics.Reset(Count());
   }
 
-  // One iteration. False when something was not finite.
+  // Runs one iteration. Returns false if a value was not finite.
   bool Step() {
     const int drawn = state_.order.Next(static_cast<int>(problem_.training.size()), state_.random);
     const PosedCamera& view = problem_.training[drawn];
@@ -200,12 +200,12 @@ class GeometryTrainer {
     return true;
   }
 
-  // Null: all of the view counts.
+  // Null: all pixels count.
   std::shared_ptr<const PlaneBuffer> MaskOf(const PosedCamera& view, int level) {
     return problem_.mask ? masks_.Get(view, level) : nullptr;
   }
 
-  // The same in training: until motion has been looked for, what moves is nothing to learn from.
+  // The training mask: until motion has been searched for, moving pixels are excluded.
   std::shared_ptr<const PlaneBuffer> LearntFrom(const PosedCamera& view, int level) {
     const std::shared_ptr<const PlaneBuffer> mask = MaskOf(view, level);
     if (!problem_.still || !MayMove() || fraction_ >= kSurveyAt) return mask;
@@ -216,8 +216,8 @@ class GeometryTrainer {
     return both;
   }
 
-  // Loss and d_color_. What is masked out is taken to be as drawn, which costs nothing, not even in
-  // windows that reach over the mask's edge, and gets no gradient.
+  // Computes the loss and d_color_. Masked pixels are set to the render, so that they have no loss,
+  // not even in windows that cross the mask's edge, and no gradient.
   LossValue Compare(const PlaneBuffer& drawn,
                     const std::shared_ptr<const PlaneBuffer>& target,
                     const std::shared_ptr<const PlaneBuffer>& mask,
@@ -233,13 +233,13 @@ class GeometryTrainer {
     return loss;
   }
 
-  // As this iteration's number says, so that a resumed training drops the same.
+  // Seeded by the iteration's number, so that a resumed training drops the same Gaussians.
   SplatDropping DroppingNow() const {
     return {schedule_.DropRate(fraction_, static_cast<int>(problem_.training.size())),
             options_.seed + (static_cast<uint64_t>(state_.iteration) << 20u)};
   }
 
-  // Parameters from the gradient. False when something was not finite.
+  // Updates parameters from the gradient. Returns false if a value was not finite.
   bool Update(const PosedCamera& view) {
     clock_.Enter(Phase::kAdam);
     std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
@@ -300,7 +300,7 @@ class GeometryTrainer {
     return true;
   }
 
-  // How many Gaussians there may be after this round.
+  // Maximum number of Gaussians after this round.
   int64_t CountAllowed() {
     const Moment now{clock_.TrainingSeconds(), state_.iteration};
     const double each =
@@ -358,7 +358,7 @@ class GeometryTrainer {
     }
   }
 
-  // Means over the held-out views; no part of training's time.
+  // Means over the held-out views; not counted as training time.
   void ReportHeldOut() {
     if (problem_.held_out.empty()) return;
     const HeldOutPoint point = Score(problem_.held_out);

@@ -19,15 +19,15 @@ constexpr size_t kMedianFrames = 31;  // at most, evenly over time
 constexpr size_t kFewestFrames = 5;   // that say what stands still
 constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
 constexpr double kConfirmed = 0.1;    // of what was seen to move, by residuals, at least
-// Shares of the pixels that a still scene stays below: with a median over time or regions that were
-// seen to move, and with neither, where what is drawn badly looks like what moves.
+// Maximum shares of such pixels in static scenes: with a median over time or known moving regions,
+// and with neither, where badly drawn regions look like motion.
 constexpr double kStillShare = 0.002;
 constexpr double kStillShareAlone = 0.005;
 constexpr size_t kNoiseStep = 7;  // every so many pixels tell the scene's deviation
 
 using Stand = std::tuple<double, double, double, double, double, double, double, int, int>;
 
-// Views of one stand are of a camera that does not move.
+// Views with equal pose and size belong to a static camera.
 Stand StandOf(const PosedCamera& p) {
   const Eigen::Quaterniond& q = p.cam_from_world.rotation;
   const Eigen::Vector3d& t = p.cam_from_world.translation;
@@ -40,7 +40,7 @@ Image ResidualOf(const SurveyedView& view) {
   return BoxMean(residual, kRadiusPx);
 }
 
-// Takes the median over time away, pixel by pixel.
+// Subtracts the median over time, pixel by pixel.
 void RemoveStanding(const std::vector<size_t>& frames,
                     ThreadPool& pool,
                     std::vector<Image>& residuals) {
@@ -78,14 +78,15 @@ Image MaskOf(const Image& residual, double threshold) {
   return mask;
 }
 
-// What was seen to move before anything was drawn.
+// Pixels where motion was detected before training.
 void AddSeenMoving(SurveyedView& view) {
   for (size_t i = 0; i < view.still.data.size(); ++i) {
     if (view.still.data[i] == 0.0f) view.moving.data[i] = 1.0f;
   }
 }
 
-// Whether what was seen to move is drawn badly by what stands still: what is not, stands still.
+// Returns true if the previously detected moving pixels have high residuals; otherwise they are
+// static.
 bool SeenIsConfirmed(const std::vector<SurveyedView>& views) {
   double seen = 0.0, confirmed = 0.0;
   for (const SurveyedView& view : views) {

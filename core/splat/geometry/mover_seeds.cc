@@ -30,7 +30,7 @@ float AtClamped(const Image& image, int x, int y) {
   return image.At(0, std::clamp(y, 0, image.height - 1), std::clamp(x, 0, image.width - 1));
 }
 
-// -1..1 for two windows; 0 where one of them is flat.
+// Correlation of two windows, -1..1; 0 if one of them is flat.
 double Correlation(const Image& a, Pixel p, const Image& b, Pixel q) {
   double sa = 0.0, sb = 0.0, saa = 0.0, sbb = 0.0, sab = 0.0;
   int n = 0;
@@ -59,11 +59,11 @@ bool MovesNear(const Image& moving, Pixel p) {
   return false;
 }
 
-// Of pictures of one moment.
+// Views of one time.
 using Views = std::vector<const SurveyedView*>;
 
-// How well the other cameras agree that something moves at this point; none: some camera sees the
-// place and nothing moves there, or no camera sees it.
+// Agreement of the other cameras on motion at this point; none if a camera sees the point without
+// motion, or if no camera sees it.
 std::optional<double> Agreement(const Views& moment,
                                 const SurveyedView& own,
                                 Pixel pixel,
@@ -98,7 +98,7 @@ std::vector<MoverSeed> SeedsOf(const SurveyedView& view,
   if (!(usual > 0.0)) return seeds;
   const Camera& camera = view.posed.camera;
   for (int y = 0; y < camera.height; y += step) {
-    // Every other row begins half a step later.
+    // Every other row is offset by half a step.
     for (int x = y / step % 2 * (step / 2); x < camera.width; x += step) {
       if (view.moving.At(0, y, x) == 0.0f) continue;
       const float surface = view.depth.At(0, y, x);

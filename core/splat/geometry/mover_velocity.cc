@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kFarthest = 0.2;  // of its depth that a seed may come in one time step
 
-// The views of each camera in the order of time.
+// The views of each camera, ordered by time.
 std::vector<std::vector<size_t>> ByCamera(const std::vector<SurveyedView>& views) {
   std::map<int, std::vector<size_t>> cameras;
   for (size_t i = 0; i < views.size(); ++i) cameras[views[i].posed.shot].push_back(i);
@@ -26,7 +26,7 @@ std::vector<std::vector<size_t>> ByCamera(const std::vector<SurveyedView>& views
   return sorted;
 }
 
-// Depth of the nearest seed within `radius` px; 0 where there is none.
+// Depth of the nearest seed within `radius` px; 0 without one.
 double DepthNear(const std::vector<MoverSeed>& seeds, double x, double y, double radius) {
   double best = radius * radius, depth = 0.0;
   for (const MoverSeed& seed : seeds) {
@@ -45,7 +45,7 @@ Image InLab(const Image& luminance) {
   return l;
 }
 
-// Where a seed of `from` is in `to`; none where nothing moves there.
+// Position in `to` of a seed of `from`; none if nothing moves there.
 std::optional<Eigen::Vector3d> PlaceIn(const MoverSeed& seed,
                                        const Image& flow,
                                        const SurveyedView& to,

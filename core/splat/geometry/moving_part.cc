@@ -17,7 +17,7 @@ namespace {
 constexpr double kMoverShare = 0.4;  // of the most Gaussians that there may be
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
-// The mean over the channels.
+// Mean over the channels.
 Image MeanImage(const PlaneBuffer& planes, int channels) {
   Image image(planes.width, planes.height, 1);
   for (int y = 0; y < planes.height; ++y) {
@@ -30,7 +30,7 @@ Image MeanImage(const PlaneBuffer& planes, int channels) {
   return image;
 }
 
-// What does not count is drawn as it is: nothing moves there. `mask` may be larger.
+// Replaces masked pixels by the render, so that nothing moves there. `mask` may be larger.
 void TakeMasked(const Image& mask, const Image& luminance, Image& drawn) {
   for (int y = 0; y < drawn.height; ++y) {
     for (int x = 0; x < drawn.width; ++x) {
@@ -41,7 +41,7 @@ void TakeMasked(const Image& mask, const Image& luminance, Image& drawn) {
   }
 }
 
-// These training views as they are and as `still` draws them.
+// These training views as photographed and as rendered by `still`.
 std::vector<SurveyedView> SurveyedViews(const GeometryProblem& problem,
                                         const std::vector<PosedCamera>& training,
                                         const ParameterBlock& still,

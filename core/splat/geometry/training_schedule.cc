@@ -20,7 +20,7 @@ constexpr int kMinTrainingSidePx = 64;  // coarser levels are not used below thi
 constexpr double kAccelerationShare = 0.25;  // of a step of the velocity
 constexpr double kCenterRate = 0.01;         // of the interval between time steps
 
-// How many whole steps of `step`, counted from `from`, lie before `fraction`.
+// Number of whole steps of `step`, counted from `from`, before `fraction`.
 double StepsDone(double fraction, double from, double step) {
   return std::floor((fraction - from) / step);
 }
@@ -64,7 +64,7 @@ std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels
   const int active = ShCoefficients(ActiveDegree(fraction));
   std::vector<float> rates(kColorRow + channels * coefficients, 0.0f);
   const double scale = options_.learning_rate_scale;
-  // Settles once nothing is added any more.
+  // Grows from 0 to 1 after the end of densification.
   const double settling =
       std::max(0.0, fraction - tuning_.densify_until) / std::max(1e-9, 1.0 - tuning_.densify_until);
   const double fade = scale * std::pow(tuning_.last_rate, settling);
@@ -103,7 +103,8 @@ std::vector<float> TrainingSchedule::MoverRates(double fraction,
   const auto set = [&](int row, int count, double rate) {
     std::fill_n(rates.begin() + first + row, count, static_cast<float>(rate));
   };
-  // What a step changes one time step away is what a step of the position changes.
+  // Scaled so that a step changes the position one time step away as much as a step of the position
+  // does.
   set(kVelocityRow, 3, scale * PositionRate(fraction) / interval);
   set(kAccelerationRow,
       3,

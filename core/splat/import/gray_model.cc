@@ -15,7 +15,7 @@ namespace color3d {
 namespace {
 
 constexpr float kMaxLogit = 15.0f;
-// dL'/dx of grey x at white: brighter than white goes on like this, as it does in the file.
+// dL'/dx of grey x at white: values above white continue linearly, as in the file.
 constexpr double kSlopeAtWhite = 0.88;
 
 bool AnyNan(const float* values, size_t count) {
@@ -25,7 +25,7 @@ bool AllFinite(const float* values, size_t count) {
   return std::all_of(values, values + count, [](float v) { return std::isfinite(v); });
 }
 
-// Which Gaussians can be drawn at all.
+// Gaussians that can be drawn at all.
 std::vector<size_t> Usable(const ViewerGaussians& splat) {
   const size_t row = 3 * static_cast<size_t>(ShCoefficients(splat.sh_degree));
   std::vector<size_t> usable;
@@ -47,7 +47,7 @@ void UnitRotation(const float* q, float* out) {
   }
 }
 
-// sRGB's transfer function from a table: a splat of a million Gaussians asks for it 200 million
+// sRGB's transfer function from a table: a splat of a million Gaussians evaluates it 200 million
 // times. Agrees with the formula to 1e-6.
 class LinearLight {
  public:
@@ -68,7 +68,7 @@ class LinearLight {
   std::vector<double> table_;
 };
 
-// L' of a colour: 0..1, and a little more for what is brighter than white in the file.
+// L' of a colour: 0..1, and slightly more for colours above white.
 double Luminance(double r, double g, double b, const LinearLight& linear) {
   // The second row of lab.cc's matrix, for a white of 1.
   const double y = 0.2126729 * linear(r) + 0.7151522 * linear(g) + 0.0721750 * linear(b);
@@ -76,7 +76,7 @@ double Luminance(double r, double g, double b, const LinearLight& linear) {
   return l + kSlopeAtWhite * std::max(0.0, std::min({r, g, b}) - 1.0);
 }
 
-// Squared distance of what Gaussian's colour is on average over directions from grey, Lab units.
+// Squared distance from grey of a Gaussian's mean colour over directions, Lab units.
 double SquaredChroma(const float* sh) {
   const auto channel = [&](int c) { return std::clamp(0.5 + double{kShDc} * sh[c], 0.0, 1.0); };
   const LabColor lab = LabFromSrgb(RgbColor{channel(0), channel(1), channel(2)});

@@ -29,7 +29,7 @@ struct Header {
   bool has_faces = false;
 };
 
-// 0 for a type that PLY does not have.
+// 0 for an unknown type.
 size_t SizeOfType(const std::string& type) {
   static const std::map<std::string, size_t> sizes = {{"char", 1},
                                                       {"int8", 1},
@@ -112,7 +112,7 @@ class HeaderReader {
     in_vertices_ = name == "vertex" && !saw_vertices_;
     header_.has_faces = header_.has_faces || name == "face";
     if (!in_vertices_) {
-      // Rows in front of the Gaussians: none is known that could be passed over.
+      // Elements before the Gaussians cannot be skipped.
       if (!saw_vertices_ && count > 0) {
         throw InvalidArgument(
             "{} begins with {}, as SuperSplat's compressed PLY does; save it uncompressed "

@@ -19,7 +19,7 @@ constexpr double kDepthTolerance = 0.04;
 constexpr double kNearShare = 0.15;  // of the focus
 constexpr float kCoveredOpacity = 0.5f;
 
-// What tells depths needs no harmonics.
+// Rendering depths needs no harmonics.
 GaussianModel WithoutHarmonics(const GaussianModel& model) {
   GaussianModel plain;
   plain.position = model.position;
@@ -109,12 +109,12 @@ SeenGaussians::Measure SeenGaussians::At(const Pose& cam_from_world, double focu
       const Ellipsoid& e = sample_[i];
       const Eigen::Vector3d in_camera = cam_from_world.Apply(e.center);
       if (!Unhidden(in_camera)) continue;
-      // Area of an ellipsoid's shadow along v, by that of its largest one.
+      // Area of the ellipsoid's projection along v relative to its largest one.
       const Eigen::Vector3d v = e.axes.transpose() * (e.center - eye).normalized();
       const double flat = e.radius[1] * e.radius[2];
       const Eigen::Vector3d faces(flat, e.radius[0] * e.radius[2], e.radius[0] * e.radius[1]);
       const double face = faces.cwiseProduct(v).norm() / flat;
-      // Smaller than a pixel it is not seen as a thing of its own.
+      // Gaussians smaller than a pixel count less.
       const double side_px = picture_.fx * std::sqrt(flat) / in_camera.z();
       sums[t] += e.opacity * face * std::min(1.0, side_px);
     }

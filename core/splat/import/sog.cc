@@ -15,7 +15,7 @@ namespace {
 using nlohmann::json;
 
 constexpr uint64_t kMaxMetaBytes = 16 << 20;
-// A picture has a pixel for each Gaussian and the rest of its last rows.
+// A picture has a pixel for each Gaussian and padding to full rows.
 constexpr uint64_t kSparePixels = 1 << 20;
 constexpr size_t kPaletteRow = 64;  // entries of the palette of harmonics in one row of its picture
 constexpr size_t kMaxPalette = 65'536;
@@ -48,7 +48,7 @@ class SogReader {
       CheckCount(static_cast<uint64_t>(count), source_);
       return ReadAll(static_cast<size_t>(count));
     } catch (const json::exception& e) {
-      // In one line, and short.
+      // Shortened to one line.
       throw InvalidArgument("meta.json of {} is not as SOG 2 says ({})",
                             source_.name,
                             std::string(e.what()).substr(0, 120));

@@ -19,7 +19,7 @@ constexpr double kFarFromOrigin = 1e3;  // radii
 constexpr size_t kPoints = 10'000;
 constexpr int64_t kMiB = int64_t{1} << 20;
 
-// Into a frame that float32 and the near plane can bear; the export undoes it.
+// Transforms to a frame suitable for float32 and the near plane; the export inverts it.
 void Normalise(SplatPlace* place, SplatScene* result) {
   const bool in_band = place->radius >= kMinRadius && place->radius <= kMaxRadius;
   const double scale = in_band ? 1.0 : place->radius / kStandardRadius;
@@ -50,7 +50,7 @@ void AddViews(const std::vector<SplatCamera>& cameras, Scene* scene) {
   }
 }
 
-// Gaussians that at least two of the views see, as structure-from-motion would leave them.
+// Gaussians visible in at least two views, like points of structure-from-motion.
 void AddPoints(const GaussianModel& model, const RunControl& run, Scene* scene) {
   std::vector<Eigen::Vector3d> points;
   for (const size_t i : SpreadSample(model, kPoints))

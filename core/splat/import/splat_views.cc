@@ -18,12 +18,11 @@ constexpr size_t kPlaceSample = 200'000;
 constexpr int kCoarseDirections = 60;
 constexpr int kFineDirections = 600;
 constexpr double kDistances[] = {0.35, 0.6, 1.0, 1.6, 2.5, 4.0};  // radii from the center
-// A direction from which the best distance shows so much of what the best direction shows is good.
+// A direction is good if its best distance shows this share of the best direction's.
 constexpr double kGoodShare = 0.75;
-// The distance of the best direction is kept where the best one shows little more.
+// Keeps the distance of the best direction if another one shows little more.
 constexpr double kSameDistanceShare = 0.85;
-// Cameras stand on the ground, hardly ever under it: views from more than 25 degrees below count so
-// much.
+// Cameras are usually above the ground: factor for views from more than 25 degrees below.
 constexpr double kBelow = -0.42, kBelowShare = 0.6;
 constexpr double kFocalShare = 0.9;  // of the picture's width: 58 degrees across
 constexpr double kAspect = 0.75;
@@ -155,7 +154,7 @@ class CameraChooser {
         });
   }
 
-  // Of the good fine directions, always the one that is farthest from those taken.
+  // Among the good fine directions, selects the one farthest from the selected ones.
   std::vector<SplatCamera> Spread(const Candidate& best) {
     std::vector<Candidate> fine;
     for (const Eigen::Vector3d& direction : Directions(kFineDirections)) {
@@ -187,7 +186,7 @@ class CameraChooser {
     return InAPath(std::move(chosen));
   }
 
-  // Each view beside the one before it, so that the names tell neighbours.
+  // Orders views by proximity, so that consecutive names are neighbours.
   static std::vector<SplatCamera> InAPath(std::vector<SplatCamera> cameras) {
     for (size_t i = 1; i < cameras.size(); ++i) {
       const Eigen::Vector3d last = cameras[i - 1].cam_from_world.Center();
@@ -241,7 +240,7 @@ SplatPlace FindSplatPlace(const GaussianModel& model) {
     largest = std::max(largest, ellipsoids[i].radius[2]);
   }
   place.radius = MedianOf(&values);
-  // One Gaussian, or several in one place: as large as they are.
+  // One Gaussian, or several at one position: uses their own size.
   if (!(place.radius > 1e-6 * largest)) place.radius = std::max(largest, 1e-9);
   return place;
 }

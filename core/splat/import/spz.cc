@@ -23,7 +23,7 @@ struct Header {
   int degree = 0;
   int fraction_bits = 0;
   size_t turn_bytes() const { return version == 2 ? 3 : 4; }
-  // Of all streams behind the header.
+  // Of all streams after the header.
   uint64_t bytes() const {
     return count * (9 + 1 + 3 + 3 + turn_bytes() + 3 * (ShCoefficients(degree) - 1));
   }
@@ -65,7 +65,7 @@ Header ReadHeader(std::string_view plain, bool packed_by_gzip, const SplatSource
   return header;
 }
 
-// Unpacks a gzip file in two steps: first what says how much there is.
+// Unpacks a gzip file in two steps, the first of which reads the counts.
 class Gunzip {
  public:
   explicit Gunzip(std::string_view bytes) {
@@ -77,7 +77,7 @@ class Gunzip {
   Gunzip(const Gunzip&) = delete;
   Gunzip& operator=(const Gunzip&) = delete;
 
-  // True when there are so many more bytes.
+  // Returns false if fewer bytes remain.
   bool Append(uint64_t count, std::string* to) {
     const size_t before = to->size();
     to->resize(before + count);
@@ -93,8 +93,8 @@ class Gunzip {
     }
     return left == 0;
   }
-  // False when the file ends before its checksum, or that is another one. More than was asked for
-  // may follow.
+  // Returns false if the file ends before its checksum or the checksum differs. Further bytes may
+  // follow.
   bool EndsWell() {
     Bytef more = 0;
     stream_.next_out = &more;
@@ -155,7 +155,7 @@ std::string StreamsOfZstd(std::string_view bytes, const SplatSource& source, Hea
   return plain;
 }
 
-// Of basis function k where y and z change their sign: by its parity in them.
+// Sign of basis function k after negation of y and z: its parity in them.
 float SignOf(int k) {
   static constexpr float kSigns[16] = {1, -1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1};
   return kSigns[k];

@@ -21,7 +21,7 @@ constexpr uint32_t kStored = 0, kDeflated = 8;
 constexpr uint32_t kZip64 = 0xffffffff;
 constexpr uint32_t kMostDeflated = 1033;  // bytes that one can stand for, at most
 
-// True when the whole of `packed` unpacks to exactly `to->size()` bytes.
+// Returns true if the whole of `packed` unpacks to exactly `to->size()` bytes.
 bool Inflate(std::string_view packed, std::string* to) {
   z_stream stream = {};
   if (inflateInit2(&stream, -15) != Z_OK) return false;  // without a header

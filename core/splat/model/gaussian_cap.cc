@@ -7,8 +7,8 @@ namespace color3d {
 namespace {
 
 constexpr double kMaxGaussiansPerPixel = 0.02;
-// Sharper pictures of the same few places do not tell where more surfaces lie: those of so many
-// views or fewer count at this size, those of more by and by at their own.
+// Higher resolution of the same few places reveals no more surfaces: with at most this number of
+// views pixels count at this size, with more views gradually at their own.
 constexpr int kSparseSidePx = 500;
 constexpr double kSparseViews = 12.0;
 constexpr int kMinCap = 5000;

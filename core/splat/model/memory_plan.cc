@@ -17,7 +17,7 @@ constexpr int64_t kPairsPerTile = 400;
 constexpr int64_t kTilePx = 256;
 constexpr int64_t kWorkBytesPerPixel = 80;   // pictures, gradients and filtered moments of the loss
 constexpr int64_t kPhotoBytesPerPixel = 36;  // decoded (3 x 16 bit), as float, turned, undistorted
-// At most, of the trainer's pictures and of decoded ones.
+// Maximum caches of training pictures and of decoded ones.
 constexpr int64_t kTargetCacheBytes = 512 * kMiB;
 constexpr int64_t kImageCacheBytes = 1024 * kMiB;
 constexpr int64_t kFrameTargetCacheBytes = 128 * kMiB;  // of a scene that moves
@@ -56,7 +56,7 @@ int64_t TargetCacheBytes(const MemoryDemand& demand) {
   return demand.moves ? kFrameTargetCacheBytes : kTargetCacheBytes;
 }
 
-// All but the Gaussians.
+// Everything but the Gaussians.
 int64_t FixedBytes(const MemoryDemand& demand, int side) {
   const PixelCounts px = WorkingPixels(demand, side);
   // The trainer keeps pictures at two sizes (4 + 1 bytes a pixel) within its own budget.

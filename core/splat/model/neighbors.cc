@@ -25,8 +25,7 @@ bool Nearer(const NeighborTree::Neighbor& a, const NeighborTree::Neighbor& b) {
                                                   : a.index < b.index;
 }
 
-// What nanoflann searches into: the k nearest in order, whatever order they come in. The names are
-// those that nanoflann calls.
+// Result set for nanoflann: the k nearest points in order. Method names are required by nanoflann.
 // NOLINTBEGIN(readability-identifier-naming)
 class NearestInOrder {
  public:
@@ -43,8 +42,8 @@ class NearestInOrder {
   }
   bool full() const { return nearest_.size() == k_; }
   size_t size() const { return nearest_.size(); }
-  // A bit more than the distance of the last one: points as far away are ties, which the index
-  // decides, and the search adds up its bounds with rounding.
+  // Slightly more than the distance of the last point: the index decides between equally distant
+  // points, and the search accumulates bounds with rounding errors.
   float worstDist() const {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
     return full() ? std::nextafter(1.00001f * nearest_.back().squared_distance, kInfinity)

@@ -39,7 +39,7 @@ using simd::F32;
 constexpr float kLog2E = 1.44269504f;
 constexpr float kLn2 = 0.69314718f;
 constexpr float kMaxOpacity = 1.0f - 1e-6f;
-// Of a window; narrower ones are taken to be so wide, so that no product overflows.
+// Minimum width of a time window, so that no product overflows.
 constexpr float kLeastLogWidth = -40.0f;
 constexpr float kFarthest = 1e4f;  // of tau / width: nothing is seen long before
 
@@ -63,7 +63,8 @@ HWY_INLINE Window WindowAt(const MotionAt& m, int64_t i) {
   return w;
 }
 
-// The first `lanes` of sixteen floats; the rest is zero, or stays as it is. A row may end there.
+// Loads the first `lanes` of sixteen floats, the rest as zero; stores leave the rest unchanged. A
+// row may end there.
 HWY_INLINE F32 LoadSome(const float* p, int64_t lanes) {
   if (lanes >= simd::kLanes) return simd::Load(p);
   alignas(64) float some[simd::kLanes] = {};
@@ -129,7 +130,8 @@ void BackwardRange(const MotionAt& m,
       store(m.row + kSpinRow + k, w.tau * d);
       d_tau = d_tau + d * motion(kSpinRow + k);
     }
-    // dL/d logit at t is dL/d opacity times opacity (1 - opacity); what is not drawn has none.
+    // dL/d logit at t is dL/d opacity times opacity (1 - opacity); Gaussians that are not drawn
+    // have none.
     const F32 rest = Sigmoid(-LoadSome(at.Row(kOpacityRow) + m.first + i, lanes));
     const F32 d_log_opacity = gradient(kOpacityRow) / rest;
     store(kOpacityRow, d_log_opacity * Sigmoid(-simd::Load(m.moving.Row(kOpacityRow) + i)));

@@ -66,7 +66,7 @@ RigidMotion Fit(const std::vector<Neighbor>& neighbors) {
   return motion;
 }
 
-// Neighbours that move otherwise count less: another thing's, or those whose motion is wrong.
+// Weights down neighbours with a different motion: another object's, or a wrong one.
 void Distrust(const RigidMotion& motion, std::vector<Neighbor>* neighbors) {
   std::vector<double> off;
   for (const Neighbor& n : *neighbors) off.push_back((n.velocity - motion.At(n.position)).norm());
@@ -90,7 +90,7 @@ Vector3d MeanAcceleration(const std::vector<Neighbor>& neighbors) {
   return sum / weights;
 }
 
-// As it is at its own center of time, or at `time`, where it belongs to another step.
+// The Gaussian at its own time, or at `time` if it belongs to another time step.
 Neighbor NeighborAt(const ParameterBlock& moving, int row, int64_t i, bool own_step, double time) {
   const Vector3d acceleration = Rows(moving, row + kAccelerationRow, i);
   const Vector3d velocity = Rows(moving, row + kVelocityRow, i);

@@ -5,7 +5,7 @@
 
 namespace color3d {
 
-// The choice for a Gaussian depends on its index alone, not on who was asked before.
+// The decision for a Gaussian depends on its index alone, not on the order of calls.
 void DropSplats(const SplatDropping& dropping, ThreadPool& pool, SplatBuffer& splats) {
   const auto threshold = static_cast<uint64_t>(dropping.rate * 4294967296.0);
   const auto gain = static_cast<float>(-std::log2(1.0 - dropping.rate));

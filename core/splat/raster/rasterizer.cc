@@ -178,8 +178,8 @@ void BuildWorkList(const Chunk& chunk, const uint16_t* masks, uint32_t alive, Wo
   work.begin[chunk.count] = count;
 }
 
-// What the exponent of entry j in block b is made of: e = e_lane[j] + e_block[j][b],
-// dy = LaneY() + dy_block[j][b].
+// Terms of the exponent of entry j in block b: e = e_lane[j] + e_block[j][b], dy = LaneY() +
+// dy_block[j][b].
 struct Offsets {
   F32 e_lane[16];
   alignas(64) float e_block[16][kTileBlocks];
@@ -250,7 +250,7 @@ void ForwardTile(const ForwardJob& job, const Tile& tile) {
   }
 }
 
-// A tile's pixels on the way front to back.
+// State of a tile's pixels, front to back.
 template <int kChannels>
 struct BackwardPixels {
   F32 t[kTileBlocks];             // transmittance before the next entry
@@ -269,7 +269,7 @@ struct BackwardPixels {
   }
 };
 
-// One entry: its gradient row to `out`, and the pixels moved behind it.
+// Processes one entry: writes its gradient row to `out` and advances the pixels behind it.
 template <int kChannels>
 HWY_INLINE void BackwardEntry(const Chunk& chunk,
                               const Offsets& offsets,

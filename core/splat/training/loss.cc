@@ -31,8 +31,8 @@ struct Terms {
   PlaneBuffer& gradient;
 };
 
-// What a band of rows keeps while it moves down: the last rows of the derivatives by the blurred
-// moments and by the Laplacian, and row buffers.
+// Rolling state of a band of rows: the last rows of the derivatives by the blurred moments and by
+// the Laplacian, and row buffers.
 enum BandMap { kDMean, kDSquare, kDProduct, kDLaplacian, kBandMaps };
 constexpr int kBandRows = 2 * kReach + 1;
 constexpr int kRowBuffers = 5;
@@ -214,7 +214,7 @@ void GradientRow(const Terms& t, int c, int r, const Band& band) {
 }
 
 // Rows [first, end) of channel c, streaming: the gradient follows kReach rows behind the terms, so
-// that what lies between stays in the cache. Rows beyond the band's ends are computed twice.
+// that the rows between stay in the cache. Rows beyond the band's ends are computed twice.
 void LossRows(const Terms& t, int c, int first, int end, float* scratch, double* row_sums) {
   const Band band{scratch, t.x.stride};
   for (int r = first - kReach; r < end + kReach; ++r) {

@@ -54,7 +54,7 @@ SmoothPath::SmoothPath(const std::vector<PathCamera>& knots, double unit) {
     numbers << knot.cam_from_world.Center(),
         knot.cam_from_world.rotation.conjugate().normalized().coeffs(), std::log(camera.fx),
         std::log(camera.fy), camera.cx, camera.cy;
-    // Of the two quaternions of a direction, the one nearer to the last.
+    // Of the two quaternions of a rotation, the one closer to the previous.
     if (knots_.size() > 1 && numbers.segment<4>(3).dot(knots_.back().segment<4>(3)) < 0.0) {
       numbers.segment<4>(3) *= -1.0;
     }
@@ -120,7 +120,7 @@ std::vector<double> FrameShares(int frames, bool bounce, bool closed) {
     } else if (closed) {
       shares.push_back(static_cast<double>(i) / frames);
     } else {
-      // The way of a speed that grows evenly, stays and falls evenly.
+      // Distance for a speed that rises linearly, is constant and falls linearly.
       const double x = frames > 1 ? static_cast<double>(i) / (frames - 1) : 0.0;
       const double near = std::min(x, 1.0 - x);
       const double way =

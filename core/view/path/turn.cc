@@ -10,8 +10,8 @@ namespace {
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kLargestGap = kTwoPi / 4;  // between neighbours that stand all around
 constexpr double kLeastReach = 0.1, kMostReach = 0.35;
-// Which photos are near a place on the way and like the key view: standard deviations of angles
-// around and up, and of the logarithm of distances.
+// Standard deviations in the weight of a photo: azimuth from the current position, elevation and
+// logarithm of distance from the key view.
 constexpr double kNearAround = 0.45, kNearUp = 0.35, kNearAway = 0.5;
 constexpr double kHome = 0.02;       // weight of the key view's height and distance everywhere
 constexpr double kHomeAround = 0.6;  // radians from the key view on which the way leaves it
@@ -22,7 +22,7 @@ Turn::Place PlaceOf(const Eigen::Vector3d& position) {
           std::log(std::max(position.norm(), 1e-6))};
 }
 
-// 1 for no angle; a bell of this standard deviation for small ones.
+// Bell curve of the angle with this standard deviation; 1 at zero.
 double Nearness(double angle, double deviation) {
   return std::exp((std::cos(angle) - 1.0) / (deviation * deviation));
 }
@@ -75,7 +75,7 @@ Turn TurnOf(const Scene& scene, int key_view, const Stand& stand) {
   const double room = std::max(0.0, 0.5 * (right - left) - turn.reach);
   turn.middle = 0.5 * (left + right);
   turn.middle = std::clamp(0.0, turn.middle - room, turn.middle + room);
-  // The key view is on the way.
+  // The path passes through the key view.
   turn.middle = std::clamp(turn.middle, -turn.reach, turn.reach);
   return turn;
 }

@@ -88,7 +88,7 @@ class GlbWriter {
     Append(g_.position);
   }
 
-  // Coloured points, for programs that do not know the extension.
+  // Coloured points, for programs without the extension.
   void Fallback() {
     Add("COLOR_0", "VEC4", kUnsignedByte, 4 * g_.size())["normalized"] = true;
     const size_t row = 3 * static_cast<size_t>(ShCoefficients(g_.sh_degree));

@@ -13,7 +13,8 @@ constexpr int kBins = 512;
 constexpr int kLevelIterations = 200;
 constexpr int kPaletteIterations = 8;
 
-// Levels as dense as the cube root of the values' density, which is best for many levels.
+// Initial levels with the density of the cube root of the values' density, which is optimal for
+// many levels.
 void SpreadLevels(const std::vector<float>& sorted, std::span<float> levels) {
   const size_t count = levels.size();
   const double low = sorted.front(), width = (static_cast<double>(sorted.back()) - low) / kBins;
@@ -35,7 +36,7 @@ void SpreadLevels(const std::vector<float>& sorted, std::span<float> levels) {
   while (next < count) levels[next++] = sorted.back();
 }
 
-// k-means of the rows that `members` names.
+// k-means of the rows with indices `members`.
 class Clusters {
  public:
   Clusters(const std::vector<float>& rows, int width, std::vector<uint32_t> members, int count)
@@ -70,7 +71,8 @@ class Clusters {
     }
   }
 
-  // Each centre becomes the mean of its members; one without any takes the row that is worst off.
+  // Each centre becomes the mean of its members; an empty cluster takes the row with the largest
+  // error.
   void Update() {
     std::vector<double> sums(centers_.size(), 0.0);
     std::vector<int> counts(count_, 0);
@@ -112,8 +114,8 @@ class Clusters {
   std::vector<float> centers_;  // width x count
 };
 
-// How many of `size` rows each cluster gets: by its share of the error, but one at least and no
-// more than it has members.
+// Distribution of `size` rows to the clusters in proportion to their error, at least one and at
+// most the number of members each.
 std::vector<int> Shares(const Clusters& coarse, int size) {
   std::vector<double> error(coarse.count(), 0.0);
   std::vector<int> members(coarse.count(), 0);

@@ -21,7 +21,7 @@ constexpr int kPaletteColumns = 64;  // of the picture of centroids
 constexpr int kGaussiansPerPaletteRow =
     8;  // what a palette of more rows costs, it hardly wins back
 constexpr int kMaxPalette = 65536;
-// Fewer levels than 256 make smaller pictures, at a cost that is hardly seen; those of scales are.
+// Fewer levels than 256 make smaller pictures with hardly visible loss, except for scales.
 constexpr int kColorLevels = 128;
 constexpr int kHarmonicLevels = 64;
 constexpr int kLargestIsW = 252;  // the fourth byte of a rotation: which component is left out
@@ -30,7 +30,7 @@ uint8_t Byte(float unit) {
   return static_cast<uint8_t>(std::lround(255.0f * std::clamp(unit, 0.0f, 1.0f)));
 }
 
-// As JSON: six digits, which are more than a codebook's levels are worth.
+// Six digits in JSON, more than the precision of a codebook's levels.
 std::vector<double> ShortNumbers(const Codebook& codebook) {
   std::vector<double> numbers;
   for (const float level : codebook.levels()) {
@@ -39,7 +39,7 @@ std::vector<double> ShortNumbers(const Codebook& codebook) {
   return numbers;
 }
 
-// The largest component is left out and positive; the others fill -1/sqrt(2)..1/sqrt(2).
+// The largest component is omitted and positive; the others span -1/sqrt(2)..1/sqrt(2).
 std::array<uint8_t, 4> PackRotation(const float* q) {
   int largest = 0;
   for (int k = 1; k < 4; ++k) {
@@ -64,7 +64,7 @@ class SogWriter {
         coefficients_(static_cast<size_t>(ShCoefficients(gaussians.sh_degree))),
         grid_(LogGridOf(gaussians.position)),
         order_(MortonOrder(grid_)) {
-    // A multiple of 4 each way; one pixel at least.
+    // Multiples of 4; at least one pixel.
     const double side = std::sqrt(static_cast<double>(std::max<size_t>(count_, 1)));
     width_ = 4 * static_cast<int>(std::ceil(side / 4.0));
     const size_t rows = (count_ + width_ - 1) / width_;
@@ -147,7 +147,7 @@ class SogWriter {
     const size_t rest = coefficients_ - 1;
     std::vector<float> rows;
     rows.reserve(count_ * rest * 3);
-    // In the file's order, so that the rows that clusters start from are spread over space.
+    // In the file's order, so that the initial rows of clusters are spread over space.
     for (const uint32_t i : order_) rows.insert(rows.end(), Sh(i) + 3, Sh(i) + 3 * coefficients_);
     const size_t wanted = std::clamp<size_t>(count_ / kGaussiansPerPaletteRow, 1, kMaxPalette);
     const int size = static_cast<int>(std::bit_floor(wanted));

@@ -21,7 +21,7 @@ constexpr uint64_t kLimit = std::numeric_limits<uint32_t>::max();
 void Put16(uint64_t value, std::string* out) { PutLittleEndian(value, 2, out); }
 void Put32(uint64_t value, std::string* out) { PutLittleEndian(value, 4, out); }
 
-// What the local and the central header have in common.
+// Fields common to the local and the central header.
 void PutFacts(const ZipEntry& entry, uint32_t crc, std::string* out) {
   Put16(kVersion, out);
   Put16(0, out);  // flags

@@ -24,7 +24,7 @@ constexpr double kPositionOfSize = 0.05;        // bound, of the median Gaussian
 constexpr double kFarthestSteps = 1 << 29;
 constexpr double kScaleBound = 0.01;  // relative
 constexpr int kOpacityBound = 1;      // of 255
-// Digits that an offset and a length may add to the header.
+// Maximum digits that an offset and a length add to the header.
 constexpr size_t kDigitsOfSpan = 40;
 
 Quantizer OfPositions(const ViewerGaussians& g) {
@@ -106,7 +106,7 @@ class Encoder {
            (tracks_[2].IsStill(i) ? 0u : 1u << kOpacity);
   }
 
-  // Those that change in the same attributes together, in them neighbours in space.
+  // Groups Gaussians that change in the same attributes, and sorts them by spatial neighbourhood.
   void Order() {
     for (const uint32_t i : MortonOrder(LogGridOf(g_.position))) {
       const bool is_seen = i < first_mover_ ? OpacityByte(g_.opacity_logit[i]) > 0
@@ -119,7 +119,7 @@ class Encoder {
     });
   }
 
-  // Movers, in the file's order, of which the attribute changes.
+  // Moving Gaussians, in the file's order, whose attribute changes.
   std::vector<size_t> MoversOf(Attribute attribute) const {
     std::vector<size_t> movers;
     for (const uint32_t i : order_) {
@@ -136,7 +136,7 @@ class Encoder {
     return stream;
   }
 
-  // Each less the one before.
+  // Delta coding.
   template <class Steps>
   Stream Differences(Attribute attribute, Steps&& steps) const {
     Stream stream{attribute, kStatic, {}};
@@ -220,7 +220,7 @@ class Encoder {
         before[a] = std::move(held);
       }
     }
-    // All keys first: a player that seeks shows the key frame before it has the rest.
+    // All keys first: a seeking player shows the key frame before the rest arrives.
     std::string heads, payloads;
     unsigned streams = 0;
     for (const std::vector<Stream>& kind : {keys, deltas}) {
@@ -300,7 +300,7 @@ class Encoder {
       }
       return header.dump();
     };
-    // Offsets are counted from the file's begin, so that blanks keep the header's length.
+    // Offsets count from the start of the file, so blanks keep the header's length.
     const size_t length = text_from(0).size() + kDigitsOfSpan * (groups.size() + 1);
     std::string file = kMagic;
     PutLittleEndian(kVersion, 2, &file);

@@ -7,7 +7,7 @@
 
 namespace color3d {
 
-// All lowest bytes, then all next ones: alike bytes lie together.
+// All lowest bytes, then all next ones, so that similar bytes are adjacent.
 PackedStream Pack(const Stream& stream) {
   uint32_t largest = 0;
   for (const uint32_t s : stream.symbols) largest = std::max(largest, s);

@@ -24,12 +24,12 @@ constexpr double kPositionLimit = 8388607.0;  // 2^23 - 1
 constexpr float kColorScale = 0.15f;
 constexpr float kLowestLogScale = -10.0f;
 constexpr float kScaleSteps = 16.0f;  // a unit of the logarithm
-// Steps of bytes of which 128 are 1.
+// Quantization steps in byte values; 128 byte values are one unit.
 constexpr int kFirstDegreeStep = 8;
 constexpr int kRestStep = 16;
 constexpr std::array<float, 3> kFlip = {1.0f, -1.0f, -1.0f};
 
-// As many as keep the farthest coordinate within 24 bits.
+// The largest number of fractional bits with the farthest coordinate within 24 bits.
 int FractionalBits(const std::vector<float>& position) {
   double farthest = 0.0;
   for (const float x : position) farthest = std::max(farthest, std::abs(static_cast<double>(x)));
@@ -100,7 +100,7 @@ std::array<float, 4> FlippedRotation(const ViewerGaussians& g, size_t i) {
   return {q[1], -q[2], -q[3], q[0]};
 }
 
-// The components that are not the largest: a sign and 9 bits each below the largest one's number.
+// All components but the largest: a sign and 9 bits each, below the index of the largest.
 std::string SmallestThree(const ViewerGaussians& g) {
   std::string bytes;
   for (size_t i = 0; i < g.size(); ++i) {
@@ -121,7 +121,7 @@ std::string SmallestThree(const ViewerGaussians& g) {
   return bytes;
 }
 
-// x y z where w is positive.
+// x y z with positive w.
 std::string FirstThree(const ViewerGaussians& g) {
   std::string bytes;
   for (size_t i = 0; i < g.size(); ++i) {
@@ -132,7 +132,7 @@ std::string FirstThree(const ViewerGaussians& g) {
   return bytes;
 }
 
-// Whether each basis function changes its sign with the axes.
+// True for basis functions that change sign with the axes.
 std::array<float, kMaxShCoefficients> FlippedSigns() {
   double here[kMaxShCoefficients], there[kMaxShCoefficients];
   EvaluateSh(kMaxShCoefficients, 0.36, 0.48, 0.8, here);  // where none is zero
@@ -180,7 +180,7 @@ std::string Gzip(const std::string& plain) {
   return packed;
 }
 
-// Neighbours in space become neighbours in the file: they are alike, and compress better.
+// Spatial neighbours are similar and compress better together.
 ViewerGaussians InMortonOrder(const ViewerGaussians& g) {
   const std::vector<uint32_t> order = MortonOrder(LogGridOf(g.position));
   const auto sorted = [&](const std::vector<float>& rows) {
