@@ -293,7 +293,8 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
   command
       ->add_option("--hints,--strokes,--points",
                    options->paint.hints,
-                   "Colour strokes (PNG of the photo's size, transparent elsewhere), or points, "
+                   "Colour strokes (PNG with the aspect ratio of the photo, transparent "
+                   "elsewhere), or points, "
                    "lines and regions (JSON)")
       ->group(place);
   command

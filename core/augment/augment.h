@@ -1,4 +1,4 @@
-// Geometric augmentations of the coloured key view (METHOD.md "Stage 1c"). Luminance, colour and a
+// Geometric augmentations of the coloured key view (STILL.md "Stage 1c"). Luminance, colour and a
 // validity mask share one sampling map. Chroma is never mixed across a hard shuffle edge (nearest
 // sampling there). Pure functions of the generator; thread-safe.
 #pragma once

@@ -1,4 +1,4 @@
-// Renders the key view from another camera by its depth map (METHOD.md "Stage 1c"): a z-buffered
+// Renders the key view from another camera by its depth map (STILL.md "Stage 1c"): a z-buffered
 // forward warp of the visible surface. Pure functions, thread-safe.
 #pragma once
 

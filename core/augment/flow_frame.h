@@ -1,4 +1,4 @@
-// Synthetic frame of a film that starts at the key view, without geometry (METHOD.md "Stage 1c"): a
+// Synthetic frame of a film that starts at the key view, without geometry (STILL.md "Stage 1c"): a
 // slow zoom and rotation, and a smooth flow. Pure function, thread-safe.
 #pragma once
 

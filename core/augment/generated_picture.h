@@ -1,4 +1,4 @@
-// A training picture for the colorizer, generated from the coloured key view (METHOD.md "Stage
+// A training picture for the colorizer, generated from the coloured key view (STILL.md "Stage
 // 1c"). A plain value.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Patch-based outpainting (METHOD.md "Stage 1c"): a quadrant of the key view is placed in the
+// Patch-based outpainting (STILL.md "Stage 1c"): a quadrant of the key view is placed in the
 // opposite corner of a canvas of the same size, and its two open sides are extended by quilting
 // (Efros & Freeman 2001). Every pixel is a copy with both its luminance and its chroma. Only small
 // steps of shading between neighbouring patches are smoothed, equally in all three channels.

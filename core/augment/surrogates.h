@@ -1,6 +1,6 @@
 // Surrogates for a generative model's variations of the coloured key view, without a model: the
 // picture extended beyond its border, the next frame of a film, and views from nearby cameras
-// (METHOD.md "Stage 1c"). Thread-safe if the renderer is.
+// (STILL.md "Stage 1c"). Thread-safe if the renderer is.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// The colour of a view from all that is known of it, per pixel by confidence (METHOD.md "Fusion of
+// The colour of a view from all that is known of it, per pixel by confidence (STILL.md "Fusion of
 // sources"): carried from a key view > inferred by the personalized colorizer > guessed by the
 // automatic one. Pure functions, thread-safe.
 #pragma once

@@ -1,4 +1,4 @@
-// The final colour of a view: carried, inferred and guessed colours fused (METHOD.md "Fusion of
+// The final colour of a view: carried, inferred and guessed colours fused (STILL.md "Fusion of
 // sources"). As thread-safe as the sources.
 #pragma once
 

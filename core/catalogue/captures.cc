@@ -103,7 +103,7 @@ CaptureLayout DetectCapture(const std::vector<std::string>& files) {
 
 const std::vector<CaptureKindInfo>& CaptureKinds() {
   static const std::vector<CaptureKindInfo> kinds = {{CaptureKind::kStatic, "static", false, true},
-                                                     {CaptureKind::kFilm, "film", true, false},
+                                                     {CaptureKind::kFilm, "film", false, false},
                                                      {CaptureKind::kDynamic, "dynamic", true, true},
                                                      {CaptureKind::kRelief, "relief", true, true}};
   return kinds;

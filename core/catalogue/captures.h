@@ -55,7 +55,7 @@ enum class CaptureKind {
 struct CaptureKindInfo {
   CaptureKind kind;
   const char* name;       // in scene.json
-  bool has_times;         // each view has one
+  bool is_dynamic;        // posed views with times: what is reconstructed may move
   bool is_reconstructed;  // Gaussians are made of it
 };
 

@@ -1,4 +1,4 @@
-// Gaussian process regression of colour changes (METHOD.md "Corrections";
+// Gaussian process regression of colour changes (STILL.md "Corrections";
 // kriging, Rasmussen & Williams 2006, ch. 2). Torch in the interface; used inside core/colorizer
 // only. Immutable after construction, thread-safe.
 #pragma once

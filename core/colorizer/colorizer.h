@@ -1,4 +1,4 @@
-// The personalized colorizer (METHOD.md "Stage 1d"): frozen ConvNeXt encoder, Conv-Adapters and a
+// The personalized colorizer (STILL.md "Stage 1d"): frozen ConvNeXt encoder, Conv-Adapters and a
 // per-scene decoder, trained on one coloured key view; L in, ab out. No torch in this interface.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Corrections of a coloured scene (METHOD.md "Corrections"): propagates colour changes that a user
+// Corrections of a coloured scene (STILL.md "Corrections"): propagates colour changes that a user
 // paints on parts of some pictures to similar and near places in all pictures. No torch in this
 // interface.
 #pragma once

@@ -7,7 +7,7 @@
 
 namespace color3d {
 
-// METHOD.md "Stage 1d": every picture is padded to multiples of 32.
+// STILL.md "Stage 1d": every picture is padded to multiples of 32.
 inline constexpr int kPadMultiple = 32;
 
 // Extends [1,C,H,W] at its right and bottom to multiples of `multiple` by reflection, or by

@@ -1,5 +1,5 @@
 // The trained part of a colorizer: per-scene decoder and Conv-Adapters around the shared frozen
-// encoder (METHOD.md "Stage 1d"). Torch in the interface; used inside core/colorizer only.
+// encoder (STILL.md "Stage 1d"). Torch in the interface; used inside core/colorizer only.
 // Forward() is const: concurrent calls are safe while the parameters do not change.
 #pragma once
 

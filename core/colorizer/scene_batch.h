@@ -1,4 +1,4 @@
-// Many scenes in one running batch (METHOD.md "All-in-one"): each scene's thread trains with its
+// Many scenes in one running batch (STILL.md "All-in-one"): each scene's thread trains with its
 // own options, checkpoints, clock and cancellation; here they share one frozen encoder and take
 // turns at the compute slots. A turn goes to the project that has computed least, then to the scene
 // of it that has. Scenes join and leave at any time, and fail alone. Nothing of a scene's
@@ -46,7 +46,7 @@ class SceneBatch {
   // A scene's membership, from construction to destruction. Used by one thread.
   class Membership {
    public:
-    // `project`: what fairness is between, e.g. the submitted job.
+    // `project`: of the scene's owner. All scenes of a project share its turns.
     Membership(SceneBatch& batch, const std::string& project);
     ~Membership();
     Membership(const Membership&) = delete;

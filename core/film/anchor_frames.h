@@ -1,5 +1,5 @@
 // Chooses the frames of a film that get colours of their own; other frames take theirs from these
-// by optical flow (METHOD.md "Film"). Their number depends on motion, not on frames per second.
+// by optical flow (FILM.md "Film"). Their number depends on motion, not on frames per second.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,4 @@
-// Carries the colours of a film's key frames along the film by optical flow (METHOD.md "Film").
+// Carries the colours of a film's key frames along the film by optical flow (FILM.md "Film").
 // Each pixel is tracked back to its place in a key frame and takes the colour there, so that
 // colours are resampled once only.
 #pragma once

@@ -1,4 +1,4 @@
-// Separates moving objects in a film from the motion of the camera (METHOD.md "Poses of films") by
+// Separates moving objects in a film from the motion of the camera (DYNAMIC.md "Poses of films") by
 // the residual of optical flow against the epipolar geometry of two frames. Pure functions,
 // thread-safe.
 #pragma once

@@ -1,4 +1,4 @@
-// Finds shots of a film that show the place of a key frame again after a cut (METHOD.md "Film").
+// Finds shots of a film that show the place of a key frame again after a cut (FILM.md "Film").
 #pragma once
 
 #include <memory>

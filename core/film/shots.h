@@ -1,4 +1,4 @@
-// Finds the cuts of a film and its useless frames from thumbnails of all frames (METHOD.md "Film").
+// Finds the cuts of a film and its useless frames from thumbnails of all frames (FILM.md "Film").
 // Pure functions, thread-safe.
 #pragma once
 

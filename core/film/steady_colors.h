@@ -1,5 +1,5 @@
 // Averages the colours of neighbouring frames along optical flow, so that colours inferred frame by
-// frame do not flicker (METHOD.md "Film"). Stateless.
+// frame do not flicker (FILM.md "Film"). Stateless.
 #pragma once
 
 #include <memory>

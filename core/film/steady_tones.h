@@ -1,4 +1,4 @@
-// Removes flicker of exposure from a film (METHOD.md "Film"): computes for each frame the monotone
+// Removes flicker of exposure from a film (FILM.md "Film"): computes for each frame the monotone
 // curve that maps its tones to those of the frames around it. Tones are compared along optical
 // flow, so that moving objects do not count. Pure functions, thread-safe.
 #pragma once

@@ -1,4 +1,4 @@
-// Colours of the key view from a coloured picture of it (METHOD.md "Stage 1b"). Only a and b are
+// Colours of the key view from a coloured picture of it (STILL.md "Stage 1b"). Only a and b are
 // used; L remains that of the photo.
 #pragma once
 

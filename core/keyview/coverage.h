@@ -1,4 +1,4 @@
-// Score of the coverage strategy (METHOD.md "Stage 1a"): how well the deep features of one view
+// Score of the coverage strategy (STILL.md "Stage 1a"): how well the deep features of one view
 // explain the other views. Pure functions, thread-safe.
 #pragma once
 

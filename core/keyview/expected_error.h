@@ -1,4 +1,4 @@
-// Selects views to colour by the expected error of the colours of all views (METHOD.md "Stage 1a"):
+// Selects views to colour by the expected error of the colours of all views (STILL.md "Stage 1a"):
 // small where a key view shows the same place, larger where colours are inferred, and increasing
 // with the feature distance to the key views. Pure functions, thread-safe.
 #pragma once

@@ -20,7 +20,7 @@ namespace {
 
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-constexpr double kGuardDeviations = 2.0;  // METHOD.md "Stage 1a": median - 2 MAD
+constexpr double kGuardDeviations = 2.0;  // STILL.md "Stage 1a": median - 2 MAD
 // Minimum deviation: near-identical views have a MAD of almost 0, due to rounding.
 constexpr double kGuardSlack = 1e-6;
 constexpr int kGuardMinViews = 5;

@@ -1,4 +1,4 @@
-// Key view selection (METHOD.md "Stage 1a"): the photo that the user should colour. Excludes unfit
+// Key view selection (STILL.md "Stage 1a"): the photo that the user should colour. Excludes unfit
 // views, then ranks the others by the scores of the strategy. Pure functions, float64,
 // deterministic; thread-safe.
 #pragma once

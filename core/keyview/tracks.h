@@ -1,4 +1,4 @@
-// Score of the `tracks` strategy (METHOD.md "Stage 1a"): overlap of a view with the other views,
+// Score of the `tracks` strategy (STILL.md "Stage 1a"): overlap of a view with the other views,
 // from tracks of structure-from-motion. Pure functions, thread-safe.
 #pragma once
 

@@ -23,7 +23,7 @@ bool HasMoments(const std::vector<View>& views) {
   });
 }
 
-// Not all views stand at one place and look one way.
+// Returns true unless all views have the same position and direction.
 bool HasPoses(const std::vector<View>& views) {
   return std::any_of(views.begin(), views.end(), [&](const View& view) {
     const Pose &one = view.cam_from_world, &first = views.front().cam_from_world;
@@ -70,9 +70,11 @@ int Scene::FindView(std::string_view name) const {
                                  : "; it has " + known + (views.size() > 3 ? ", ..." : "")));
 }
 
-bool Scene::IsFilm() const { return HasMoments(views) && !HasPoses(views) && !relief; }
-
-bool Scene::IsDynamic() const { return HasMoments(views) && (HasPoses(views) || relief); }
+CaptureKind Scene::kind() const {
+  if (!HasMoments(views)) return CaptureKind::kStatic;
+  if (relief) return CaptureKind::kRelief;
+  return HasPoses(views) ? CaptureKind::kDynamic : CaptureKind::kFilm;
+}
 
 std::vector<int> Scene::ViewsInOrderOfTime() const {
   std::vector<int> order(views.size());

@@ -40,7 +40,7 @@ const char* ModelName(Distortion::Model model) {
   return "none";
 }
 
-// Reads fields and names the place ("views[3].camera.fx") when one is wrong.
+// Reads fields; errors name the place ("views[3].camera.fx").
 class Field {
  public:
   Field(const json& value, std::string place) : value_(value), place_(std::move(place)) {}
@@ -173,7 +173,7 @@ Relief ReliefFromJson(const Field& field) {
   return relief;
 }
 
-// [x, y, z, error, [views]]: there may be a million of them.
+// As [x, y, z, error, [views]], which is compact: a scene may have a million points.
 SparsePoint PointFromJson(const Field& field, int view_count) {
   if (field.ArraySize() != 5) throw field.Wrong("[x, y, z, error, [views]]");
   SparsePoint point;
@@ -220,6 +220,7 @@ std::string SceneToJson(const Scene& scene) {
   }
   json root = {{"format", kFormat},
                {"version", kVersion},
+               {"kind", scene.capture().name},
                {"world_from_scene_scale", scene.world_from_scene_scale},
                {"world_offset", Vector3ToJson(scene.world_offset)},
                {"views", std::move(views)},
@@ -267,6 +268,10 @@ Scene SceneFromJson(std::string_view text) {
   scene.points.reserve(point_count);
   for (size_t i = 0; i < point_count; ++i) {
     scene.points.push_back(PointFromJson(points[i], static_cast<int>(view_count)));
+  }
+  if (field.Has("kind")) {  // absent from older files
+    const CaptureKind kind = KindOfName(field["kind"].Text());
+    if (kind != scene.kind()) throw field["kind"].Wrong(scene.capture().name);
   }
   return scene;
 }

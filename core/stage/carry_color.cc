@@ -26,11 +26,11 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   options.Validate();
   Scene scene = ReadScene(context);
   const std::vector<int> key_views = ReadKeyViews(context, scene, options.additional_key_views);
-  if (IsColoredAsFilm(context, scene)) {
+  if (!ColoredAs(context, scene).is_reconstructed) {
     return CarryFilm({options, scene, key_views, GaussianModel()}, context);
   }
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
-  if (scene.IsDynamic() && geometry.motion.size() > 0) {
+  if (scene.capture().is_dynamic && geometry.motion.size() > 0) {
     return CarryDynamic({options, scene, key_views, geometry}, context);
   }
   // Frames of a static scene are photos of it.

@@ -118,7 +118,7 @@ std::optional<SceneMotion> MotionOf(const Scene& scene,
                                     const std::vector<CurvePoint>& curves,
                                     const StageContext& context) {
   const char* name = context.HasInput(artifact::kModel) ? artifact::kModel : artifact::kGeometry;
-  if (!scene.IsDynamic() || !context.HasInput(name)) return std::nullopt;
+  if (!scene.capture().is_dynamic || !context.HasInput(name)) return std::nullopt;
   SceneMotion motion;
   motion.moves = ParseGaussians(context.ReadInput(name)).motion.size() > 0;
   for (const CurvePoint& point : curves) {
@@ -150,7 +150,7 @@ std::string DescribeMotion(const FilmFindings& film, const Scene& scene) {
 }
 
 void AddTime(const Scene& scene, PlanFacts* facts) {
-  facts->is_dynamic = scene.IsDynamic();
+  facts->is_dynamic = scene.capture().is_dynamic;
   if (!facts->is_dynamic) return;
   std::set<double> times;
   std::set<int> cameras;
@@ -171,7 +171,7 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     return {};  // the facts that the plan depends on are unknown
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
   PlanFacts plan_facts;
-  plan_facts.is_film = IsColoredAsFilm(context, scene);
+  plan_facts.is_film = !ColoredAs(context, scene).is_reconstructed;
   AddTime(scene, &plan_facts);
   plan_facts.motion = motion;
   plan_facts.has_poses = !facts.ran_structure_from_motion;
@@ -293,7 +293,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
 
   ReportData data;
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
-  data.summary = Summary(scene, IsColoredAsFilm(context, scene), metrics, keys);
+  data.summary = Summary(scene, !ColoredAs(context, scene).is_reconstructed, metrics, keys);
   if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
   data.key_view = KeyViewChapter(KeyPictures(key ? scene.views[*key].name : "", context), context);
   data.additional_key_views = AdditionalKeyViewChapters(scene, kReportSidePx, context);

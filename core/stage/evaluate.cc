@@ -140,7 +140,7 @@ class HeldOutScores {
                 const std::optional<GaussianModel>& model,
                 const std::optional<GaussianModel>& bound,
                 StageContext& context)
-      : scene_(scene), how_(HowHeldOut(scene)), model_(model), bound_(bound), context_(context) {}
+      : scene_(scene), how_(HeldOutKinds(scene)), model_(model), bound_(bound), context_(context) {}
 
   void Add(int index, const std::filesystem::path& truth) {
     const View& view = scene_.views[index];
@@ -266,7 +266,8 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const TruthFiles held_out = FilesByView(options.truth, true, scene);
   const TruthFiles training = FilesByView(options.training_truth, false, scene);
   std::optional<GaussianModel> model;
-  if (!IsColoredAsFilm(context, scene)) model = ParseGaussians(context.ReadInput(artifact::kModel));
+  if (ColoredAs(context, scene).is_reconstructed)
+    model = ParseGaussians(context.ReadInput(artifact::kModel));
   std::optional<GaussianModel> bound;
   if (options.bound && model) {
     bound = FitTrueChroma(*model, scene, training, options.chroma, context);

@@ -62,7 +62,7 @@ TEST_F(EvaluateTest, ComparesCamerasOfOneTimeInDynamicScenes) {
   scene_.views[0].moment = Moment{0.0, 1};  // its camera is held out
   scene_.views[1].moment = Moment{0.0, 0};
   scene_.views[2].moment = Moment{0.5, 0};
-  ASSERT_TRUE(scene_.IsDynamic());
+  ASSERT_TRUE(scene_.capture().is_dynamic);
   AddInput(artifact::kScene, SceneToJson(scene_));
   EvaluateOptions options;
   options.truth = {TruthOf("p0.png")};

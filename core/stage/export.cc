@@ -219,10 +219,6 @@ void ExportOptions::Validate() const {
 void RunExport(const ExportOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
-  if (scene.IsFilm()) {  // nothing was reconstructed
-    context.WriteOutput(artifact::kExportScores, "{}\n");
-    return;
-  }
   Exporter(options, scene, context).Run();
 }
 

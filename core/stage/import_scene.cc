@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "core/base/files.h"
+#include "core/catalogue/captures.h"
 #include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
@@ -19,17 +21,14 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// The splat that a scene without photos consists of; empty where it is none.
-std::string FindSplat(const fs::path& scene_folder) {
-  std::string splat;
-  std::error_code none;
-  if (!fs::is_directory(scene_folder, none)) return splat;
-  for (const std::string& file : ListFiles(scene_folder)) {
-    if (IsAugmentFile(file) || IsMaskFile(file)) continue;
-    if (HasImageExtension(file)) return "";
-    if (HasSplatExtension(file) && splat.empty()) splat = file;
-  }
-  return splat;
+// Requires: the scene is laid out as a splat.
+std::string FindSplat(const std::vector<std::string>& files) {
+  const auto is_splat = [](const std::string& file) {
+    return HasSplatExtension(file) && !IsAugmentFile(file) && !IsMaskFile(file);
+  };
+  const auto splat = std::find_if(files.begin(), files.end(), is_splat);
+  if (splat == files.end()) throw InvalidArgument("the scene holds no splat outside of masks/");
+  return *splat;
 }
 
 // As a photo of the Gaussians would be, in grey.
@@ -78,20 +77,21 @@ void RunImportScene(const ImportOptions& options,
   splat_views.Validate();
   film_options.Validate();
   if (ImportCameraFilms(options, film_options, context)) return;
-  const std::string film = FindFilm(context.scene_folder());
-  if (!film.empty()) {
-    return ImportFilm(film, film_options, options, context);
-  }
-  const std::string splat = FindSplat(context.scene_folder());
-  if (!splat.empty()) {
+  std::error_code none;
+  std::vector<std::string> files;
+  if (fs::is_directory(context.scene_folder(), none)) files = ListFiles(context.scene_folder());
+  const CaptureLayout layout = DetectCapture(files);
+  if (layout == CaptureLayout::kFilm)
+    return ImportFilm(FindFilm(files), film_options, options, context);
+  if (layout == CaptureLayout::kSplat) {
     WarnOfUnusedOptions(film_options, NoFilm::kPhotos, context);
-    return ImportSplatScene(splat, options, splat_views, context);
+    return ImportSplatScene(FindSplat(files), options, splat_views, context);
   }
   ImportOptions within = options;
   within.memory_bytes = context.MemoryBytes();
   const ImportResult result =
       ImportScene(context.scene_folder(), context.scratch_folder(), within, context.control());
-  const NoFilm what = result.scene.IsDynamic() ? NoFilm::kTimedPictures : NoFilm::kPhotos;
+  const NoFilm what = result.scene.capture().is_dynamic ? NoFilm::kTimedPictures : NoFilm::kPhotos;
   WarnOfUnusedOptions(film_options, what, context);
   WriteImported(result, context);
 }

@@ -23,7 +23,7 @@ TEST_F(StageTest, ASplatBecomesViewsAndGeometryThatNeedsNoTraining) {
   const Scene scene = SceneFromJson(ReadFile(out / "scene.json"));
   ASSERT_EQ(scene.views.size(), 8u);
   EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{0}));
-  EXPECT_EQ(ImportFactsFromJson(ReadFile(out / "import.json")).layout, "splat");
+  EXPECT_EQ(ImportFactsFromJson(ReadFile(out / "import.json")).layout, CaptureLayout::kSplat);
   for (const View& view : scene.views) {
     const Image photo = ReadImage(out / view.image_file);
     EXPECT_EQ(photo.channels, 1);

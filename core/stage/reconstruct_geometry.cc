@@ -35,7 +35,7 @@ MemoryPlan PlanMemory(const GeometryOptions& options,
   demand.max_side_px = max_side_px;
   demand.max_gaussians = options.max_gaussians;
   demand.sh_degree = options.sh_degree;
-  demand.moves = scene.IsDynamic();
+  demand.moves = scene.capture().is_dynamic;
   return PlanGeometryMemory(demand, budget_bytes);
 }
 
@@ -92,10 +92,6 @@ void RunReconstructGeometry(const GeometryOptions& options,
     return;
   }
   const Scene scene = ReadScene(context);
-  if (scene.IsFilm()) {  // whose poses were looked for in vain
-    context.WriteOutput(artifact::kGeometry, SerializeGaussians({}));
-    return;
-  }
   GeometryOptions planned = options;
   planned.max_gaussians = GaussianCap(options.max_gaussians, TrainingCameras(scene), max_side_px);
   if (options.recipe == GeometryOptions::Recipe::kColor3d) {

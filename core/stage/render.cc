@@ -65,7 +65,7 @@ void RenderOptions::Validate() const {
 void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
-  if (IsColoredAsFilm(context, scene)) {
+  if (!ColoredAs(context, scene).is_reconstructed) {
     RefusePathThroughFilm(options);
     return RenderFilm(options, scene, ViewsToRender(options, scene), context);
   }
@@ -83,7 +83,7 @@ void RunRender(const RenderOptions& options, StageContext& context) {
     movie.pictures = false;  // `pictures` means those of the films of the cameras
     RenderMovie(movie, scene, model, context);
   }
-  if (scene.IsDynamic()) {  // moving or static
+  if (scene.capture().is_dynamic) {  // moving or static
     if (HasColors(context, scene)) WriteFilmsOfCameras(scene, options.pictures, context);
   } else if (options.pictures) {
     context.progress().OnWarning(

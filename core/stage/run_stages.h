@@ -66,7 +66,7 @@ ColorSources SourcesOf(const Colorizer& colorizer,
                        std::function<Image(const Image& luminance)> position = {});
 
 // Corrects the colours of every view where the user painted and in similar places near that
-// (METHOD.md "Corrections"), or recolours ranges of time of a film. `encoder`: as in
+// (STILL.md "Corrections"), or recolours ranges of time of a film. `encoder`: as in
 // RunColorizeViews.
 void RunCorrectColors(const CorrectColorsOptions& options,
                       StageContext& context,

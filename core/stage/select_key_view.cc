@@ -90,7 +90,7 @@ void ChooseTogether(const SelectKeyViewOptions& options,
     ChooseManually(options.view, scene, candidates, ranking);
     first = ranking->selection.index;
   }
-  if (scene.IsFilm()) {
+  if (!scene.capture().is_reconstructed) {
     ChosenKeyViews chosen = ChooseFilmKeys(
         scene, candidates, ranking->features, kept, options.selection.count, first, context);
     ranking->selection.index = chosen.views[0];
@@ -141,7 +141,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
     contents.push_back(view.content);
   }
   std::vector<int> shots;  // shots of a film
-  if (scene.IsFilm()) {
+  if (!scene.capture().is_reconstructed) {
     for (const int view : candidates) shots.push_back(scene.views[view].moment->shot);
   }
   GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents, shots), options, shots);
@@ -169,7 +169,8 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   }
   ranking->strategy = StrategyName(strategy);
   ranking->selection = RankViews(std::move(guarded), scores);
-  if (scene.IsFilm() && TakeFromLongestShot(scene, candidates, &ranking->selection)) {
+  if (!scene.capture().is_reconstructed &&
+      TakeFromLongestShot(scene, candidates, &ranking->selection)) {
     ranking->among = "the film's longest shot";
   }
   if (options.count > 1) ChooseTogether(stage_options, scene, candidates, kept, context, ranking);
@@ -195,7 +196,8 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   const Scene scene = ReadScene(context);
   // Colours of held-out views must not be used.
   std::vector<int> candidates = scene.TrainingViews();
-  if (scene.IsFilm() || scene.IsDynamic()) candidates = CandidatesOfFilm(scene, options.view);
+  if (!scene.capture().is_reconstructed || scene.capture().is_dynamic)
+    candidates = CandidatesOfFilm(scene, options.view);
   if (options.selection.count > static_cast<int>(candidates.size())) {
     throw InvalidArgument("{} key views are requested, but the scene has only {} training views",
                           options.selection.count,

@@ -11,10 +11,6 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
-  if (scene.IsFilm()) {  // nothing was reconstructed
-    context.WriteOutput(artifact::kModel, SerializeGaussians(geometry));
-    return;
-  }
   const ViewImages images(scene, context.scene_folder(), ColoredSide(context, scene.views[key]), 0);
   const ChromaTargetSource targets = [&](int view) {
     const Camera camera = images.WorkingCamera(view);

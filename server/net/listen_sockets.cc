@@ -122,7 +122,7 @@ void ListenSockets::ListenOnUnix() {
                                    path_.size()));
   }
   std::memcpy(address.sun_path, path_.data(), path_.size());
-  // Of two servers that start at once, one gets the lock; probing the socket would not suffice.
+  // If two servers start at once, one gets the lock; probing the socket would not suffice.
   lock_ = ::open((path_ + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (lock_ < 0) throw CannotListen(address_, std::strerror(errno));
   struct stat status {};

@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "core/catalogue/captures.h"
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
@@ -146,14 +147,13 @@ std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts&
   return SamplesOf(spec) == 0 ? "no samples are requested" + unused : "";
 }
 
-// Why a stage has nothing to do for a film; empty when it has. Where poses are looked for, the
-// stages of geometry themselves decide, when it is known whether there are any.
-std::string WhyNotForFilm(const std::string& kind, const ColorizeSceneSpec& scene) {
+// Reason why a stage has nothing to do for the scene; empty if it has, or if only import finds out.
+std::string WhyIdle(const std::string& kind,
+                    const SceneFacts& facts,
+                    const ColorizeSceneSpec& scene) {
+  if (!facts.is_film) return "";
   if (scene.import_scene().film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO) return "";
-  if (kind == kind::kReconstructGeometry || kind == kind::kSolveChroma || kind == kind::kExport) {
-    return "frames of a film without poses are coloured, not reconstructed";
-  }
-  return "";
+  return std::string(WhyNothingToDo(CaptureKind::kFilm, kind));
 }
 
 // `scene`: as in BuildColorizeSceneGraph.
@@ -211,7 +211,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
       skip_reason = "nothing is to be corrected";
     }
     if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);
-    if (skip_reason.empty() && facts.is_film) skip_reason = WhyNotForFilm(kind, scene);
+    if (skip_reason.empty()) skip_reason = WhyIdle(kind, facts, scene);
     builder->Add(std::move(spec), skip_reason);
   }
   builder->AddParent();

@@ -6,6 +6,7 @@
 #include "core/colorizer/scene_batch.h"
 #include "core/report/curves.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/idle_stages.h"
 #include "core/stage/run_stages.h"
 #include "server/backends/grpc_colorizer.h"
 #include "server/planning/key_view_jobs.h"
@@ -129,7 +130,7 @@ RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
 
 ColorizerOptions PersonalizeOptions(v1::PersonalizeSpec spec, const StageContext& context) {
   // As a part of colorize_scene it has its size already.
-  if (ReadScene(context).IsFilm()) TrainAtFrameSize(kDefaultMaxSidePx, &spec);
+  if (!ReadScene(context).capture().is_reconstructed) TrainAtFrameSize(kDefaultMaxSidePx, &spec);
   return ColorizerOptionsFrom(spec, context.seed());
 }
 
@@ -171,9 +172,9 @@ class CoreStageRunner : public StageRunner {
     };
     setup.attempt = run.job_name + "/" + std::to_string(run.attempt);
     setup.batch = Batch(run.threads);
-    setup.project = run.submission;
+    setup.project = run.project;
     StageContext context(std::move(setup), recorder, recorder, cancel);
-    RunStage(run, blobs, context);
+    if (LeaveOutIdleStage(kind, context).empty()) RunStage(run, blobs, context);
     const auto points = recorder.points();
     if (!points.empty() && kind != kind::kColorizeScene) {
       context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(points));

@@ -6,6 +6,7 @@
 #include "core/catalogue/stages.h"
 #include "core/report/curves.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/idle_stages.h"
 
 namespace color3d {
 namespace {
@@ -79,7 +80,7 @@ void LocalPipeline::Run(const std::string& kind,
                        recorder,
                        recorder,
                        cancel);
-  stage(context);
+  if (LeaveOutIdleStage(kind, context).empty()) stage(context);
   const double seconds = recorder.Seconds();
   if (!recorder.points().empty()) {
     context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(recorder.points()));

@@ -386,7 +386,7 @@ TEST_F(FilmTest, WhatIsNoFilmIsRefused) {
   EXPECT_THAT(text.err, HasSubstr("try another copy, or save it as .mp4"));
   const ProcessResult inspected = Client({"inspect", Path("text.mp4").string()});
   EXPECT_EQ(inspected.exit_code, 2);
-  EXPECT_THAT(inspected.err, HasSubstr("text.mp4 is a film; inspect looks at pictures"));
+  EXPECT_THAT(inspected.err, HasSubstr("text.mp4 is a film; inspect needs pictures"));
   const fs::path film = WriteVideo();
   const ProcessResult none =
       Colorize(film, {"--benchmark", "--set", "import_scene.film_end_s=0.1"});

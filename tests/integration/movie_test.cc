@@ -108,7 +108,7 @@ void MovieTest::ExpectBadInput() {
   EXPECT_FALSE(fs::exists(file));
   fs::create_directories(Path("other"));
   WriteFileAtomic(Path("other/model.c3g"), "another");
-  ExpectRefusal(Client({"turntable", Path("other").string()}), 2, {"no job that made"});
+  ExpectRefusal(Client({"turntable", Path("other").string()}), 2, {"no job of the server"});
 }
 
 }  // namespace

@@ -128,8 +128,8 @@ TEST_F(RigTest, ScoresAreToldByHowViewsAreHeldOut) {
   const double all = metrics.at("delta_e00_chroma"), camera = metrics.at("delta_e00_chroma_camera"),
                block = metrics.at("delta_e00_chroma_block");
   EXPECT_NEAR(all, (9 * camera + 4 * block) / 13, 1e-6);
-  EXPECT_THAT(result.out, HasSubstr("of a camera held out"));
-  EXPECT_THAT(result.out, HasSubstr("of a block of time"));
+  EXPECT_THAT(result.out, HasSubstr("held-out cameras"));
+  EXPECT_THAT(result.out, HasSubstr("held-out blocks of time"));
   EXPECT_THAT(ReadFile(Path("out") / "report.html"), HasSubstr("delta_e00_chroma_block"));
 }
 

@@ -41,7 +41,7 @@ void CheckLuminance(const Image& luminance) {
 }
 
 // sRGB grey of L (0..100), elementwise: inverse CIE f, then the sRGB transfer function
-// (METHOD.md "Colour"; the scalar reference is GrayFromLuminance).
+// (STILL.md "Colour"; the scalar reference is GrayFromLuminance).
 torch::Tensor GrayFromLuminanceTensor(const torch::Tensor& luminance) {
   const torch::Tensor f = (luminance + 16.0) / 116.0;
   const torch::Tensor y = torch::where(luminance > 8.0, f * f * f, luminance * (27.0 / 24389.0));

@@ -1,4 +1,4 @@
-// Automatic colourization of a picture (METHOD.md "Stage 1b", `auto`). No torch in this interface.
+// Automatic colourization of a picture (STILL.md "Stage 1b", `auto`). No torch in this interface.
 // Immutable, thread-safe.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Colours of the key view from hints (METHOD.md "Stage 1b"): strokes, points, lines and regions,
+// Colours of the key view from hints (STILL.md "Stage 1b"): strokes, points, lines and regions,
 // propagated along the luminance. All pictures have the size of the key photo as captured. The
 // result does not depend on the number of threads.
 #pragma once

@@ -1,4 +1,4 @@
-// Colours a picture by a text prompt (METHOD.md "Stage 1b", `prompt`): colour phrases are located
+// Colours a picture by a text prompt (STILL.md "Stage 1b", `prompt`): colour phrases are located
 // with CLIP's dense features and become hints, which are propagated along L. No torch in this
 // interface.
 #pragma once

@@ -1,5 +1,5 @@
-// Gaussians in time: where they are at a moment, and the adjoint of that (METHOD.md "What
-// moves"). A model at one moment is a model as any other, so no kernel but these knows of time.
+// Gaussians in time: where they are at a moment, and the adjoint of that (DYNAMIC.md
+// "Motion"). A model at one moment is a model as any other, so no kernel but these knows of time.
 // Internal to the splat module. Deterministic whatever the thread count.
 #pragma once
 

@@ -1,4 +1,4 @@
-// Motion that neighbours share: in the small, things move rigidly (METHOD.md "What moves").
+// Motion that neighbours share: in the small, things move rigidly (DYNAMIC.md "Motion").
 // Internal to the splat module. Deterministic whatever the thread count.
 #pragma once
 

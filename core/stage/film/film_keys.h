@@ -1,5 +1,5 @@
 // Chooses the key frames of a film. A key frame colours its own shot by optical flow and other
-// shots by inference alone, so every shot gets one before any gets two (METHOD.md "Film").
+// shots by inference alone, so every shot gets one before any gets two (FILM.md "Film").
 #pragma once
 
 #include <optional>

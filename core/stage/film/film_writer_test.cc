@@ -202,7 +202,7 @@ TEST_F(FilmWriterTest, WritesFilmOfEachCamera) {
   MakeRig();
   WriteFilm({0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0}, "aac");
   ImportFacts facts;
-  facts.layout = "posed_films";
+  facts.layout = CaptureLayout::kPosedFilms;
   facts.cameras = {{"in the/left", ""}, {"in the_left", "film.mov"}};
   AddInput(artifact::kImportFacts, ImportFactsToJson(facts));
   StageContext context = MakeContext();
@@ -227,7 +227,7 @@ TEST_F(FilmWriterTest, WritesFilmOfEachCamera) {
 TEST_F(FilmWriterTest, KeepsHalfSecondsOfColmapScene) {
   MakeRig();
   ImportFacts facts;
-  facts.layout = "colmap";
+  facts.layout = CaptureLayout::kColmap;
   facts.cameras = {{"left", ""}, {"right", ""}};
   AddInput(artifact::kImportFacts, ImportFactsToJson(facts));
   StageContext context = MakeContext();

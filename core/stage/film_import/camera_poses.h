@@ -1,5 +1,5 @@
-// Poses of several cameras that filmed one place, in part of which things move (METHOD.md "Poses of
-// films"). For the import stage only.
+// Poses of several cameras that filmed one place, in part of which things move (DYNAMIC.md "Poses
+// of films"). For the import stage only.
 #pragma once
 
 #include <filesystem>

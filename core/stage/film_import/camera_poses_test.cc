@@ -74,7 +74,7 @@ TEST_F(CameraPosesTest, CamerasFindTheirPlacesButForOneThatSawAnother) {
   film_.frames_per_second = 10.0;
   options_.hold_out_camera = "right";
   const Scene scene = Import();
-  ASSERT_TRUE(scene.IsDynamic());
+  ASSERT_TRUE(scene.capture().is_dynamic);
   ASSERT_EQ(scene.views.size(), 3u * kFrames) << observer_.text;
   EXPECT_EQ(scene.views[kFrames + 3].name, "right/n103.png");
   EXPECT_EQ(scene.views[kFrames + 3].image_file, "frames/right/n103.png");
@@ -88,7 +88,7 @@ TEST_F(CameraPosesTest, CamerasFindTheirPlacesButForOneThatSawAnother) {
   for (int i = 0; i < kFrames; ++i) {
     EXPECT_TRUE(fs::exists(scratch_.path() / "out/moving/left" / Name(i))) << i;
   }
-  EXPECT_EQ(facts_.layout, "films");
+  EXPECT_EQ(facts_.layout, CaptureLayout::kFilms);
   EXPECT_TRUE(facts_.film->poses_found);
   EXPECT_EQ(facts_.film->frames_placed, 3 * kFrames);
   EXPECT_GT(facts_.film->motion_energy, 0.02);

@@ -1,5 +1,5 @@
 // Poses of a film's frames where one camera moves through a place, in part of which things move
-// (METHOD.md "Poses of films"). For the import stage only.
+// (DYNAMIC.md "Poses of films"). For the import stage only.
 #pragma once
 
 #include <filesystem>

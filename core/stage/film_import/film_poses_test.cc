@@ -67,7 +67,7 @@ TEST_F(FilmPosesTest, AMovingCameraBeforeWhichSomethingMoves) {
   Write(5, Image(400, 300, 1, 0.3f));  // a blank frame finds no place
   options_.hold_out_every_eighth = true;
   const Scene scene = Import();
-  ASSERT_TRUE(scene.IsDynamic());
+  ASSERT_TRUE(scene.capture().is_dynamic);
   ASSERT_EQ(scene.views.size(), kFrames - 1u) << observer_.text;
   EXPECT_THAT(observer_.text, HasSubstr("1 frame of 16 found no place, left out: n105.png"));
   EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{4, 12}));
@@ -115,7 +115,7 @@ TEST_F(FilmPosesTest, ACameraThatStandsStillIsSaidToAndMakesARelief) {
   options_.hold_out_every_eighth = true;
   const Scene scene = Import();
   ASSERT_TRUE(scene.relief.has_value());
-  EXPECT_TRUE(scene.IsDynamic());
+  EXPECT_TRUE(scene.capture().is_dynamic);
   EXPECT_EQ(scene.views.size(), static_cast<size_t>(kFrames));
   EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{4, 12}));
   EXPECT_THAT(observer_.text, HasSubstr("the camera stands still"));
@@ -147,7 +147,7 @@ TEST_F(FilmPosesTest, CutFilmsAndFramesThatShareNothingStayWithoutPoses) {
     for (float& v : noise.data) v = static_cast<float>(random.NextUniform());
     Write(i, Resize(noise, 400, 300));
   }
-  EXPECT_TRUE(Import().IsFilm());
+  EXPECT_FALSE(Import().capture().is_reconstructed);
   EXPECT_THAT(observer_.text, HasSubstr("its longest shot has 6 of 12 frames"));
   EXPECT_LT(facts_.film->motion_energy, 0.0);
 
@@ -156,7 +156,7 @@ TEST_F(FilmPosesTest, CutFilmsAndFramesThatShareNothingStayWithoutPoses) {
   for (int i = 0; i < 4; ++i) {  // textured nowhere
     Write(i, GradientPhoto(400, 300, 1));
   }
-  EXPECT_TRUE(Import().IsFilm());
+  EXPECT_FALSE(Import().capture().is_reconstructed);
   EXPECT_THAT(observer_.text, HasSubstr("stays without poses: none of 4 frames could be placed"));
   EXPECT_FALSE(facts_.film->poses_found);
 }
@@ -164,7 +164,7 @@ TEST_F(FilmPosesTest, CutFilmsAndFramesThatShareNothingStayWithoutPoses) {
 TEST_F(FilmPosesTest, TooLittleTimeLeavesTheFilmAsItIsAndCancellingDoesNot) {
   WriteFilm(0.05, 0.025);
   options_.sfm_timeout = std::chrono::seconds(1);
-  EXPECT_TRUE(Import().IsFilm());
+  EXPECT_FALSE(Import().capture().is_reconstructed);
   EXPECT_THAT(observer_.text, HasSubstr("the film stays without poses"));
   cancel_.Cancel();
   EXPECT_THAT(Refusal([&] { Import(); }), HasSubstr("cancelled"));

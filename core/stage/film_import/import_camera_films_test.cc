@@ -95,7 +95,7 @@ TEST_F(ImportCameraFilmsTest, FramesOfARigAreViewsWithPosesAndTimes) {
   options.hold_out_every_eighth = true;
   const Scene scene = Import({}, options);
   ASSERT_EQ(scene.views.size(), 21u);
-  EXPECT_TRUE(scene.IsDynamic());
+  EXPECT_TRUE(scene.capture().is_dynamic);
   const View& view = scene.views[12 + 4];
   EXPECT_EQ(view.name, "cam01/f000004.png");
   EXPECT_NEAR(view.moment->time_s, 0.4, 1e-6);
@@ -109,7 +109,7 @@ TEST_F(ImportCameraFilmsTest, FramesOfARigAreViewsWithPosesAndTimes) {
   EXPECT_NEAR(frame.At(0, 30, 40), Gray(1, 4), 0.02);
   EXPECT_EQ(scene.points.size(), 20000u);
   const ImportFacts facts = ImportFactsFromJson(ReadFile(scratch_.path() / "out/import.json"));
-  EXPECT_EQ(facts.layout, "posed_films");
+  EXPECT_EQ(facts.layout, CaptureLayout::kPosedFilms);
   EXPECT_EQ(facts.photos_found, 21);
 }
 

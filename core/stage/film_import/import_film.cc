@@ -176,7 +176,7 @@ void ImportFrames(const FrameStream& stream,
   if (options.deflicker) WriteSteady(stream, frames, context);
   const bool is_drawn = stream.is_video || options.deflicker;
   ImportFacts facts;
-  facts.layout = "film";
+  facts.layout = CaptureLayout::kFilm;
   facts.photos_found = stream.count;
   facts.photos_registered = static_cast<int>(scene.views.size());
   if (options.poses == FilmPoses::kAuto) {
@@ -255,21 +255,13 @@ void FilmOptions::Validate() const {
   }
 }
 
-std::string FindFilm(const fs::path& scene_folder) {
+std::string FindFilm(const std::vector<std::string>& files) {
   std::string film;
-  std::error_code none;
-  if (!fs::is_directory(scene_folder, none)) return film;
-  bool has_photos = false;
-  int films = 0;
-  for (const std::string& file : ListFiles(scene_folder)) {
-    if (IsAugmentFile(file) || IsMaskFile(file)) continue;
+  for (const std::string& file : files) {
     if (IsFrameFile(file) && HasImageExtension(file)) return std::string(kFramesFolder);
-    has_photos |= HasImageExtension(file);
-    if (!HasFilmExtension(file)) continue;
-    film = file;
-    ++films;
+    if (HasFilmExtension(file) && !IsAugmentFile(file)) film = file;
   }
-  return has_photos || films != 1 ? "" : film;
+  return film;
 }
 
 void ImportFilm(const std::string& film,

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "core/scene/import_options.h"
 #include "core/stage/context/stage_context.h"
@@ -11,9 +12,9 @@
 
 namespace color3d {
 
-// The film that the scene consists of: a video file, or "frames/" for pictures in that folder.
-// Empty where it is none.
-std::string FindFilm(const std::filesystem::path& scene_folder);
+// The film among the files of a scene: a video file, or "frames/" for pictures in that folder.
+// Requires: the scene is laid out as a film (DetectCapture).
+std::string FindFilm(const std::vector<std::string>& files);
 
 // Leaves kScene, kImportFacts and, of a video file or where exposure is made steady, the frames in
 // grey as kGivenViews; with poses kMovingRegions and kSfmLog, too. Of `import`, every eighth frame

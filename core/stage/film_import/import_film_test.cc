@@ -6,6 +6,8 @@
 
 #include <cmath>
 
+#include "core/base/files.h"
+#include "core/catalogue/captures.h"
 #include "core/scene/scene.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
@@ -72,17 +74,18 @@ class ImportFilmTest : public StageTest {
 
 TEST_F(ImportFilmTest, FramesOfAVideoAreViewsWithTheirMoments) {
   WriteVideo(24, 24);
-  EXPECT_EQ(FindFilm(scratch_.path()), "film.mp4");
+  EXPECT_EQ(FindFilm(ListFiles(scratch_.path())), "film.mp4");
   ImportOptions options;
   options.hold_out_every_eighth = true;
   const Scene scene = Import({}, options);
   ASSERT_EQ(scene.views.size(), 24u);
-  EXPECT_TRUE(scene.IsFilm());
+  EXPECT_FALSE(scene.capture().is_reconstructed);
   EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{0, 8, 16}));
   EXPECT_EQ(scene.views[12].name, "f000012.png");
   EXPECT_NEAR(scene.views[12].moment->time_s, 1.2, 1e-6);
   EXPECT_EQ(scene.views[12].moment->shot, 0);
-  EXPECT_EQ(ImportFactsFromJson(ReadFile(scratch_.path() / "out/import.json")).layout, "film");
+  EXPECT_EQ(ImportFactsFromJson(ReadFile(scratch_.path() / "out/import.json")).layout,
+            CaptureLayout::kFilm);
   const Image frame = ReadImage(scratch_.path() / "out" / scene.views[12].image_file);
   EXPECT_EQ(frame.channels, 1);
   const Image truth = FrameOf(1, 12);
@@ -120,7 +123,7 @@ TEST_F(ImportFilmTest, PartsStridesAndCuts) {
 TEST_F(ImportFilmTest, PicturesInFramesAreAFilm) {
   for (int i = 0; i < 9; ++i) WriteFrame("n" + std::to_string(i) + ".png", FrameOf(1, i));
   WriteFrame("n4.png", Image(kWidth, kHeight, 3, 0.01f));
-  EXPECT_EQ(FindFilm(scratch_.path()), "frames/");
+  EXPECT_EQ(FindFilm(ListFiles(scratch_.path())), "frames/");
   const Scene scene = Import();
   ASSERT_EQ(scene.views.size(), 9u);
   EXPECT_EQ(scene.views[2].image_file, "frames/n2.png");
@@ -289,7 +292,7 @@ TEST_F(ImportFilmTest, ExposureIsSteadied) {
 TEST_F(ImportFilmTest, PhotosBesideAVideoAreNoFilm) {
   WriteVideo(3, 3);
   WriteFileAtomic(scratch_.path() / "photo.png", EncodePng8(FrameOf(1, 0)));
-  EXPECT_EQ(FindFilm(scratch_.path()), "");
+  EXPECT_NE(DetectCapture(ListFiles(scratch_.path())), CaptureLayout::kFilm);
 }
 
 }  // namespace

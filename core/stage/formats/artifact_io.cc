@@ -33,7 +33,7 @@ void CheckStemsAreUnique(const Scene& scene) {
 }
 
 std::string ImportFactsToJson(const ImportFacts& f) {
-  nlohmann::ordered_json json{{"layout", f.layout},
+  nlohmann::ordered_json json{{"layout", InfoOf(f.layout).name},
                               {"ran_structure_from_motion", f.ran_structure_from_motion},
                               {"sfm_plan", f.sfm_plan},
                               {"undistorted", f.undistorted},
@@ -59,7 +59,7 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
   try {
     const auto value = nlohmann::json::parse(json);
     ImportFacts f;
-    f.layout = value.at("layout");
+    f.layout = LayoutOfName(value.at("layout").get<std::string>());
     f.ran_structure_from_motion = value.at("ran_structure_from_motion");
     f.sfm_plan = value.at("sfm_plan");
     f.undistorted = value.at("undistorted");
@@ -89,10 +89,11 @@ Scene ReadScene(const StageContext& context) {
   return SceneFromJson(context.ReadInput(artifact::kScene));
 }
 
-bool IsColoredAsFilm(const StageContext& context, const Scene& scene) {
-  if (scene.IsFilm()) return true;
-  return scene.IsDynamic() && !context.HasInput(artifact::kGeometry) &&
-         !context.HasInput(artifact::kModel);
+const CaptureKindInfo& ColoredAs(const StageContext& context, const Scene& scene) {
+  const CaptureKindInfo& capture = scene.capture();
+  const bool has_geometry =
+      context.HasInput(artifact::kGeometry) || context.HasInput(artifact::kModel);
+  return capture.is_dynamic && !has_geometry ? InfoOf(CaptureKind::kFilm) : capture;
 }
 
 int ReadKeyView(const StageContext& context, const Scene& scene) {

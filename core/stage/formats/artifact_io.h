@@ -59,9 +59,9 @@ std::string ImportFactsToJson(const ImportFacts& facts);
 ImportFacts ImportFactsFromJson(std::string_view json);
 
 Scene ReadScene(const StageContext& context);
-// Returns true for a film, and for a dynamic scene if neither kGeometry nor kModel is among the
-// inputs: its frames are coloured along the optical flow.
-bool IsColoredAsFilm(const StageContext& context, const Scene& scene);
+// Kind that the views of the scene are coloured as: its own; kFilm, frame by frame along optical
+// flow, for a dynamic scene without geometry (neither kGeometry nor kModel among the inputs).
+const CaptureKindInfo& ColoredAs(const StageContext& context, const Scene& scene);
 // Index of the chosen key view in the scene.
 int ReadKeyView(const StageContext& context, const Scene& scene);
 // Throws Error{kInvalidArgument} with the name of the artifact if it is not JSON.

@@ -74,7 +74,7 @@ std::optional<ImportFacts> FindImportFacts(const StageContext& context) {
 
 bool TimesAreSeconds(const Scene& scene, const std::optional<ImportFacts>& facts) {
   if (facts && InfoOf(facts->layout).times_are_seconds) return true;
-  return scene.IsFilm() || scene.Times().back() > kLongestWhole;
+  return !scene.capture().is_reconstructed || scene.Times().back() > kLongestWhole;
 }
 
 std::optional<SoundPart> SoundFrom(const Scene& scene,

@@ -255,7 +255,7 @@ TEST_F(MovieTest, ErrorsNameTheProblem) {
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 0}), HasSubstr("frames"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 18'001}), HasSubstr("18000"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 1'001, .pictures = true}),
-              HasSubstr("at most 1000"));
+              HasSubstr("the limit is 1000"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames_per_second = NAN}),
               HasSubstr("frames_per_second"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .video = false}), HasSubstr("nothing"));
@@ -277,7 +277,7 @@ TEST_F(MovieTest, RefusesPathsThroughFilmsWithoutPoses) {
     scene_.views[i].cam_from_world = Pose{};
     scene_.views[i].moment = Moment{0.1 * i, 0};
   }
-  ASSERT_TRUE(scene_.IsFilm());
+  ASSERT_FALSE(scene_.capture().is_reconstructed);
   AddInput(artifact::kScene, SceneToJson(scene_));
   for (const Path path : {Path::kOrbit, Path::kPhotos, Path::kStill}) {
     EXPECT_THAT(Complaint({.path = path}), HasSubstr("this film has no poses"));

@@ -1,4 +1,4 @@
-// Recolours ranges of time of a coloured film (METHOD.md "Film").
+// Recolours ranges of time of a coloured film (FILM.md "Film").
 #pragma once
 
 #include <string>

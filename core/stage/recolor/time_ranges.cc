@@ -99,12 +99,13 @@ void AddTo(std::vector<RecoloredRange>* ranges,
 }  // namespace
 
 std::vector<RecoloredRange> RangesOf(const std::vector<RangeKeyView>& keys, const Scene& scene) {
-  if (!scene.IsFilm()) {
+  if (scene.capture().is_reconstructed) {
     throw InvalidArgument("the key view {} has a range of time, but {}; leave the range out{}",
                           keys.front().view,
-                          scene.IsDynamic() ? "the scene has poses, and is coloured for all times"
-                                            : "the scene is no film",
-                          scene.IsDynamic() ? ", or colour the film without poses" : "");
+                          scene.capture().is_dynamic
+                              ? "the scene has poses, and is coloured for all times"
+                              : "the scene is no film",
+                          scene.capture().is_dynamic ? ", or colour the film without poses" : "");
   }
   const FilmTime film = TimeOf(scene);
   std::vector<RecoloredRange> ranges;

@@ -16,7 +16,7 @@ namespace color3d {
 std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
                                                   const std::vector<std::string>& key_views,
                                                   StageContext& context) {
-  if (scene.IsFilm()) {
+  if (!scene.capture().is_reconstructed) {
     std::vector<int> of_film;
     for (const std::string& name : key_views) of_film.push_back(scene.FindView(name));
     const std::map<std::string, double> covered = ReadCarryFacts(context).view_coverage;

@@ -52,7 +52,7 @@ Image GrayPicture(const Image& luminance) {
 
 std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
   std::optional<GaussianModel> model;
-  if (!scene.IsFilm() && context.HasInput(artifact::kModel)) {
+  if (scene.capture().is_reconstructed && context.HasInput(artifact::kModel)) {
     model = ParseGaussians(context.ReadInput(artifact::kModel));
     if (model->channels != 3) model.reset();
   }

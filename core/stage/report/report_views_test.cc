@@ -46,7 +46,7 @@ TEST_F(ReportViewsTest, ReportsUnfinishedWork) {
 TEST_F(ReportViewsTest, TellsWhetherAPosedFilmMoves) {
   for (int i = 0; i < 3; ++i) scene_.views[i].moment = Moment{0.5 * i, 0};
   AddInput(artifact::kScene, SceneToJson(scene_));
-  AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = "film"}));
+  AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = CaptureLayout::kFilm}));
   AddInput(std::string(artifact::kCurves) + "reconstruct_geometry.csv",
            CurvesToCsv({{"reconstruct_geometry", 1.0, 100, "moving_share", 0.03}}));
   for (const bool moves : {false, true}) {
@@ -69,7 +69,7 @@ TEST_F(ReportViewsTest, TellsWhetherAPosedFilmMoves) {
 }
 
 TEST_F(ReportViewsTest, PlanNamesTheStrategyAndEveryStage) {
-  AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = "photos"}));
+  AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = CaptureLayout::kPhotos}));
   AddInput(artifact::kKeyView, R"({"view": "p1.png", "strategy": "tracks"})");
   StageContext context = MakeContext();
   RunReport({{.kind = "carry_color", .state = "SKIPPED", .skip_reason = "for this test"},

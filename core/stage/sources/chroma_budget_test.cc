@@ -21,7 +21,7 @@ TEST(ChromaBudgetTest, KeepsLessOfManyOrMovingFrames) {
   ASSERT_EQ(moving.motion.size(), 1u);
   const ChromaOptions photos, frames = ForManyFrames({});
   ASSERT_FALSE(frames == photos);
-  ASSERT_TRUE(SceneOf(2, true).IsDynamic());
+  ASSERT_TRUE(SceneOf(2, true).capture().is_dynamic);
   const auto of = [&](size_t views, bool has_times, const GaussianModel& geometry) {
     return ChromaWithinMemory({}, SceneOf(views, has_times), geometry, int64_t{16} << 30);
   };

@@ -42,7 +42,7 @@ TEST(ColorBinsTest, CountsOuterColorsAtTheBorder) {
   EXPECT_EQ(bins[0].center_ab, (std::array<float, 2>{120.0f, -120.0f}));
 }
 
-TEST(ColorBinsTest, RebalancingLiftsRareBinsAndKeepsTheMean) {
+TEST(ColorBinsTest, RebalancingLiftsRareBinsAndKeepsMean) {
   const std::vector<ColorHistogram::Bin> bins{{{0, 0}, 0.9}, {{60, 0}, 0.1}};
   const std::vector<float> weights = RebalancingWeights(bins, 0.0, 1.0);
   EXPECT_NEAR(weights[1] / weights[0], 9.0, 1e-5);

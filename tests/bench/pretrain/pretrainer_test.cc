@@ -137,7 +137,7 @@ TEST_F(PretrainerTest, WritesAutomaticColorizer) {
   for (float v : color.ab.data) ASSERT_TRUE(std::isfinite(v));
 }
 
-TEST_F(PretrainerTest, RefusesADamagedCheckpoint) {
+TEST_F(PretrainerTest, RejectsDamagedCheckpoint) {
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   std::string checkpoint = trainer.Checkpoint("{}");

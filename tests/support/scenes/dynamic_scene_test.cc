@@ -227,7 +227,7 @@ TEST(DynamicScene, ThingsAppearVanishAndCrossWhenTheCaseSays) {
 
 TEST(DynamicScene, ScenesAreAsTheImporterGivesThem) {
   DynamicSceneOptions options = Small(DynamicCase::kSliding);
-  EXPECT_TRUE(DynamicScene(options).scene().IsDynamic());
+  EXPECT_TRUE(DynamicScene(options).scene().capture().is_dynamic);
   EXPECT_EQ(DynamicScene(options).scene().views.size(), 36u);
   const Scene scene = DynamicScene(options).scene();
   EXPECT_TRUE(std::is_sorted(
@@ -235,10 +235,10 @@ TEST(DynamicScene, ScenesAreAsTheImporterGivesThem) {
   EXPECT_EQ(scene.views[13].name, "cam01/0001.png");
   EXPECT_EQ(scene.views[13].moment, (Moment{0.125, 1}));
   options.cameras = 1;
-  EXPECT_TRUE(DynamicScene(options).scene().IsFilm());
+  EXPECT_FALSE(DynamicScene(options).scene().capture().is_reconstructed);
   options.moving_cameras = true;
   const DynamicScene film(options);
-  EXPECT_TRUE(film.scene().IsDynamic());
+  EXPECT_TRUE(film.scene().capture().is_dynamic);
   ASSERT_EQ(film.scene().points.size(), 200u);
   for (const SparsePoint& point : film.scene().points) {
     EXPECT_GE(point.views.size(), 3u);
