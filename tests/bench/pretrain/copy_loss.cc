@@ -27,7 +27,7 @@ torch::Tensor PrincipalDirections(const torch::Tensor& x, int64_t dims) {
   torch::NoGradGuard no_grad;
   const auto n = static_cast<double>(x.size(0));
   const bool wide = x.size(1) > x.size(0);
-  // Of fewer samples than channels the matrix of inner products is the smaller one.
+  // With fewer samples than channels, the Gram matrix is smaller.
   const torch::Tensor matrix = (wide ? torch::mm(x, x.t()) : torch::mm(x.t(), x)).cpu() / n;
   torch::Tensor values, vectors;
   std::tie(values, vectors) = torch::linalg_eigh(matrix);  // ascending
