@@ -8,7 +8,7 @@
 namespace color3d {
 namespace {
 
-// Places on a line in space, all of one look but for `look`.
+// Places on a line in space, with equal features but for `look`.
 FieldPlaces Places(const std::vector<double>& x, double look = 0.0, double seen = 0.0) {
   const auto count = static_cast<int64_t>(x.size());
   FieldPlaces places{torch::full({count, 4}, look),
@@ -43,7 +43,7 @@ double ChangeAt(const ChangeField& field, const FieldPlaces& places, int row = 0
 
 TEST(ChangeField, AgreesWithFormulaForOnePlace) {
   const ChangeField field = OneStroke(Places({0.0}), 20.0);
-  // Of its own place: variance / (variance + noise).
+  // At its own place: variance / (variance + noise).
   EXPECT_NEAR(ChangeAt(field, Places({0.0})), 20.0 * 0.9 / 1.0, 1e-4);
   // At a distance of d: wide halves at 0.2, near falls by exp(-(d / 0.1)^2).
   const double alike = 0.5 / 2.0 + 0.4 * std::exp(-4.0);
@@ -62,7 +62,7 @@ TEST(ChangeField, ReachesSimilarAndNearUnseenPlaces) {
 TEST(ChangeField, KeepsPlacesWithTargetColor) {
   const ChangeField field = OneStroke(Places({0.0}), 20.0);
   FieldPlaces right = Places({0.01, 0.01, 0.01});
-  right.colors[0].fill_(20.0);  // as wanted
+  right.colors[0].fill_(20.0);  // target colour
   right.colors[1].fill_(15.0);  // nearly
   right.colors[2].fill_(30.0);  // beyond
   EXPECT_NEAR(ChangeAt(field, right, 0), 0.0, 1e-4);
@@ -92,12 +92,12 @@ TEST(ChangeField, StaysFiniteWithoutPositions) {
   const ChangeField::Answer answer = field.At(Unknown(3));
   EXPECT_NEAR(answer.change[0][0].item<double>(), 12.0, 0.1);
   EXPECT_LE(answer.share.max().item<double>(), 1.0);
-  // What has a position is another place.
+  // A known position is another place.
   EXPECT_LT(ChangeAt(field, Places({0.0})), 3.0);
 }
 
 TEST(ChangeField, ProposesDistinctPlacesByGain) {
-  // Five places together, one alone, one that is sure.
+  // Five places close together, a single one, and a certain one.
   FieldPlaces places = Places({0.0, 0.01, 0.02, 0.03, 0.04, 2.0, -2.0});
   const torch::Tensor deviation = torch::tensor({1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.01});
   const ChangeField none({}, torch::zeros({0, 2}), {}, {});
@@ -107,7 +107,7 @@ TEST(ChangeField, ProposesDistinctPlacesByGain) {
   EXPECT_EQ(proposals[1].row, 5);
   EXPECT_GT(proposals[0].gain, proposals[1].gain);
   for (const auto& proposal : proposals) EXPECT_NE(proposal.row, 6);
-  // What has been painted is not asked for again.
+  // Painted places are not proposed again.
   const ChangeField painted = OneStroke(Places({0.01, 0.02}), 5.0);
   EXPECT_EQ(painted.Propose(places, deviation, 1).at(0).row, 5);
 }

@@ -1,4 +1,4 @@
-// Personalization on encoders of the user's: taps at strides 4..32 instead of 2..16.
+// Personalization on encoders of the user, with taps at strides 4..32 instead of 2..16.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -69,7 +69,7 @@ TEST(PublishedEncoderColorizerTest, LearnsTheKeyViewFromADdcolorEncoder) {
     gray += std::abs(key.ab.data[i]);
   }
   EXPECT_LT(error, 0.3 * gray);
-  // Another size, and the file gives back the same colorizer.
+  // At another size, the colorizer from the file gives the same result.
   const Image other(61, 33, 1, 40.0f);
   const auto loaded = LoadColorizer(colorizer->Serialize(), encoder, 1);
   EXPECT_EQ(loaded->Colorize(other).data, colorizer->Colorize(other).data);

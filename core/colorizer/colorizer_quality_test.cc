@@ -1,6 +1,6 @@
 // Quality on real scenes: key = a middle training view in its true colour, test = held-out views,
 // error = CIEDE2000 between the truth and (true L, predicted ab). Skipped without the shared data;
-// ColorizerTest.LearnsTheKeyView is the counterpart that needs none.
+// ColorizerTest.LearnsTheKeyView needs no data.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -42,7 +42,7 @@ struct Errors {
   double predicted = 0.0;
 };
 
-// At most two of the held-out views (every eighth).
+// At most two held-out views (every eighth view).
 Errors Measure(const fs::path& folder, int iterations) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());

@@ -1,4 +1,4 @@
-// The public interface: train, colorize, store, load.
+// Tests of the public interface: train, colorize, store, load.
 #include "core/colorizer/colorizer.h"
 
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ ColorizerOptions Quick(int iterations) {
   return options;
 }
 
-// Made once: it takes a while and never changes.
+// Trained once, since training is slow.
 const std::shared_ptr<const Encoder>& TheEncoder() {
   static const std::shared_ptr<const Encoder> encoder = Encoder::Embedded();
   return encoder;
@@ -131,7 +131,7 @@ TEST(ColorizerTest, RefusesNetworkSizeOutOfRange) {
 TEST(ColorizerTest, SameSeedSameColorizer) {
   const Key key = MakeKey(96, 80);
   ColorizerOptions options = Quick(5);
-  // Without neighbors, whose colours are the key's own under any seed.
+  // Without neighbors, since their colours do not depend on the seed.
   options.recipe = ColorizerOptions::Recipe::kPaper;
   const Image first = Train(key, options)->Colorize(key.luminance);
   EXPECT_EQ(Train(key, options)->Colorize(key.luminance).data, first.data);

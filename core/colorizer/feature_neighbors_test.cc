@@ -49,7 +49,7 @@ TEST_F(FeatureNeighborsTest, NeighborsAgreeWithTheDefinitionInFloat64) {
   }
 }
 
-// A picture whose halves look alike and lie apart, red and blue.
+// A picture with similar halves at distant positions, red and blue.
 TEST_F(FeatureNeighborsTest, PositionsSeparateSimilarPlaces) {
   constexpr int kSide = 64;
   TrainingPicture picture{"the key view", Image(kSide, kSide, 1), Image(kSide, kSide, 2)};
@@ -69,7 +69,7 @@ TEST_F(FeatureNeighborsTest, PositionsSeparateSimilarPlaces) {
   options.vote.position_weight = 50.0;
   const std::vector<TrainingPicture> pictures{picture};
   const FeatureNeighbors made(encoder_, pictures, options, Random(1), {});
-  // As read from a file.
+  // Also when read from a file.
   TensorFile file;
   made.PutInto(&file);
   const auto neighbors = FeatureNeighbors::TakeFrom(encoder_, options, "the file", &file);

@@ -22,8 +22,8 @@ TEST_F(PersonalModelTest, AdaptersStartAsIdentity) {
 TEST_F(PersonalModelTest, FreezesStatisticsOfKeyView) {
   PersonalModel model = MakeModel();
   torch::NoGradGuard no_grad;
-  // The prediction for a part of the picture does not depend on the rest of it: with instance norm
-  // it would. Compared away from the border of the crop.
+  // The prediction of a crop does not depend on the rest of the picture, unlike with instance norm.
+  // Compared away from the border of the crop.
   const torch::Tensor whole = torch::rand({1, 1, 64, 128}) * 100.0;
   torch::Tensor other = whole.clone();
   other.slice(3, 96, 128).fill_(5.0);

@@ -43,7 +43,7 @@ std::string MessageOf(const std::string& bytes) {
   return "";
 }
 
-// Replaces the checksum, so that what lies behind it is tested.
+// Corrects the checksum, to test the checks after it.
 std::string Resign(std::string bytes) {
   const size_t key = bytes.find(kDigestKey);
   if (key == std::string::npos || key + 10 + 64 > bytes.size()) return bytes;

@@ -63,7 +63,7 @@ struct Warnings : NullObserver {
   std::vector<double> validation;
 };
 
-// Saves once, then fails the next save as if the worker had died.
+// Saves once, then throws at the next save to simulate the death of the worker.
 struct OneCheckpoint : CheckpointStore {
   std::optional<std::string> Load() override { return loaded; }
   bool WantsSave() override { return wants_save; }
@@ -104,7 +104,7 @@ TEST_F(TrainingTest, LossFalls) {
   EXPECT_TRUE(progress.messages.empty());
 }
 
-// A second picture that says that everything is green.
+// A second picture, all green.
 TrainingPicture Green(const TrainingPicture& key) {
   TrainingPicture green = key;
   green.name = "green";
@@ -121,7 +121,7 @@ TEST_F(TrainingTest, IgnoresPicturesOfZeroShareOrWeight) {
   options_.iterations = 150;
   PersonalModel model = MakeModel();
   Train(model, checkpoints, alone);
-  // Drawing among several takes a random number more: not the same bytes, but the same quality.
+  // Drawing among several pictures uses another random number: other bytes, but the same quality.
   TrainingPicture green = Green(pictures_[0]);
   green.share = 0.0;
   pictures_.push_back(green);
@@ -143,7 +143,7 @@ TEST_F(TrainingTest, DrawsPicturesByShare) {
   pictures_[1].share = 50.0;
   PersonalModel model = MakeModel();
   Train(model, checkpoints, progress);
-  // It has learnt green, so that the key view's own held-out views are wrong.
+  // Trained on green, so that the error of the held-out views remains.
   EXPECT_GT(progress.validation.back(), 0.8 * progress.validation.front());
 }
 
@@ -219,7 +219,7 @@ TEST_F(TrainingTest, KeepsAverageWhenItIsBetter) {
   NoCheckpoints none;
   Warnings averaged, plain;
   options_.iterations = 60;
-  recipe_.last_learning_rate = recipe_.first_learning_rate;  // the last step is a noisy one
+  recipe_.last_learning_rate = recipe_.first_learning_rate;  // noisy last step
   options_.average_decay = 0.0;
   PersonalModel last = MakeModel();
   Train(last, none, plain);

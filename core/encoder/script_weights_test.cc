@@ -1,4 +1,4 @@
-// The reader of TorchScript archives against the writer of LibTorch itself.
+// Reads TorchScript archives that LibTorch wrote.
 #include <gtest/gtest.h>
 #include <torch/script.h>
 
@@ -14,7 +14,7 @@ namespace {
 torch::jit::Module MakeLayer(const std::string& name, torch::ScalarType type) {
   torch::jit::Module layer(name);
   layer.register_parameter("weight", torch::randn({3, 4, 2, 2}).to(type), false);
-  // A view with its own strides, and one that shares its storage.
+  // A strided view, and one with shared storage.
   const torch::Tensor table = torch::randn({5, 7}).to(type);
   layer.register_parameter("transposed", table.t(), false);
   layer.register_buffer("row", table[2]);

@@ -110,7 +110,7 @@ TEST(KeyColorFromImageTest, NonFiniteValuesAreRefused) {
   EXPECT_NE(MessageOf(LuminanceOfLab(lab), colored), "");
 }
 
-// The picture with an alpha of 1 left of `columns`, else of 0 over a black that is nobody's colour.
+// Returns the picture with alpha 1 left of `columns`, else transparent black.
 Image PaintedLeftOf(int columns, const Image& srgb) {
   Image painted(srgb.width, srgb.height, 4);
   for (int y = 0; y < srgb.height; ++y) {

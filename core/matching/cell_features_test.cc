@@ -27,7 +27,7 @@ TEST(CellFeaturesTest, BorderCellsIgnorePadding) {
 
 TEST(CellFeaturesTest, CropsTapsToPicture) {
   const torch::Tensor l = torch::full({1, 1, 6, 10}, 50.0f);
-  // Of the picture padded to 16 x 16; what lies beyond it must not be seen.
+  // Taps of the picture padded to 16 x 16. The padding must have no effect.
   std::vector<torch::Tensor> taps = {torch::full({1, 1, 8, 8}, 1.0f),
                                      torch::full({1, 1, 4, 4}, 2.0f),
                                      torch::full({1, 1, 2, 2}, 3.0f)};

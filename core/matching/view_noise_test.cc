@@ -16,7 +16,7 @@ torch::Tensor Positions(double offset) {
   return torch::stack({x, y, torch::zeros_like(x), torch::ones_like(x)}, 1).to(torch::kFloat32);
 }
 
-// What the places look like in one view: the places' own features, and noise with these deviations.
+// Features of the places in one view, with noise of these deviations.
 std::vector<torch::Tensor> View(const torch::Tensor& places, const torch::Tensor& deviations) {
   return {places + torch::randn({kCells, places.size(1)}) * deviations};
 }

@@ -37,7 +37,7 @@ WeightArray Transposed(const WeightArray& a) {
   return t;
 }
 
-// The layout of the other hub, made here from OpenAI's.
+// Converts OpenAI's layout to that of Hugging Face.
 WeightMap HuggingFaceLayout(const WeightMap& openai) {
   WeightMap out;
   for (const auto& [openai_name, array] : openai) {
@@ -117,7 +117,7 @@ TEST(ClipWeightsTest, NamesArraysThatDoNotFit) {
   EXPECT_THROW(ClipModel(resnet, true), Error);
 }
 
-// A transformer block is told from its neighbour by number, and q from k by place.
+// Distinguishes transformer blocks by number, and q from k by position.
 TEST(ClipWeightsTest, ListsIncompleteAttentionStack) {
   WeightMap other = HuggingFaceLayout(SyntheticClipWeights({}, 7));
   other.erase("vision_model.encoder.layers.0.self_attn.k_proj.weight");

@@ -36,7 +36,7 @@ ConvNextConfig TinyConfig() {
   return config;
 }
 
-// Weights that exercise every term, unlike the random features' many zeros and ones.
+// Weights that exercise every term, unlike random features with many zeros and ones.
 WeightMap NoisyWeights(const ConvNextConfig& config) {
   WeightMap weights = RandomFeatureWeights(config, 1);
   Random random(5);
@@ -46,7 +46,7 @@ WeightMap NoisyWeights(const ConvNextConfig& config) {
   return weights;
 }
 
-// Slow float64 twin of ConvNext::Taps, straight from the publication (Liu et al. 2022).
+// Slow float64 reference of ConvNext::Taps, after the publication (Liu et al. 2022).
 class Reference {
  public:
   using Map = std::vector<std::vector<std::vector<double>>>;  // [channel][y][x]

@@ -1,5 +1,5 @@
-// color3d-bench augmentations: the extra training pictures of one colour scene, to be looked at and
-// to be trained with (color3d-bench colorizer --pictures).
+// color3d-bench augmentations: writes the generated training pictures of a colour scene, for
+// viewing and for color3d-bench colorizer --pictures.
 #include <cstdio>
 
 #include "core/base/files.h"
@@ -21,7 +21,7 @@ struct AugmentationsArguments {
   AugmentationOptions options;
 };
 
-// The middle one, as in color3d-bench colorizer.
+// Middle view, as in color3d-bench colorizer.
 std::string MiddleView(const Scene& scene) {
   for (size_t i = scene.views.size() / 2; i < scene.views.size(); ++i) {
     if (!scene.views[i].held_out) return scene.views[i].name;

@@ -1,7 +1,7 @@
-// color3d-bench choices: colour error of unseen views against seconds of personalization, one
-// choice of the colorizer's changed at a time. Geometry, key view and carried colours of a scene
-// are made once; each point is a training of its own, to the end of its schedule. Scoring does not
-// count. Resumable: points that the folder has already are not measured again.
+// color3d-bench choices: colour error of held-out views against seconds of personalization, with
+// one choice of the colorizer varied at a time. Geometry, key view and carried colours of a scene
+// are computed once; each point is a complete training. Time for scoring is excluded. Resumable:
+// skips points that are already in the folder.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -43,13 +43,13 @@ struct ChoicesArguments {
   std::vector<std::string> table_folders;
 };
 
-// The default with one thing changed.
+// The default with one change.
 struct Choice {
   std::string name = kDefaultChoice;
-  std::string value;  // as it is shown: without folders
+  std::string value;  // for display, without folders
   ColorizerOptions options;
   std::string encoder = "embedded";
-  std::string pictures;  // kind of generated ones, "all", or empty for none
+  std::string pictures;  // kind of generated pictures, "all", or empty for none
   bool carry = true;
 };
 
@@ -92,7 +92,8 @@ const std::map<std::string, Setter>& Setters() {
        [](const std::string& value, Choice* c) { c->options.precision = PrecisionOf(value); }},
       {"recipe",
        [](const std::string& value, Choice* c) {
-         if (value != "paper") throw InvalidArgument("the other recipe is \"paper\"");
+         if (value != "paper")
+           throw InvalidArgument("unknown recipe; the only other recipe is \"paper\"");
          c->options.UsePaperRecipe();
        }},
       {"pictures", [](const std::string& value, Choice* c) { c->pictures = value; }},
@@ -105,7 +106,7 @@ const std::map<std::string, Setter>& Setters() {
   return setters;
 }
 
-// "crop=128", or "default".
+// Parses "crop=128" or "default".
 Choice ChoiceFrom(const std::string& text, const ChoicesArguments& args) {
   Choice choice;
   choice.options.max_side_px = args.max_side_px;
@@ -125,7 +126,7 @@ Choice ChoiceFrom(const std::string& text, const ChoicesArguments& args) {
   return choice;
 }
 
-// Everything before personalization.
+// Stages before personalization.
 void Prepare(const ChoicesArguments& args, LocalPipeline& pipeline) {
   if (fs::exists(fs::path(args.out_folder) / kPrepared)) return pipeline.TakeAll();
   pipeline.ImportScene();
@@ -182,7 +183,7 @@ class ChoiceBench {
   }
 
  private:
-  // Trains, and fills in what that took and how good the colours are.
+  // Trains, and sets time and errors.
   void Train(const Choice& choice, const ColorizerOptions& options, ChoicePoint* point) {
     const ScratchFolder folder;
     SceneBatch batch(args_.threads);

@@ -37,7 +37,7 @@ struct ColorizerArguments {
   std::string out_folder;
   std::string json_file;
   int side_px = 400;
-  int threads = 0;  // 0: what the machine has
+  int threads = 0;  // 0: one per core
   bool paper = false;
   bool one_after_another = true;
   bool memory = false;
@@ -49,7 +49,7 @@ struct ColorizerArguments {
   ColorizerOptions options{.iterations = 800};
 };
 
-// A folder of colour photos, whose middle one (or `key`) is the key view.
+// A folder of colour photos. The key view is the middle one or `key`.
 struct Photos {
   Photos(const fs::path& photos_folder, const std::string& wanted_key, int side)
       : folder(photos_folder), side_px(side) {
@@ -86,7 +86,7 @@ ColorizerOptions OptionsFrom(const ColorizerArguments& args) {
   return options;
 }
 
-// Errors over every eighth view, and what the views look like.
+// Computes errors over every eighth view and writes the coloured views.
 void Score(const Photos& photos,
            const Colorizer& colorizer,
            const std::string& out_folder,
@@ -117,7 +117,7 @@ void Score(const Photos& photos,
   (*result)["seconds_per_view"] = seconds / count;
 }
 
-// Those of the kinds that are asked for among what color3d-bench augmentations left.
+// Generated pictures of the requested kinds, as written by color3d-bench augmentations.
 std::vector<TrainingPicture> MorePictures(const ColorizerArguments& args) {
   if (args.pictures_folder.empty()) return {};
   const fs::path folder = args.pictures_folder;
@@ -168,7 +168,7 @@ float LargestDifference(const Colorizer& x, const Colorizer& y, const Image& lum
   return largest;
 }
 
-// All scenes in one batch, then (unless switched off) one after another.
+// Trains all scenes in one batch, then (unless disabled) one after another.
 Json RunAllInOne(const ColorizerArguments& args) {
   const ColorizerOptions options = OptionsFrom(args);
   const auto encoder = BenchEncoder(args.encoder);
@@ -228,7 +228,7 @@ Json RunAllInOne(const ColorizerArguments& args) {
   return result;
 }
 
-// Where the memory of a batch goes: the encoder, and what each scene adds.
+// Memory of a batch: the encoder and each scene.
 Json RunMemory(const ColorizerArguments& args) {
   MemorySubject subject;
   subject.options = OptionsFrom(args);
@@ -249,7 +249,7 @@ Json RunMemory(const ColorizerArguments& args) {
 }
 
 void RunColorizer(const ColorizerArguments& args) {
-  ShareMallocArenas(args.threads > 0 ? args.threads : 2);  // as the worker does
+  ShareMallocArenas(args.threads > 0 ? args.threads : 2);  // as in the worker
   const Json result = args.all_in_one.empty() ? RunOne(args)
                       : args.memory           ? RunMemory(args)
                                               : RunAllInOne(args);

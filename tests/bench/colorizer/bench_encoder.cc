@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-// SqueezeNet's features behind the interface of our own encoder.
+// SqueezeNet as TapEncoder.
 class SqueezeNetEncoder : public TapEncoder {
  public:
   explicit SqueezeNetEncoder(const std::filesystem::path& file)

@@ -1,4 +1,4 @@
-// The encoders that benchmarks compare.
+// Encoders for benchmarks.
 #pragma once
 
 #include <memory>
@@ -10,7 +10,7 @@ namespace color3d {
 
 // "embedded", "random" (the same network before training), "squeezenet=FILE.onnx", or a weight
 // file: one of ours ("encoder.*", as `pretrain` writes it) or a published one. Throws
-// Error{kInvalidArgument} for anything else.
+// Error{kInvalidArgument} for other names.
 std::shared_ptr<const Encoder> BenchEncoder(const std::string& name);
 
 }  // namespace color3d

@@ -26,7 +26,7 @@ void AddOnce(const T& value, std::vector<T>& values) {
   if (std::find(values.begin(), values.end(), value) == values.end()) values.push_back(value);
 }
 
-// One setting at one number of iterations, over all scenes.
+// A setting at a number of iterations, over all scenes.
 struct Row {
   std::string value;
   int iterations = 0;
@@ -53,7 +53,7 @@ class Results {
   const std::vector<std::string>& scenes() const { return scenes_; }
   const std::vector<std::string>& choices() const { return choices_; }
 
-  // Of a choice alone, by value and iterations; those that lack a scene are left out.
+  // Rows of a choice, by value and iterations, without those that lack a scene.
   std::vector<Row> RowsOf(const std::string& choice) const {
     std::vector<Row> rows;
     for (const std::string& value : values_) {
@@ -72,7 +72,7 @@ class Results {
     return rows;
   }
 
-  // The default first, as far as it was trained for as long as the others.
+  // The default first, at the numbers of iterations of the others.
   std::vector<Row> RowsBesideDefault(const std::string& choice) const {
     std::vector<Row> rows = RowsOf(choice);
     if (choice == kDefaultChoice || rows.empty()) return rows;

@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kMib = 1 << 20;
 constexpr int kCheckpointIterations = 25;  // the first checkpoint
 
-// Keeps the last state that training leaves.
+// Keeps the last checkpoint.
 struct LastCheckpoint : CheckpointStore {
   std::optional<std::string> Load() override { return std::nullopt; }
   bool WantsSave() override { return true; }
@@ -32,7 +32,7 @@ struct Line {
   double slope = 0.0;
 };
 
-// Least squares.
+// Least-squares line.
 Line FitLine(const std::vector<std::pair<double, double>>& points) {
   double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
   for (const auto& [px, py] : points) x += px, y += py, xx += px * px, xy += px * py;
@@ -41,7 +41,7 @@ Line FitLine(const std::vector<std::pair<double, double>>& points) {
   return {(y - slope * x) / n, slope};
 }
 
-// Largest resident memory while the first `count` scenes train together.
+// Peak resident memory while the first `count` scenes train together.
 int64_t PeakOf(const MemorySubject& subject, size_t count) {
   ::malloc_trim(0);
   ResetPeakMemory();

@@ -1,4 +1,4 @@
-// How well an automatic colourizer does on photographs whose colours are known.
+// Accuracy of automatic colourizers on photographs of known colours.
 #pragma once
 
 #include <filesystem>
@@ -17,12 +17,12 @@ struct AutomaticScore {
   double true_colorfulness = 0.0;
 };
 
-// Photographs below a folder, sorted; at most `count` of them, evenly thinned out (0: all). Throws
-// Error{kInvalidArgument} when there is none.
+// Returns photographs below a folder, sorted, at most `count` evenly spaced ones (0: all). Throws
+// Error{kInvalidArgument} if there are none.
 std::vector<std::filesystem::path> PhotosBelow(const std::filesystem::path& folder, int count);
 
-// Colours the photo's L at `max_side_px`. With a folder, writes L, prediction and truth side by
-// side there as PNG.
+// Colours the photo's L at `max_side_px`. If a folder is given, writes L, prediction and truth side
+// by side as PNG.
 AutomaticScore ScoreAutomatic(const AutomaticColorizer& colorizer,
                               const std::filesystem::path& photo,
                               int max_side_px,

@@ -1,5 +1,5 @@
-// color3d-bench correct: error of a coloured scene against the number of strokes that a user gives
-// in its true colours, each where the scene is least sure then.
+// color3d-bench correct: error of a coloured scene against the number of strokes in its true
+// colours, each at the most uncertain place.
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -21,16 +21,16 @@ namespace {
 struct Arguments {
   std::string scene_folder, run_folder, out_folder;
   int strokes = 3;
-  double radius = 0.03;  // of the stroke, of the photo's longer side
+  double radius = 0.03;  // radius of a stroke, relative to the photo's longer side
   bool true_colors = false;
   int threads = 2;
 };
 
-// How far colours of one thing differ from those in its middle, Lab units.
+// Maximum colour difference within an object from its centre, Lab units.
 constexpr float kOneThing = 15.0f;
 
-// A disc, as far as it shows the thing in its middle, in the mean of the photo's true colours
-// there, or in these colours themselves.
+// Paints a disc, restricted to the object in its centre, in the mean of the photo's true colours or
+// in these colours.
 ColorCorrection Stroke(const Arguments& args,
                        const Scene& scene,
                        int view,

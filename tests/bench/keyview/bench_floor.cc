@@ -1,7 +1,7 @@
-// color3d-bench floor: what no colourizer can go below. True colours of all training views, carried
-// into each held-out view through geometry, stereo and optical flow; what differs in chroma then is
-// gloss, exposure, noise and misregistration. With each photo's gain and offset of chroma fitted to
-// the held-out view, exposure is taken out.
+// color3d-bench floor: lower bound of the error of any colourizer. Carries the true colours of all
+// training views into each held-out view by geometry, stereo and optical flow. Remaining
+// differences in chroma are gloss, exposure, noise and misregistration. Fitting gain and offset of
+// chroma of each photo to the held-out view removes exposure.
 #include <Eigen/Dense>
 #include <cstdio>
 #include <map>
@@ -38,7 +38,7 @@ struct Error {
 };
 
 struct Errors {
-  Error carried, all, nearest;  // nearest: the best covered single view alone, where it shows
+  Error carried, all, nearest;  // nearest: the single view of highest coverage
 };
 
 LabColor At(const Image& truth, const Image& ab, size_t i) {
@@ -54,7 +54,7 @@ void AddErrors(const Image& truth, const CarriedColor& color, float least, Error
   }
 }
 
-// One gain, and one offset for a and for b, by weighted least squares where the colour is carried.
+// Fits a gain and offsets of a and b by weighted least squares where colour is carried.
 void FitChromaTo(const Image& truth, CarriedColor* color) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Identity() * 1e-6;
   Eigen::Vector3d right = Eigen::Vector3d(1e-6, 0, 0);
@@ -76,7 +76,7 @@ void FitChromaTo(const Image& truth, CarriedColor* color) {
   }
 }
 
-// All of them together: the surest first, the others where it leaves room.
+// Combines all views, the most confident first.
 CarriedColor Together(std::vector<CarriedColor> colors) {
   std::stable_sort(colors.begin(), colors.end(), [](const auto& x, const auto& y) {
     return Coverage(x, kCarried) > Coverage(y, kCarried);
@@ -86,7 +86,7 @@ CarriedColor Together(std::vector<CarriedColor> colors) {
   return all;
 }
 
-// Their mean by confidence: noise and misregistration of single views average out.
+// Mean weighted by confidence, which averages out noise and misregistration.
 CarriedColor Averaged(const std::vector<CarriedColor>& colors) {
   CarriedColor mean = colors[0];
   for (size_t i = 0; i < mean.confidence.data.size(); ++i) {
@@ -103,7 +103,7 @@ CarriedColor Averaged(const std::vector<CarriedColor>& colors) {
   return mean;
 }
 
-// What is not carried comes from around it.
+// Fills pixels without carried colour from their surroundings.
 void AddErrorsOfAll(const Image& truth, const CarriedColor& color, ThreadPool& pool, Error* error) {
   double sums[3] = {0.0, 0.0, 1e-9};
   for (size_t i = 0; i < color.confidence.data.size(); ++i) {

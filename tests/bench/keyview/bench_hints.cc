@@ -1,6 +1,6 @@
-// color3d-bench hints: colour hints on real photographs and a procedural picture. Residual against
-// time of our solver and of Eigen's conjugate gradients with incomplete Cholesky, by size; and the
-// colour error by the number of hints.
+// color3d-bench hints: colour hints on real photographs and a procedural picture. Measures
+// residual against time of our solver and of Eigen's conjugate gradients with incomplete Cholesky,
+// by size, and the colour error by the number of hints.
 #include <Eigen/IterativeLinearSolvers>
 #include <Eigen/SparseCore>
 #include <algorithm>
@@ -97,7 +97,7 @@ struct Problem {
   std::vector<ColorHint> hints;
 };
 
-// True colours at random pixels. Noise makes up for the grain that an enlarged photo lacks.
+// True colours at random pixels. Adds noise, since enlarged photos lack grain.
 Problem MakeProblem(const Image& srgb, int points, double noise) {
   Problem problem{LabFromSrgb(srgb), Image(srgb.width, srgb.height, 1), {}};
   std::copy_n(
@@ -141,7 +141,7 @@ Json RunOurs(const Problem& problem, const HintOptions& options, ThreadPool& poo
 
 using Matrix = Eigen::SparseMatrix<double, Eigen::ColMajor, int>;
 
-// The same system for Eigen, one unknown per pixel that is not hinted; right-hand side for a.
+// The same system for Eigen: one unknown per pixel without hint, right-hand side for a.
 void AssembleForEigen(const Problem& problem, double sigma, Matrix& matrix, Eigen::VectorXd& b) {
   ThreadPool pool(1);
   const GridSystem s = SystemOfLuminance(problem.luminance, sigma, pool);
@@ -179,8 +179,8 @@ void AssembleForEigen(const Problem& problem, double sigma, Matrix& matrix, Eige
   matrix.setFromTriplets(entries.begin(), entries.end());
 }
 
-// Eigen's ConjugateGradient step by step, so that its residual can be read against the time; for
-// one component where ours solves two.
+// Eigen's ConjugateGradient step by step, to measure residual against time. Solves one component,
+// ours two.
 Json RunEigen(const Problem& problem, const HintsArguments& args) {
   Matrix a;
   Eigen::VectorXd b;

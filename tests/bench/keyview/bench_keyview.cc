@@ -1,5 +1,5 @@
-// color3d-bench keyview: what each strategy chooses, how long it takes, and the colour error that
-// the other views get from the chosen one by feature neighbours, beside all other choices.
+// color3d-bench keyview: view and time of each strategy, and the colour error of the other views
+// when coloured from it by feature neighbours, compared with all other choices.
 #include <algorithm>
 #include <chrono>
 #include <map>
@@ -46,7 +46,7 @@ class SceneFolder {
  public:
   const fs::path& path() const { return scratch_.path(); }
 
-  // The photos below a folder as views without poses.
+  // Reads the photos below a folder as views without poses.
   void AddPhotos(const fs::path& folder, Scene* scene) {
     const fs::path photos = fs::exists(folder / "images") ? folder / "images" : folder;
     const std::string link = Link(photos);
@@ -84,7 +84,7 @@ class SceneFolder {
   int links_ = 0;
 };
 
-// Every count-th of `all`, the middle of each step.
+// Returns `count` evenly spaced entries of `all`.
 std::vector<int> Spread(int all, int count) {
   std::vector<int> chosen;
   const int taken = std::min(all, count);
@@ -136,7 +136,7 @@ class ErrorOfKeys {
   std::map<int, double> errors_;
 };
 
-// Runs the stage as a job would. `work` keeps inputs, outputs and the cache.
+// Runs the stage as a job does. `work` holds inputs, outputs and the cache.
 ordered_json Select(const Scene& scene,
                     const fs::path& folder,
                     KeyViewStrategy strategy,

@@ -1,6 +1,6 @@
-// color3d-bench next-key: is the advice on which view to colour next right? On the training views
-// of a scene that has been coloured with one key view: the error that each of several second key
-// views leaves, against what was expected of them.
+// color3d-bench next-key: accuracy of the proposed additional key view. For a scene coloured from
+// one key view, compares measured and expected errors over the training views for several second
+// key views.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -26,11 +26,11 @@ struct Arguments {
   std::string scene_folder, run_folder, out_folder;
   int candidates = 5;
   int side_px = 300;
-  int iterations = 0;  // of personalization; 0: neighbours alone
+  int iterations = 0;  // iterations of personalization; 0: neighbours only
   int threads = 2;
 };
 
-// Training views that are not key views, in the order of the scene.
+// Training views other than key views, in the order of the scene.
 struct Problem {
   Scene scene;
   int key = 0;
@@ -52,7 +52,7 @@ Problem ReadProblem(const Arguments& args) {
   return problem;
 }
 
-// Colours all views from the key view and `second` (-1: none) and leaves them in the pipeline.
+// Colours all views from the key view and `second` (-1: none); the pipeline holds the result.
 void ColorAll(const Arguments& args, const Problem& problem, int second, LocalPipeline* pipeline) {
   CarryColorOptions options;
   options.max_side_px = args.side_px;
@@ -93,8 +93,8 @@ double TrainingError(const Arguments& args, const Problem& problem, const LocalP
   return sum / static_cast<double>(training.size());
 }
 
-// By the points of structure-from-motion that the key view does not see, each counted as often as
-// views see it: what was advised before there were expected errors.
+// Baseline: number of points of structure-from-motion that the key view does not see, weighted by
+// the number of views that see them.
 double PointsGained(const Problem& problem, int second) {
   double gained = 0.0;
   for (const SparsePoint& point : problem.scene.points) {
@@ -106,7 +106,7 @@ double PointsGained(const Problem& problem, int second) {
   return gained;
 }
 
-// What is expected of the key view with each candidate, and of the key view alone (last).
+// Expected error of the key view with each candidate, and of the key view alone (last).
 std::vector<double> ExpectedErrors(const Arguments& args,
                                    const Problem& problem,
                                    ThreadPool& pool) {
@@ -139,8 +139,8 @@ std::vector<double> ExpectedErrors(const Arguments& args,
   return errors;
 }
 
-// Pairs of candidates whose order `worth` (more is better) tells, of those whose errors differ by
-// more than 1 %.
+// Share of pairs of candidates ordered correctly by `worth` (more is better), among those with
+// errors that differ by more than 1 %.
 nlohmann::ordered_json Order(const std::vector<double>& errors, const std::vector<double>& worth) {
   int right = 0, pairs = 0;
   for (size_t i = 0; i < errors.size(); ++i) {

@@ -1,4 +1,4 @@
-// color3d-bench reference: the key view coloured from other pictures, against its true colours.
+// color3d-bench reference: error of key views coloured from reference pictures.
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>

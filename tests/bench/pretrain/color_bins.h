@@ -1,5 +1,5 @@
-// Colours as classes: the ab plane in cells, so that a colourizer can say "red or blue" instead of
-// the grey between (Zhang, Isola & Efros 2016). Plain values, no torch, thread-safe.
+// Colours as classes: cells of the ab plane, so that a colourizer can predict "red or blue" instead
+// of the grey in between (Zhang, Isola & Efros 2016). Plain values, no torch, thread-safe.
 #pragma once
 
 #include <array>
@@ -20,9 +20,9 @@ class ColorHistogram {
 
   struct Bin {
     std::array<float, 2> center_ab;
-    double share = 0.0;  // of all counted pixels, > 0; sums to 1 over the bins
+    double share = 0.0;  // share of all counted pixels, > 0; sums to 1 over the bins
   };
-  // The cells that hold at least `min_share` of what was counted, in a fixed order.
+  // Returns the cells with at least `min_share` of all counts, in a fixed order.
   std::vector<Bin> Bins(double min_share) const;
 
  private:

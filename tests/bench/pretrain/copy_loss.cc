@@ -15,7 +15,7 @@ constexpr double kVarianceFloor = 1e-8;
 constexpr double kRankFloor = 1e-4;     // of the largest eigenvalue: directions that n samples lack
 constexpr double kUniformShare = 1e-3;  // of a copied colour: one that `first` lacks costs log 1000
 
-// As core/matching/whitening.cc.
+// As in core/matching/whitening.cc.
 double ShareOfTap(const WhiteningOptions& options, int stride_px) {
   size_t octave = 0;
   while (octave + 1 < options.tap_shares.size() && (4 << octave) <= stride_px) ++octave;
@@ -27,7 +27,7 @@ torch::Tensor PrincipalDirections(const torch::Tensor& x, int64_t dims) {
   torch::NoGradGuard no_grad;
   const auto n = static_cast<double>(x.size(0));
   const bool wide = x.size(1) > x.size(0);
-  // Of fewer samples than channels the matrix of inner products is the smaller one.
+  // With fewer samples than channels, the Gram matrix is smaller.
   const torch::Tensor matrix = (wide ? torch::mm(x, x.t()) : torch::mm(x.t(), x)).cpu() / n;
   torch::Tensor values, vectors;
   std::tie(values, vectors) = torch::linalg_eigh(matrix);  // ascending
@@ -40,13 +40,13 @@ torch::Tensor PrincipalDirections(const torch::Tensor& x, int64_t dims) {
   return torch::mm(x.t(), vectors) * scale;
 }
 
-// Distances squared of all pairs.
+// Squared distances of all pairs.
 torch::Tensor Distances(const torch::Tensor& x, const torch::Tensor& y) {
   const torch::Tensor d = torch::addmm(y.square().sum(1), x, y.t(), /*beta=*/1.0, /*alpha=*/-2.0);
   return (d + x.square().sum(1, true)).clamp_min(0.0);
 }
 
-// Middles of the cells [cells, 2], x and y in px.
+// Centres of the cells [cells, 2], x and y in px.
 torch::Tensor CellMiddles(int64_t rows, int64_t columns) {
   const torch::Tensor y = (torch::arange(rows, torch::kFloat32) + 0.5) * kCellPx;
   const torch::Tensor x = (torch::arange(columns, torch::kFloat32) + 0.5) * kCellPx;

@@ -1,7 +1,7 @@
-// Features learn what they are used for (Vondrick et al. 2018, "Tracking emerges by colorizing
-// videos"): cells of one view take their colours from the cells of another that look most like
-// them, exactly as core/matching does it, and the colours must come out right. Torch in the
-// interface. Pure functions, thread-safe.
+// Loss that trains features for exemplar matching (Vondrick et al. 2018, "Tracking emerges by
+// colorizing videos"): cells of one view copy colours from the most similar cells of another, as in
+// core/matching, and are compared with their true colours. Torch in the interface. Pure functions,
+// thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -16,16 +16,16 @@
 namespace color3d {
 
 struct CopyLossOptions {
-  int queries = 256;  // cells of the second view, drawn at random
+  int queries = 256;  // cells of the second view, sampled at random
   WhiteningOptions whitening;
-  // Twice as soft as in use, so that more than the nearest cells learn.
+  // Twice the temperature of core/matching, so that gradients reach more than the nearest cells.
   VoteOptions vote{.temperature = 0.2, .distance_floor = 0.1};
-  double match_sigma_px = 6.0;  // a cell this far beside the true place is nearly right
+  double match_sigma_px = 6.0;  // tolerance for the distance to the true place
 };
 
-// Space of core/matching's Whitening with gradients: all but the principal directions depends on
-// the features. `samples` [n, C] and `cells` [m, C] of one block: [m, dims], a mean over dims of
-// squared differences times `share`.
+// The space of core/matching's Whitening with gradients, except through the principal directions.
+// `samples` [n, C] and `cells` [m, C] of one block: [m, dims], a mean over dims of squared
+// differences times `share`.
 torch::Tensor WhitenBlock(const torch::Tensor& samples,
                           const torch::Tensor& cells,
                           int dims,

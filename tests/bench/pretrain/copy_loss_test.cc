@@ -10,7 +10,7 @@ namespace {
 
 constexpr int64_t kSide = 64;
 
-// Of a tap each at strides 4 and 8, and 3 colours.
+// View with taps at strides 4 and 8, and 3 colours.
 ConvNextConfig TwoTaps() {
   ConvNextConfig config;
   config.stem_stride = 4;

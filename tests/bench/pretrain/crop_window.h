@@ -1,5 +1,4 @@
-// Parts of a photo: a parallelogram in it that becomes a square picture. Pure functions,
-// thread-safe.
+// Crops of a photo: a parallelogram that becomes a square picture. Pure functions, thread-safe.
 #pragma once
 
 #include <array>
@@ -19,9 +18,9 @@ struct BytePhoto {
 };
 
 struct WindowOptions {
-  double min_area = 0.3;        // of the photo
-  double max_aspect = 4.0 / 3;  // before it is made square
-  double max_turn = 0.0;        // radians either way
+  double min_area = 0.3;        // minimum share of the photo's area
+  double max_aspect = 4.0 / 3;  // aspect ratio before resampling to a square
+  double max_turn = 0.0;        // maximum rotation, radians
   double mirror_probability = 0.5;
 };
 
@@ -38,10 +37,10 @@ struct CropWindow {
   std::array<double, 2> Inverse(const std::array<double, 2>& point) const;
 };
 
-// Inside the photo.
+// Returns a random window inside the photo.
 CropWindow RandomWindow(const BytePhoto& photo, const WindowOptions& options, Random& random);
 
-// The window as a picture of 3 channels in 0..1, size_px x size_px.
+// Samples the window as a picture of 3 channels in 0..1, size_px x size_px.
 Image SampleWindow(const BytePhoto& photo, const CropWindow& window, int size_px);
 
 }  // namespace color3d

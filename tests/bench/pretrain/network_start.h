@@ -1,5 +1,4 @@
-// What pre-training starts from: random weights, or those of an earlier run. Torch in the
-// interface.
+// Initial weights of pre-training: random, or from an earlier run. Torch in the interface.
 #pragma once
 
 #include <torch/types.h>

@@ -12,15 +12,15 @@
 namespace color3d {
 namespace {
 
-constexpr WindowOptions kAlone;  // of a crop for itself
-// Of a pair: the first is what colours are copied from.
+constexpr WindowOptions kAlone;  // for single crops
+// For pairs: colours are copied from the first.
 constexpr WindowOptions kFirst = {.min_area = 0.3, .max_turn = 0.15};
 constexpr WindowOptions kSecond = {.min_area = 0.15, .max_aspect = 1.6, .max_turn = 0.25};
 constexpr double kMirroredPairs = 0.15;
 constexpr int64_t kMaxFramesApart = 20;
 constexpr int kCellPx = 4;
 
-// What separates a film scan from the grey of a modern photo: tone curve, softness, grain.
+// Degrades a modern photo to a scan of a film: tone curve, softness, grain.
 void Degrade(Image& luminance, Random& random) {
   const double gamma = std::exp(random.NextUniform(-0.3, 0.3));
   const double gain = random.NextUniform(0.85, 1.05);
@@ -59,7 +59,7 @@ std::vector<std::filesystem::path> PicturesBelow(const std::filesystem::path& fo
   return files;
 }
 
-// Where the cells of `second` lie in `first`, both windows of one photo.
+// Positions of the cells of `second` in `first`, both windows of one photo.
 Image Matches(const CropWindow& first, const CropWindow& second, int size_px) {
   const int cells = size_px / kCellPx;
   Image matches(cells, cells, 2, -1.0f);

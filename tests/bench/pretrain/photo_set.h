@@ -19,17 +19,17 @@ struct PhotoFolder {
 };
 
 struct TrainingCrop {
-  Image srgb;       // 3 channels, what the teacher sees
-  Image luminance;  // 1 channel, L 0..100, degraded like old photographs: what the student sees
-  Image ab;         // 2 channels, Lab units, the truth
+  Image srgb;       // 3 channels, input of the teacher
+  Image luminance;  // 1 channel, L 0..100, degraded like old photographs, input of the student
+  Image ab;         // 2 channels, Lab units, ground truth
 };
 
-// Two views of the same things: parts of one photo at scales of their own, or of two frames.
+// Two views of the same objects: crops of one photo at different scales, or of two frames.
 struct TrainingPair {
   TrainingCrop first;
   TrainingCrop second;
   // 2 channels at 1/4 of the crops' size: where in `first` (px, x and y) the middle of each cell of
-  // `second` lies. -1 where `first` does not show it, or nobody knows (another frame).
+  // `second` lies. -1 where `first` does not show it or it is unknown (another frame).
   Image matches;
 };
 
@@ -41,8 +41,8 @@ class PhotoSet {
   explicit PhotoSet(const std::vector<PhotoFolder>& folders,
                     const std::vector<PhotoFolder>& clips = {});
 
-  size_t size() const { return photos_.size(); }  // of clips: frames
-  // A random part of a random photo at random scale, size_px x size_px, maybe mirrored.
+  size_t size() const { return photos_.size(); }  // photos and frames
+  // Returns a random crop of a random photo at random scale, size_px x size_px, possibly mirrored.
   TrainingCrop Crop(int size_px, Random& random) const;
   // `size_px`: a multiple of 4.
   TrainingPair Pair(int size_px, Random& random) const;

@@ -12,7 +12,7 @@
 namespace color3d {
 namespace {
 
-// Whose colours say where one is: red to the right, green downwards.
+// Picture with colours that encode the position: red to the right, green downwards.
 Image Ramps(int width, int height, float blue) {
   Image photo(width, height, 3, blue);
   for (int y = 0; y < height; ++y) {

@@ -31,10 +31,10 @@ constexpr double kLogitsTemperature = 2.0;
 constexpr double kLogitsWeight = 0.3;
 constexpr int kHistogramCrops = 4000;
 constexpr int kMaxBadSteps = 10;
-// Learning rate of what starts afresh beside trained weights, in multiples of theirs.
+// Learning rate of new weights, relative to that of weights that were trained before.
 constexpr double kFreshRate = 5.0;
 
-// Networks in bfloat16 as long as it lives.
+// Runs networks in bfloat16 during its lifetime.
 class HalfPrecision {
  public:
   explicit HalfPrecision(bool on) : before_(at::autocast::is_cpu_enabled()) {
@@ -110,7 +110,7 @@ Pretrainer::Pretrainer(const PretrainOptions& options,
 torch::Tensor Pretrainer::NewStudentHead(const std::string& name, std::vector<int64_t> shape) {
   torch::Tensor tensor = torch::zeros(shape);
   parameters_.emplace_back(name, tensor);
-  // Beside trained weights a random head would pull them about before it has learned anything.
+  // A random head would disturb trained weights before it has learned anything.
   if (started_) return tensor;
   Random random(options_.seed, 10 + static_cast<uint64_t>(parameters_.size()));
   const double deviation = std::sqrt(1.0 / static_cast<double>(shape[1]));
@@ -272,7 +272,7 @@ PretrainLosses Pretrainer::Losses(const Batch& batch, torch::Tensor& total) {
   return losses;
 }
 
-// AdamW (Loshchilov & Hutter 2019) with clipping, and the running average that is shipped.
+// AdamW (Loshchilov & Hutter 2019) with clipping, and the running average for release.
 void Pretrainer::OptimiserStep(double progress) {
   torch::NoGradGuard no_grad;
   double squares = 0.0;

@@ -26,16 +26,16 @@ namespace color3d {
 struct PretrainOptions {
   int iterations = 8000;
   int batch = 16;
-  int size_px = 128;            // crops in the first half
-  int late_size_px = 192;       // and in the second
-  double learning_rate = 2e-3;  // at its highest, then a cosine to 1 %
+  int size_px = 128;            // size of crops in the first half
+  int late_size_px = 192;       // and in the second half
+  double learning_rate = 2e-3;  // maximum, followed by a cosine to 1 %
   double weight_decay = 0.02;
   double distillation_weight = 1.0;
   double rebalancing_power = 0.5;
-  double prior_share = 1.0;  // of the rebalancing that is taken back when colours are guessed
+  double prior_share = 1.0;  // share of the rebalancing that inference undoes
   double min_bin_share = 2e-5;
-  // Above 0 a batch is made of pairs of views. Contrast tells the net which cell is the right one,
-  // copying only which colour.
+  // Above 0, batches consist of pairs of views. Contrast supervises the matched cell, copying only
+  // its colour.
   double copy_weight = 0.0;
   double contrast_weight = 0.0;
   CopyLossOptions copying;
@@ -54,20 +54,20 @@ struct PretrainLosses {
 
 class Pretrainer {
  public:
-  // `photos` must outlive it; without a teacher there is no distillation. `start`: weights as
-  // AveragedWeights gives them, in place of random ones; throws Error{kInvalidArgument} when they
-  // do not fit.
+  // `photos` must outlive the object. No distillation without a teacher. `start`: initial weights
+  // as from AveragedWeights, instead of random ones; throws Error{kInvalidArgument} if they do not
+  // fit.
   Pretrainer(const PretrainOptions& options,
              const PhotoSet& photos,
              std::optional<SqueezeNet> teacher,
              const WeightMap* start = nullptr);
 
   int64_t iteration() const { return iteration_; }
-  // One optimiser step. `progress`: share of the schedule that is over, 0..1; else it follows from
-  // the iteration. Throws Error{kInternal} when the loss is not finite ten times running.
+  // Runs an optimiser step. `progress`: completed share of the schedule, 0..1; by default derived
+  // from the iteration. Throws Error{kInternal} if the loss is not finite ten times in a row.
   PretrainLosses Step(std::optional<double> progress = std::nullopt);
 
-  // The whole state, and back: a resumed run goes on as if it had never stopped.
+  // Saves and restores the whole state. A resumed run has the same result.
   std::string Checkpoint(const std::string& notes_json) const;
   // Returns the notes. Throws Error{kInvalidArgument} when the bytes are damaged or of another
   // network.

@@ -13,8 +13,8 @@ namespace color3d {
 
 class SqueezeNet {
  public:
-  // Reads the initialisers (float16 or float32) of the file; its graph is not looked at. Throws
-  // Error{kInvalidArgument} when one is missing or the file is no ONNX model.
+  // Reads the initialisers (float16 or float32) of the file; ignores its graph. Throws
+  // Error{kInvalidArgument} if one is missing or the file is no ONNX model.
   explicit SqueezeNet(const std::filesystem::path& onnx_file);
 
   void MoveTo(torch::Device device);
