@@ -93,7 +93,7 @@ TEST_F(KeyViewsTest, ColorsThreeKeyViewsOnceAndReportsThem) {
   EXPECT_TRUE(NewestJob("carry_color").cached());
 }
 
-TEST_F(KeyViewsTest, ABenchmarkChoosesSeveralAndTheGeometryIsMadeOnce) {
+TEST_F(KeyViewsTest, BenchmarkChoosesSeveralForOneGeometry) {
   WriteProceduralScene(Path("room"), SmallRoom(8));
   const auto benchmark = [&](const std::string& out, const std::vector<std::string>& more) {
     return Client(std::vector<std::string>{
@@ -239,7 +239,7 @@ class GuardTest : public ServiceTest {
 };
 
 // Nothing but the key view's colours may reach a benchmark's model.
-TEST_F(GuardTest, ColoursOfOtherPhotosDoNotReachTheModel) {
+TEST_F(GuardTest, ColorsOfOtherPhotosDoNotReachTheModel) {
   ProceduralSceneOptions options = SmallRoom(5);
   options.width = 160;
   options.height = 120;

@@ -93,7 +93,7 @@ class MemoryLimitTest : public ServiceTest {
   }
 };
 
-TEST_F(MemoryLimitTest, ManyHugePhotosFailWithTheNumbersAndOtherJobsGoOn) {
+TEST_F(MemoryLimitTest, HugePhotosFailWithFiguresAndSpareOtherJobs) {
   ExpectOtherJobsGoOn();
   const int pid = WorkerPid();
   ASSERT_GT(pid, 0);
@@ -127,7 +127,7 @@ TEST_F(MemoryLimitTest, ManyHugePhotosFailWithTheNumbersAndOtherJobsGoOn) {
 }
 
 // The photos are small, and what is given as their colour is not.
-TEST_F(MemoryLimitTest, AHugeKeyPictureFailsWithTheNumbers) {
+TEST_F(MemoryLimitTest, HugeKeyPictureFailsWithFigures) {
   ExpectOtherJobsGoOn();
   const int pid = WorkerPid();
   WriteFlatPng(Path("view001.png"), 16'000, 12'000, 3, 100);

@@ -26,7 +26,7 @@ class MovieTest : public ServiceTest {
   void ExpectBadInput();
 };
 
-TEST_F(MovieTest, TurntableAndPathsOfAFolderOfResultsAJobAndAScene) {
+TEST_F(MovieTest, RendersPathsOfResultsJobsAndScenes) {
   const ProcessResult turned = Client({"turntable", Out(), "--seconds", "1", "--fps", "12"});
   ASSERT_EQ(turned.exit_code, 0) << turned.err;
   EXPECT_NE(turned.out.find("turntable.mp4"), std::string::npos) << turned.out;

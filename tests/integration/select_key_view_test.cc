@@ -132,12 +132,12 @@ class SelectTest : public ::testing::Test {
   fs::path scene_folder_;
 };
 
-TEST_F(SelectTest, BadFramesOfTheProceduralRoomNeverWin) {
+TEST_F(SelectTest, NeverSelectsBadFramesOfTheRoom) {
   WriteProceduralScene(scratch_.path() / "room", {.views = 8, .width = 240, .height = 180});
   ExpectNoBadFrameWins(Import(scratch_.path() / "room"), /*singly=*/true);
 }
 
-TEST_F(SelectTest, BadFramesOfRealScenesNeverWin) {
+TEST_F(SelectTest, NeverSelectsBadFramesOfRealScenes) {
   const fs::path scenes = fs::path(COLOR3D_SHARED_DATA) / "scenes";
   if (!fs::exists(scenes)) GTEST_SKIP() << "no shared data";
   for (const char* name : {"fern", "banana", "fox", "sceaux"}) {
@@ -146,7 +146,7 @@ TEST_F(SelectTest, BadFramesOfRealScenesNeverWin) {
   }
 }
 
-TEST_F(SelectTest, OnlyNewPhotosAreComputedAndTheAnswerIsTheSame) {
+TEST_F(SelectTest, ComputesFeaturesOfNewPhotosOnly) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 6, .width = 160, .height = 120});
   QuietRun run;
@@ -173,7 +173,7 @@ TEST_F(SelectTest, OnlyNewPhotosAreComputedAndTheAnswerIsTheSame) {
   EXPECT_EQ(CachedViews(), 7);
 }
 
-TEST_F(SelectTest, TracksFallBackWithAReasonAndTheRankingIsAPicture) {
+TEST_F(SelectTest, TracksFallBackWithAReason) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 5, .width = 160, .height = 120});
   QuietRun run;
@@ -192,7 +192,7 @@ TEST_F(SelectTest, TracksFallBackWithAReasonAndTheRankingIsAPicture) {
   EXPECT_THROW(Select(scene, KeyViewStrategy::kTracks, &cancel), Error);
 }
 
-TEST_F(SelectTest, AnUnreadablePhotoIsNamed) {
+TEST_F(SelectTest, NamesAnUnreadablePhoto) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 3, .width = 160, .height = 120});
   QuietRun run;

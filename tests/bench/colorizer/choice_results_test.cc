@@ -30,7 +30,7 @@ std::vector<ChoicePoint> TwoScenes() {
           PointOf("fox", "crop", "128", 60, 5.5)};
 }
 
-TEST(ChoiceResults, SurviveBeingKilledInTheMiddleOfALine) {
+TEST(ChoiceResults, SurviveAnInterruptedLine) {
   const ScratchFolder folder;
   const auto file = folder.path() / "choices.jsonl";
   EXPECT_TRUE(ReadChoicePoints(file).empty());

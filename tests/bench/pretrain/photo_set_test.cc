@@ -40,7 +40,7 @@ class PhotoSetTest : public testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(PhotoSetTest, MatchesOfAPairShowTheSame) {
+TEST_F(PhotoSetTest, MatchesOfAPairAgree) {
   Write("photo.png", Ramps(200, 150, 0.2f));
   const PhotoSet photos({{folder_, 1.0}});
   Random random(4);
@@ -73,7 +73,7 @@ TEST_F(PhotoSetTest, MatchesOfAPairShowTheSame) {
   EXPECT_LT(mirrored, 10);  // the world is not: one of seven
 }
 
-TEST_F(PhotoSetTest, AClipIsOneOfManyPhotosAndItsFramesArePaired) {
+TEST_F(PhotoSetTest, PairsFramesOfAClip) {
   for (int i = 0; i < 3; ++i) {
     Write("clips/one/" + std::to_string(i) + ".png", Ramps(60, 60, 0.3f * static_cast<float>(i)));
   }
