@@ -22,7 +22,7 @@ bool IsRetryableLater(const Error& error) {
 
 }  // namespace
 
-void ExpireDeadWorkers(JobStore& store) {
+void ExpireDeadWorkers(ChoreStore& store) {
   for (const WorkerRecord& worker : store.ListWorkers()) {
     if (IsRunning(static_cast<pid_t>(worker.pid))) continue;
     try {

@@ -111,6 +111,6 @@ class Maintenance {
 };
 
 // Leases of worker processes that are gone (the whole machine or the server was killed) end now.
-void ExpireDeadWorkers(JobStore& store);
+void ExpireDeadWorkers(ChoreStore& store);
 
 }  // namespace color3d

@@ -46,7 +46,7 @@ class SceneBatch {
   // A scene's membership, from construction to destruction. Used by one thread.
   class Membership {
    public:
-    // `project`: what fairness is between, e.g. the submitted job.
+    // `project`: of the scene's owner. All scenes of a project share its turns.
     Membership(SceneBatch& batch, const std::string& project);
     ~Membership();
     Membership(const Membership&) = delete;

@@ -44,7 +44,7 @@ bool IsForLivePictures(const WorkerRecord& worker) {
 // Metrics that are read from the store at each scrape.
 class Sampled : public prometheus::Collectable {
  public:
-  Sampled(JobStore& store,
+  Sampled(ClientStore& store,
           const BlobStore& blobs,
           std::function<ServerSample()> sample,
           prometheus::Family<prometheus::Counter>& jobs_ended,
@@ -216,7 +216,7 @@ class Sampled : public prometheus::Collectable {
     counter("color3d_sweeps_failed_total", "Failed sweeps.", sample.sweeps_failed);
   }
 
-  JobStore& store_;
+  ClientStore& store_;
   const BlobStore& blobs_;
   const std::function<ServerSample()> sample_;
   prometheus::Family<prometheus::Counter>& jobs_ended_;
@@ -271,7 +271,7 @@ void ServerMetrics::CountCall(const std::string& method, const std::string& code
 }
 
 int ServerMetrics::Listen(const std::string& address,
-                          JobStore& store,
+                          ClientStore& store,
                           const BlobStore& blobs,
                           std::function<ServerSample()> sample) {
   try {

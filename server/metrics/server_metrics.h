@@ -9,7 +9,7 @@
 #include <string>
 
 #include "server/storage/blob_store.h"
-#include "server/store/job_store.h"
+#include "server/store/client_store.h"
 
 namespace color3d {
 
@@ -41,7 +41,7 @@ class ServerMetrics {
   // Serves GET /metrics on HOST:PORT (port 0: any free port), from stores that outlive this object.
   // Returns the port. Throws Error{kFailedPrecondition} if the address cannot be used.
   int Listen(const std::string& address,
-             JobStore& store,
+             ClientStore& store,
              const BlobStore& blobs,
              std::function<ServerSample()> sample);
   // Must be called before objects used by `sample` are destroyed.

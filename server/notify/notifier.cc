@@ -56,7 +56,7 @@ std::string NotificationBody(const JobRecord& job) {
   return body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-Notifier::Notifier(JobStore& store, const Clock& clock, NotifierOptions options)
+Notifier::Notifier(ChoreStore& store, const Clock& clock, NotifierOptions options)
     : store_(store), clock_(clock), options_(std::move(options)) {
   for (int i = 0; i < options_.at_once; ++i) threads_.emplace_back([this] { Loop(); });
 }

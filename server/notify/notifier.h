@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "core/base/mutex.h"
-#include "server/store/job_store.h"
+#include "server/store/chore_store.h"
 
 namespace color3d {
 
@@ -46,7 +46,7 @@ std::string NotificationBody(const JobRecord& job);
 class Notifier {
  public:
   // The store must outlive this object.
-  Notifier(JobStore& store, const Clock& clock, NotifierOptions options);
+  Notifier(ChoreStore& store, const Clock& clock, NotifierOptions options);
   // Aborts deliveries under way; they are repeated after a restart.
   ~Notifier();
   Notifier(const Notifier&) = delete;
@@ -81,7 +81,7 @@ class Notifier {
   bool Write(const Key& key, const Outcome& outcome);
   void StoreOutcomes();
 
-  JobStore& store_;
+  ChoreStore& store_;
   const Clock clock_;
   const NotifierOptions options_;
   Mutex mutex_;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "color3d/v1/job.pb.h"
-#include "server/store/job_store.h"
+#include "server/store/client_store.h"
 
 namespace color3d {
 

@@ -5,7 +5,7 @@
 
 #include "color3d/v1/job.pb.h"
 #include "server/planning/scene_facts.h"
-#include "server/store/job_store.h"
+#include "server/store/client_store.h"
 
 namespace color3d {
 

@@ -45,7 +45,7 @@ struct RpcServer::Services {
 };
 
 RpcServer::RpcServer(const RpcServerOptions& options,
-                     JobStore& store,
+                     ClientStore& store,
                      BlobStore& blobs,
                      UploadStore& uploads,
                      const Clock& clock) {

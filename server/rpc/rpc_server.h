@@ -52,7 +52,7 @@ class RpcServer {
   // Starts to serve. Throws Error{kFailedPrecondition} with the remedy if the address is in use or
   // does not belong to this machine. The stores must outlive the server.
   RpcServer(const RpcServerOptions& options,
-            JobStore& store,
+            ClientStore& store,
             BlobStore& blobs,
             UploadStore& uploads,
             const Clock& clock);

@@ -7,7 +7,7 @@ namespace color3d {
 
 namespace {
 
-std::map<std::string, StoredBlob> Unnamed(JobStore& store, const std::vector<StoredBlob>& blobs) {
+std::map<std::string, StoredBlob> Unnamed(ChoreStore& store, const std::vector<StoredBlob>& blobs) {
   const std::set<std::string> named = store.ReferencedBlobs();
   std::map<std::string, StoredBlob> unnamed;
   for (const StoredBlob& blob : blobs) {
@@ -31,7 +31,7 @@ std::vector<StoredBlob> StillUnnamed(const std::map<std::string, StoredBlob>& un
 
 }  // namespace
 
-std::vector<StoredBlob> DueBlobs(JobStore& store,
+std::vector<StoredBlob> DueBlobs(ChoreStore& store,
                                  const std::vector<StoredBlob>& blobs,
                                  std::chrono::milliseconds grace) {
   const std::map<std::string, StoredBlob> unnamed = Unnamed(store, blobs);
@@ -40,14 +40,14 @@ std::vector<StoredBlob> DueBlobs(JobStore& store,
   return StillUnnamed(unnamed, store.AgeCandidates(told, grace.count()));
 }
 
-std::vector<StoredBlob> DueBlobsSoFar(JobStore& store,
+std::vector<StoredBlob> DueBlobsSoFar(ChoreStore& store,
                                       const std::vector<StoredBlob>& blobs,
                                       std::chrono::milliseconds grace) {
   return StillUnnamed(Unnamed(store, blobs), store.AgedCandidates(grace.count()));
 }
 
 // Whoever puts or looks for a blob touches it, before he names it.
-std::vector<FileDigest> RemoveDue(JobStore& store,
+std::vector<FileDigest> RemoveDue(ChoreStore& store,
                                   BlobStore& blobs,
                                   const std::vector<StoredBlob>& due,
                                   const std::function<bool()>& stop) {

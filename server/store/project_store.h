@@ -7,19 +7,19 @@
 #include <string>
 #include <vector>
 
-#include "server/store/job_store.h"
+#include "server/store/client_store.h"
 
 namespace color3d {
 
 class ProjectStore {
  public:
   // The store must outlive this object. `project` empty: what belongs to none.
-  ProjectStore(JobStore& store, std::string project)
+  ProjectStore(ClientStore& store, std::string project)
       : store_(&store), project_(std::move(project)) {}
 
   const std::string& project() const { return project_; }
 
-  // As those of JobStore.
+  // As those of ClientStore.
   SceneRecord CreateScene(SceneRecord record,
                           const RequestKey& request,
                           const SceneLimits& limits) const;
@@ -52,7 +52,7 @@ class ProjectStore {
   void Delete(const std::string& name, const RequestKey& request) const;
   JobRecord Pin(const std::string& name, bool pinned) const;
   QueuePlace PlaceInQueue(const JobRecord& job) const { return store_->PlaceInQueue(job); }
-  // As JobStore::Snapshot, of ids that ResolveWatch gave.
+  // As ClientStore::Snapshot, of ids that ResolveWatch gave.
   JobsSnapshot Snapshot(const std::vector<int64_t>& job_ids) const;
   LoadedJobs LoadJobs(const std::vector<int64_t>& job_ids, const ListBudget& budget) const;
   // Ids of the named jobs and their children.
@@ -78,7 +78,7 @@ class ProjectStore {
   // Throws SCENE_NOT_FOUND for what reads like the stored name of another project's.
   std::string Stored(const std::string& scene) const;
 
-  JobStore* store_;
+  ClientStore* store_;
   std::string project_;
 };
 

@@ -27,9 +27,8 @@ bool SqliteJobStore::IsHeld() {
 
 bool SqliteJobStore::IsFull() {
   try {
-    const auto held = connections_.Write();
-    SqliteDatabase& db = *held;
-    SqliteTransaction transaction(db, /*durable=*/false);
+    WriteTransaction transaction(connections_, /*durable=*/false);
+    SqliteDatabase& db = transaction.db();
     db.Exec("insert into meta values('probe', 0) on conflict(name) do update set value=value+1");
     transaction.Commit();
     return false;
@@ -51,9 +50,8 @@ void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_m
   requests_before_ms = std::min(requests_before_ms, NotedRequestAge(requests_before_ms));
   int64_t removed = kCompactAtOnce;
   while (removed == kCompactAtOnce) {
-    const auto held = connections_.Write();
-    SqliteDatabase& db = *held;
-    SqliteTransaction transaction(db, /*durable=*/false);
+    WriteTransaction transaction(connections_, /*durable=*/false);
+    SqliteDatabase& db = transaction.db();
     removed = db.Run(
         "delete from request_id where (method, id) in (select method, id from request_id where "
         "at_ms<? order by at_ms limit ?)",
@@ -65,9 +63,8 @@ void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_m
 
 int64_t SqliteJobStore::NotedRequestAge(int64_t before_ms) {
   constexpr int64_t kDayMs = 24 * 3'600'000;
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db, /*durable=*/false);
+  WriteTransaction transaction(connections_, /*durable=*/false);
+  SqliteDatabase& db = transaction.db();
   db.Run("update meta set value=value+? where name='requests_age_ms'",
          ElapsedSinceLast(db, "requests_steady_ms"));
   SqliteStatement due(db.handle(),
@@ -100,9 +97,8 @@ std::optional<int64_t> SqliteJobStore::CompactEvents(int64_t after, int64_t befo
     last = next.Int(0);
     if (next.Int(2) == 0) return last;
   }
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db, /*durable=*/false);
+  WriteTransaction transaction(connections_, /*durable=*/false);
+  SqliteDatabase& db = transaction.db();
   constexpr char kOld[] =
       " from job_event where revision>? and revision<=? and at_ms<? and "
       "exists(select 1 from job where job.job_id=job_event.job_id and end_ms<>0)";
@@ -180,9 +176,8 @@ std::vector<BlobCandidate> CandidatesOf(SqliteDatabase& db, int64_t grace_ms) {
 
 std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobCandidate>& unnamed,
                                                          int64_t grace_ms) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   const int64_t elapsed = ElapsedSinceLast(db, "collected_steady_ms");
   db.Exec("create temp table told(sha256 text primary key, touched_ns integer) without rowid");
   for (const BlobCandidate& blob : unnamed) {
@@ -206,7 +201,7 @@ std::vector<BlobCandidate> SqliteJobStore::AgedCandidates(int64_t grace_ms) {
 // In steps whose log is short: on a disk that is nearly full there is no room for a long one.
 int64_t SqliteJobStore::GiveBackSpace(int64_t keep_bytes) {
   constexpr int64_t kPagesAtOnce = 500;
-  const auto held = connections_.Write();
+  const SqliteConnections::Writer held(connections_);
   SqliteDatabase& db = *held;
   const auto number = [&](const char* pragma) {
     SqliteStatement select(db.handle(), pragma);

@@ -15,8 +15,8 @@ SqliteConnections::SqliteConnections(const std::filesystem::path& file)
     : file_(file), writer_(file, SqliteAccess::kWrite) {}
 
 std::unique_ptr<SqliteDatabase> SqliteConnections::TakeReader() {
-  std::unique_lock lock(reading_);
-  reader_is_back_.wait(lock, [this] { return !idle_readers_.empty() || readers_ < kMaxReaders; });
+  const MutexLock lock(reading_);
+  while (idle_readers_.empty() && readers_ >= kMaxReaders) reader_is_back_.Wait(reading_);
   if (idle_readers_.empty()) {
     auto fresh = std::make_unique<SqliteDatabase>(file_, SqliteAccess::kRead);
     ++readers_;
@@ -29,11 +29,18 @@ std::unique_ptr<SqliteDatabase> SqliteConnections::TakeReader() {
 
 void SqliteConnections::PutBack(std::unique_ptr<SqliteDatabase> reader) {
   {
-    std::lock_guard lock(reading_);
+    const MutexLock lock(reading_);
     idle_readers_.push_back(std::move(reader));
   }
-  reader_is_back_.notify_one();
+  reader_is_back_.NotifyOne();
 }
+
+// The members of a scoped capability are not analysed.
+SqliteConnections::Writer::Writer(SqliteConnections& connections) COLOR3D_NO_THREAD_SAFETY_ANALYSIS
+    : lock_(connections.writing_),
+      db_(connections.writer_) {}
+
+SqliteConnections::Writer::~Writer() COLOR3D_NO_THREAD_SAFETY_ANALYSIS = default;
 
 SqliteConnections::Reader::Reader(SqliteConnections& connections)
     : connections_(connections), db_(connections.TakeReader()) {

@@ -2,12 +2,11 @@
 // no read waits for a write or for a disk. Thread-safe.
 #pragma once
 
-#include <condition_variable>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "server/store/sqlite_db.h"
 
 namespace color3d {
@@ -17,15 +16,15 @@ class SqliteConnections {
   // The file must exist.
   explicit SqliteConnections(const std::filesystem::path& file);
 
-  // The writer, for one thread at a time.
-  class Writer {
+  // The writing connection, for one thread at a time.
+  class COLOR3D_SCOPED_CAPABILITY Writer {
    public:
-    explicit Writer(SqliteConnections& connections)
-        : lock_(connections.writing_), db_(connections.writer_) {}
+    explicit Writer(SqliteConnections& connections) COLOR3D_ACQUIRE(connections.writing_);
+    ~Writer() COLOR3D_RELEASE();
     SqliteDatabase& operator*() const { return db_; }
 
    private:
-    std::unique_lock<std::mutex> lock_;
+    MutexLock lock_;
     SqliteDatabase& db_;
   };
   // All that is read through it is of one moment.
@@ -42,7 +41,6 @@ class SqliteConnections {
     std::unique_ptr<SqliteDatabase> db_;
   };
 
-  Writer Write() { return Writer(*this); }
   // Waits while all readers are in use. A thread that has one must not ask for another.
   Reader Read() { return Reader(*this); }
 
@@ -51,12 +49,26 @@ class SqliteConnections {
   void PutBack(std::unique_ptr<SqliteDatabase> reader);
 
   const std::filesystem::path file_;
-  std::mutex writing_;
-  SqliteDatabase writer_;
-  std::mutex reading_;
-  std::condition_variable reader_is_back_;
-  std::vector<std::unique_ptr<SqliteDatabase>> idle_readers_;
-  int readers_ = 0;  // with those in use
+  Mutex writing_;
+  SqliteDatabase writer_ COLOR3D_GUARDED_BY(writing_);
+  Mutex reading_;
+  CondVar reader_is_back_;
+  std::vector<std::unique_ptr<SqliteDatabase>> idle_readers_ COLOR3D_GUARDED_BY(reading_);
+  int readers_ COLOR3D_GUARDED_BY(reading_) = 0;  // with those in use
+};
+
+// A transaction of the writing connection, from construction to destruction; rolled back unless
+// committed. `durable` as SqliteTransaction. Used by one thread.
+class WriteTransaction {
+ public:
+  explicit WriteTransaction(SqliteConnections& connections, bool durable = true)
+      : writer_(connections), transaction_(*writer_, durable) {}
+  SqliteDatabase& db() const { return *writer_; }
+  void Commit() { transaction_.Commit(); }
+
+ private:
+  const SqliteConnections::Writer writer_;
+  SqliteTransaction transaction_;
 };
 
 }  // namespace color3d

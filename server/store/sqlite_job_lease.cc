@@ -71,9 +71,8 @@ std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_
     peek.Bind(SteadyNow());
     if (!peek.Step()) return std::nullopt;
   }
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   RequireServersVersion(db);
   SqliteStatement next(db.handle(), kNext);
   next.Bind(SteadyNow());
@@ -89,7 +88,7 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
     int64_t lease_ms,
     const std::string& kind,
     const std::function<bool(const JobRecord&)>& accept) {
-  // Scenes of one submitted job must not keep out another's.
+  // The jobs of one project do not keep out another's, nor those of one submitted job.
   constexpr char kCandidates[] =
       "where state='QUEUED' and kind=?1 and run_after_ms<=?2 and lost_attempts=0 and not exists("
       "select 1 from job o where o.state='QUEUED' and o.kind<>?1 and o.run_after_ms<=?2 and "
@@ -97,6 +96,7 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
       "not exists(select 1 from meta where meta.name in('hold_paused','hold_storage') and "
       "value<>0) "
       "order by priority, (select count(*) from job r where r.state='RUNNING' and "
+      "r.project=job.project), (select count(*) from job r where r.state='RUNNING' and "
       "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
       "limit 16";
   const auto choose = [&](SqliteDatabase& db) -> std::optional<int64_t> {
@@ -110,9 +110,8 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
     return std::nullopt;
   };
   if (!choose(*connections_.Read())) return std::nullopt;
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   const std::optional<int64_t> id = choose(db);
   if (!id) return std::nullopt;
   JobRecord job = BeginAttempt(db, *id, worker, lease_ms);
@@ -169,9 +168,8 @@ HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
                                          const ProgressRecord& progress,
                                          const JobUsage& usage,
                                          int64_t lease_ms) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db, /*durable=*/false);
+  WriteTransaction transaction(connections_, /*durable=*/false);
+  SqliteDatabase& db = transaction.db();
   const JobRecord before = RequireLease(db, lease);
   const std::string message = CleanUtf8(progress.message, kMaxMessageBytes);
   db.Run(
@@ -203,9 +201,8 @@ HeartbeatReply SqliteJobStore::Peek(const Lease& lease) {
 
 std::optional<FileDigest> SqliteJobStore::SetCheckpoint(const Lease& lease,
                                                         const FileDigest& blob) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   const JobRecord before = RequireLease(db, lease);
   db.Run("update job set checkpoint_sha256=?, checkpoint_bytes=? where job_id=?",
          blob.sha256,
@@ -234,9 +231,8 @@ void SqliteJobStore::StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsa
 }
 
 bool SqliteJobStore::JoinEqual(const Lease& lease, const std::string& stage_key) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   const JobRecord job = RequireLease(db, lease);
   SqliteStatement other(db.handle(),
                         "select 1 from job where running_key=? and running_key<>'' and job_id<>?");
@@ -258,9 +254,8 @@ bool SqliteJobStore::JoinEqual(const Lease& lease, const std::string& stage_key)
 }
 
 void SqliteJobStore::Publish(const Lease& lease, const Publication& publication) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   RequireLease(db, lease);
   for (const ArtifactRecord& artifact : publication.artifacts) {
     db.Run("insert into artifact values(?,?,?,?,?)",
@@ -299,9 +294,8 @@ void SqliteJobStore::Requeue(SqliteDatabase& db, const JobRecord& job, bool coun
 }
 
 void SqliteJobStore::Fail(const Lease& lease, const JobError& error, const JobUsage& usage) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   const JobRecord job = RequireLease(db, lease);
   StoreUsage(db, lease.job_id, usage);
   FinishAttempt(db, lease, ErrorCodeName(error.code));
@@ -316,9 +310,8 @@ void SqliteJobStore::Fail(const Lease& lease, const JobError& error, const JobUs
 }
 
 void SqliteJobStore::Release(const Lease& lease, const JobUsage& usage) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   const JobRecord job = RequireLease(db, lease);
   StoreUsage(db, lease.job_id, usage);
   FinishAttempt(db, lease, "RELEASED");
@@ -353,9 +346,8 @@ int SqliteJobStore::ReapExpired() {
     peek.Bind(SteadyNow());
     if (!peek.Step()) return 0;
   }
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   std::vector<JobRecord> expired;
   {
     SqliteStatement select(db.handle(), SelectJob(kExpired));
@@ -385,9 +377,8 @@ int SqliteJobStore::ReapExpired() {
 }
 
 std::vector<std::string> SqliteJobStore::ExpireLeasesOf(const std::string& worker) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   std::vector<std::string> names;
   SqliteStatement update(db.handle(),
                          "update job set lease_expires_ms=0 where state='RUNNING' and "

@@ -141,6 +141,18 @@ TEST_F(SqliteJobLeaseTest, JobsOfABatchTakeTurnsBetweenSubmittedJobs) {
       store_->ClaimForBatch("w", kLease, "personalize", [](const JobRecord&) { return false; }));
 }
 
+TEST_F(SqliteJobLeaseTest, JobsOfABatchTakeTurnsBetweenProjects) {
+  NewGraph graph = PersonalizeJobs(1);
+  graph.project = "a";
+  for (int i = 0; i < 10; ++i) store_->CreateGraph(graph, {}, kNoLimit);
+  graph.project = "b";
+  store_->CreateGraph(graph, {}, kNoLimit);
+  EXPECT_EQ(ClaimOne().project, "a");
+  const auto next = store_->ClaimForBatch("w", kLease, "personalize", kAnyJob);
+  ASSERT_TRUE(next.has_value());
+  EXPECT_EQ(next->project, "b");
+}
+
 TEST_F(SqliteJobLeaseTest, JobsOfABatchDoNotOvertakeOtherKinds) {
   store_->CreateGraph(PersonalizeJobs(2), {}, kNoLimit);
   ClaimOne();

@@ -228,9 +228,8 @@ void SqliteJobStore::RequireRoom(SqliteDatabase& db,
 JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
                                       const RequestKey& request,
                                       const QueueLimits& limits) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   std::set<std::string> scenes = {graph.scene};
   for (const NewJob& job : graph.jobs) {
@@ -250,9 +249,8 @@ JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
 }
 
 JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& request) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   // The submitted job first: its children then find it finished and leave it alone.
   const std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
@@ -283,9 +281,8 @@ JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& requ
 }
 
 JobRecord SqliteJobStore::Kill(const std::string& name) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
   // The submitted job first: its children then find it finished and leave it alone.
   std::ranges::reverse(graph);
@@ -304,9 +301,8 @@ JobRecord SqliteJobStore::Kill(const std::string& name) {
 }
 
 JobRecord SqliteJobStore::Pin(const std::string& name, bool pinned) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   const JobRecord job = RequireJob(db, name);
   if (!job.parent.empty()) {
     throw InvalidArgument("{} is a stage of {}; pin that", name, job.parent);
@@ -355,9 +351,8 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
                                 bool from_scratch,
                                 const RequestKey& request,
                                 const QueueLimits& limits) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   const JobRecord job = RequireJob(db, name);
   if (!CanBeRetried(job)) throw WrongState(job, "only failed or cancelled jobs can be retried");
@@ -382,9 +377,8 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
 }
 
 void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   if (CheckRequest(db, request)) return;
   const JobRecord root = RequireJob(db, name);
   std::vector<int64_t> ids;

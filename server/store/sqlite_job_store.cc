@@ -299,9 +299,8 @@ JobCounts SqliteJobStore::CountJobs() {
 }
 
 void SqliteJobStore::UpdateWorker(const WorkerRecord& worker) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db, /*durable=*/false);
+  WriteTransaction transaction(connections_, /*durable=*/false);
+  SqliteDatabase& db = transaction.db();
   db.Run(
       "insert into worker values(?,?,?,?,?) on conflict(worker_id) do update set "
       "pid=excluded.pid, job=excluded.job, memory_bytes=excluded.memory_bytes, "
@@ -315,9 +314,8 @@ void SqliteJobStore::UpdateWorker(const WorkerRecord& worker) {
 }
 
 void SqliteJobStore::RemoveWorker(const std::string& worker_id) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db, /*durable=*/false);
+  WriteTransaction transaction(connections_, /*durable=*/false);
+  SqliteDatabase& db = transaction.db();
   db.Run("delete from worker where worker_id=?", worker_id);
   transaction.Commit();
 }

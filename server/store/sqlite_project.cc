@@ -37,9 +37,8 @@ ProjectRecord SqliteJobStore::GetProject(const std::string& name) {
 
 void SqliteJobStore::HoldBlob(const std::string& project, const FileDigest& blob) {
   if (!HeldBlobs(project, {blob.sha256}).empty()) return;
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   db.Run("insert or ignore into blob_holding values(?,?,?)", project, blob.sha256, blob.size_bytes);
   transaction.Commit();
 }
@@ -58,9 +57,8 @@ std::set<std::string> SqliteJobStore::HeldBlobs(const std::string& project,
 }
 
 void SqliteJobStore::ForgetBlob(const std::string& sha256) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   // Another may have stored and named the same bytes since.
   db.Run(
       "delete from blob_holding where sha256=?1 and not exists(select 1 from artifact where "
@@ -88,9 +86,8 @@ void SqliteJobStore::LetGo(SqliteDatabase& db,
 }
 
 void SqliteJobStore::SetHold(Hold hold, bool on) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   db.Run("update meta set value=? where name=?", on, NameOf(hold));
   transaction.Commit();
 }
@@ -144,9 +141,8 @@ QueuePlace SqliteJobStore::PlaceInQueue(const JobRecord& job) {
 }
 
 std::vector<std::string> SqliteJobStore::AgeExpired(int64_t ended_before_ms, int64_t grace_ms) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   constexpr char kExpired[] =
       "select job_id from job where parent='' and end_ms<>0 and pinned=0 and end_ms<? and "
       "not exists(select 1 from job member join job_dependency d on d.input_id=member.job_id "
@@ -178,9 +174,8 @@ std::vector<std::string> SqliteJobStore::AgeUnusedScenes(int64_t before_ms,
   constexpr char kUnused[] =
       "((active=0 and create_ms<?2) or (max(create_ms, commit_ms)<?1 and not exists("
       "select 1 from job where job.scene=scene.name)))";
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   db.Run("update scene set unused_age_ms=unused_age_ms+? where unused_age_ms>=0",
          ElapsedSinceLast(db, "scenes_steady_ms"));
   db.Run(std::string("update scene set unused_age_ms=-1 where unused_age_ms>=0 and not ") + kUnused,
@@ -227,17 +222,15 @@ std::vector<Notification> SqliteJobStore::DueNotifications(int of_each_receiver)
 }
 
 void SqliteJobStore::EndNotification(int64_t job_id, int64_t first_ms) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   db.Run("delete from notification where job_id=? and first_ms=?", job_id, first_ms);
   transaction.Commit();
 }
 
 void SqliteJobStore::DelayNotification(int64_t job_id, int64_t first_ms, int64_t pause_ms) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   db.Run("update notification set tries=tries+1, next_ms=? where job_id=? and first_ms=?",
          Now() + pause_ms,
          job_id,

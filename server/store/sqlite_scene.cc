@@ -56,9 +56,8 @@ void SqliteJobStore::RequireRoomForScene(SqliteDatabase& db,
 SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record,
                                         const RequestKey& request,
                                         const SceneLimits& limits) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
   SqliteStatement existing(db.handle(), "select 1 from scene where name=?");
   existing.Bind(record.name);
@@ -114,9 +113,8 @@ SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
                                           CaptureLayout layout,
                                           int photo_count,
                                           const RequestKey& request) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
   RequireScene(db, name, false);
   // Activating twice changes nothing: the scene is immutable.
@@ -136,9 +134,8 @@ SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
 SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
                                            const std::string& job,
                                            const RequestKey& request) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
   RequireScene(db, name, false);
   if (!job.empty()) {
@@ -166,9 +163,8 @@ SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
 }
 
 void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& request) {
-  const auto held = connections_.Write();
-  SqliteDatabase& db = *held;
-  SqliteTransaction transaction(db);
+  WriteTransaction transaction(connections_);
+  SqliteDatabase& db = transaction.db();
   if (CheckRequest(db, request)) return;
   const SceneRecord scene = RequireScene(db, name, false);
   SqliteStatement busy(db.handle(), "select name from job where scene=? and end_ms=0 limit 1");

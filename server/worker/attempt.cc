@@ -86,7 +86,7 @@ class Attempt {
   void HandleError(const JobError& found);
   JobError OutOfMemory(const std::exception& e) const;
   // Writes the end of an attempt that was told to stop; false when there was no such order.
-  void Conclude(JobStore& store, StopReason reason, const JobError& error);
+  void Conclude(WorkerStore& store, StopReason reason, const JobError& error);
   [[noreturn]] void GiveUp(StopReason reason);
   void LogEnd(const char* how);
 
@@ -147,7 +147,7 @@ JobError Attempt::OutOfMemory(const std::exception& e) const {
 void Attempt::Prepare() {
   fs::remove_all(scratch_);
   run_.job_name = job_.name;
-  run_.submission = job_.parent.empty() ? job_.name : job_.parent;
+  run_.project = job_.project;
   run_.spec = ParseSpec(job_.spec, job_.name);
   run_.threads = context_.threads;
   run_.trace = job_.trace;
@@ -362,7 +362,7 @@ void Attempt::HandleError(const JobError& found) {
   }
 }
 
-void Attempt::Conclude(JobStore& store, StopReason reason, const JobError& error) {
+void Attempt::Conclude(WorkerStore& store, StopReason reason, const JobError& error) {
   const JobUsage usage = keeper_.Usage();
   switch (reason) {
     case StopReason::kLeaseLost:
@@ -405,7 +405,7 @@ void Attempt::GiveUp(StopReason reason) {
 
 }  // namespace
 
-void GiveBack(JobStore& store, const JobRecord& job) {
+void GiveBack(WorkerStore& store, const JobRecord& job) {
   try {
     store.Release({job.id, job.lease_epoch}, job.usage);
   } catch (const std::exception& e) {

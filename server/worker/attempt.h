@@ -9,16 +9,16 @@
 
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
-#include "server/store/job_store.h"
 #include "server/store/user_models.h"
+#include "server/store/worker_store.h"
 #include "server/worker/lease_keeper.h"
 #include "server/worker/stage_runner.h"
 
 namespace color3d {
 
 struct AttemptContext {
-  JobStore& store;            // the worker's thread
-  JobStore& heartbeat_store;  // the heartbeat thread
+  WorkerStore& store;            // the worker's thread
+  WorkerStore& heartbeat_store;  // the heartbeat thread
   BlobStore& blobs;
   StageRunner& runner;
   DataPaths paths;
@@ -35,7 +35,7 @@ struct AttemptContext {
 };
 
 // Back to the queue, without counting the attempt. Never throws.
-void GiveBack(JobStore& store, const JobRecord& job);
+void GiveBack(WorkerStore& store, const JobRecord& job);
 
 // Never throws: whatever happens is written to the store, or, when that is impossible, left to the
 // lease's end.

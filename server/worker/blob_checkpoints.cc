@@ -7,7 +7,7 @@
 
 namespace color3d {
 
-BlobCheckpoints::BlobCheckpoints(JobStore& store,
+BlobCheckpoints::BlobCheckpoints(WorkerStore& store,
                                  BlobStore& blobs,
                                  const JobRecord& job,
                                  std::chrono::milliseconds interval)

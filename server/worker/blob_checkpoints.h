@@ -10,14 +10,14 @@
 
 #include "core/base/progress.h"
 #include "server/storage/blob_store.h"
-#include "server/store/job_store.h"
+#include "server/store/worker_store.h"
 #include "server/worker/checkpoint_pace.h"
 
 namespace color3d {
 
 class BlobCheckpoints : public CheckpointStore {
  public:
-  BlobCheckpoints(JobStore& store,
+  BlobCheckpoints(WorkerStore& store,
                   BlobStore& blobs,
                   const JobRecord& job,
                   std::chrono::milliseconds interval);
@@ -37,7 +37,7 @@ class BlobCheckpoints : public CheckpointStore {
   // name them at any time.
   void RemoveOwn(const StoredBlob& blob);
 
-  JobStore& store_;
+  WorkerStore& store_;
   BlobStore& blobs_;
   const Lease lease_;
   const std::string tag_;  // of log lines

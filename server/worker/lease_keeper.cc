@@ -22,7 +22,7 @@ std::string AttemptTag(const JobRecord& job) {
                      job.trace);
 }
 
-LeaseKeeper::LeaseKeeper(JobStore& store,
+LeaseKeeper::LeaseKeeper(WorkerStore& store,
                          const JobRecord& job,
                          const LeaseTiming& timing,
                          const std::atomic<bool>& draining,

@@ -13,7 +13,7 @@
 
 #include "core/base/cancellation.h"
 #include "core/base/progress.h"
-#include "server/store/job_store.h"
+#include "server/store/worker_store.h"
 
 namespace color3d {
 
@@ -43,7 +43,7 @@ class LeaseKeeper : public ProgressObserver {
   // true when the worker must stop. `on_heartbeat` is called there after each full heartbeat.
   // `give_up` is called on the heartbeat thread when the stage does
   // not stop in time, and must not return (the process ends).
-  LeaseKeeper(JobStore& store,
+  LeaseKeeper(WorkerStore& store,
               const JobRecord& job,
               const LeaseTiming& timing,
               const std::atomic<bool>& draining,
@@ -71,7 +71,7 @@ class LeaseKeeper : public ProgressObserver {
   double SecondsSoFar() const;
   void UpdateEta();
 
-  JobStore& store_;
+  WorkerStore& store_;
   const Lease lease_;
   const std::string tag_;  // of log lines
   const LeaseTiming timing_;

@@ -172,7 +172,7 @@ class CoreStageRunner : public StageRunner {
     };
     setup.attempt = run.job_name + "/" + std::to_string(run.attempt);
     setup.batch = Batch(run.threads);
-    setup.project = run.submission;
+    setup.project = run.project;
     StageContext context(std::move(setup), recorder, recorder, cancel);
     if (LeaveOutIdleStage(kind, context).empty()) RunStage(run, blobs, context);
     const auto points = recorder.points();

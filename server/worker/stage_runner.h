@@ -26,9 +26,9 @@ class BlobSource {
 };
 
 struct StageRun {
-  std::string job_name;    // "jobs/..."
-  std::string trace;       // W3C trace id of the call that made the job; empty: none
-  std::string submission;  // the submitted job: what fairness in a batch is between
+  std::string job_name;  // "jobs/..."
+  std::string trace;     // W3C trace id of the call that made the job; empty: none
+  std::string project;   // of the job's owner; scenes in a batch take turns by project
   v1::JobSpec spec;
   std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only
   // Artifacts of the jobs that this one depends on, by artifact name (read-only files).

@@ -24,7 +24,7 @@ constexpr auto kHealthyLife = std::chrono::seconds(60);
 
 }  // namespace
 
-Supervisor::Supervisor(const SupervisorOptions& options, JobStore& store)
+Supervisor::Supervisor(const SupervisorOptions& options, ChoreStore& store)
     : options_(options), store_(store) {
   kill_at_ = SteadyClock::time_point::max();
   for (int i = 0; i < options_.workers; ++i) {

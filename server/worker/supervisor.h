@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/store/job_store.h"
+#include "server/store/chore_store.h"
 #include "server/worker/orphaned_workers.h"
 
 namespace color3d {
@@ -64,7 +64,7 @@ class Supervisor {
  public:
   // Starts the workers. The store outlives the supervisor; it learns of dead workers at once, so
   // that their jobs need not wait for the lease's end.
-  Supervisor(const SupervisorOptions& options, JobStore& store);
+  Supervisor(const SupervisorOptions& options, ChoreStore& store);
   // Kills what still runs.
   ~Supervisor();
   Supervisor(const Supervisor&) = delete;
@@ -103,7 +103,7 @@ class Supervisor {
   void ReapStrangers();
 
   const SupervisorOptions options_;
-  JobStore& store_;
+  ChoreStore& store_;
   std::vector<Slot> slots_;  // supervisor's thread only
   SteadyClock::time_point next_listening_, next_orphans_;
   std::atomic<bool> draining_{false};

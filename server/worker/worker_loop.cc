@@ -64,7 +64,7 @@ class WorkerLoop {
   bool Finished() const {
     return draining_.load() || (options_.parent != 0 && ::getppid() != options_.parent);
   }
-  void ReportSelf(JobStore& store, const std::string& job) const;
+  void ReportSelf(WorkerStore& store, const std::string& job) const;
   bool ShouldRecycle() const;
   // Claims and runs one job, or a batch of them; false when there was none.
   bool Turn();
@@ -87,7 +87,7 @@ class WorkerLoop {
 };
 
 // For people, and for the supervisor, who sees that this process is alive. Nothing fails with it.
-void WorkerLoop::ReportSelf(JobStore& store, const std::string& job) const {
+void WorkerLoop::ReportSelf(WorkerStore& store, const std::string& job) const {
   try {
     store.UpdateWorker({id_, ::getpid(), job, ResidentMemoryBytes(), 0});
   } catch (const Error& e) {

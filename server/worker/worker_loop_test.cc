@@ -16,6 +16,8 @@
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
+#include "core/colorizer/scene_batch.h"
+#include "server/planning/spec_check.h"
 #include "server/storage/data_folder.h"
 #include "server/store/sqlite_job_store.h"
 
@@ -35,7 +37,6 @@ class MeetingRunner : public StageRunner {
     std::unique_lock lock(mutex_);
     ++running_;
     most_ = std::max(most_, running_);
-    projects_[run.job_name] = run.submission;
     for (const auto& [name, file] : run.inputs) inputs_[run.job_name].push_back(name);
     met_.notify_all();
     met_.wait_for(lock, std::chrono::seconds(3), [&] { return running_ >= wanted; });
@@ -56,7 +57,6 @@ class MeetingRunner : public StageRunner {
 
   int wanted = 3;
   int most() const { return most_; }
-  const std::map<std::string, std::string>& projects() const { return projects_; }
   std::vector<std::string> InputsOf(const JobRecord& job) const { return inputs_.at(job.name); }
 
  private:
@@ -64,8 +64,46 @@ class MeetingRunner : public StageRunner {
   std::condition_variable met_;
   int running_ = 0;
   int most_ = 0;
-  std::map<std::string, std::string> projects_;
   std::map<std::string, std::vector<std::string>> inputs_;  // names, sorted
+};
+
+// Its attempts begin together and take turns in one batch with one slot, until project "b" has had
+// 100 of them.
+class TurnsRunner : public StageRunner {
+ public:
+  explicit TurnsRunner(int attempts) : attempts_(attempts) {}
+  StageOutput Run(const StageRun& run,
+                  BlobSource&,
+                  CheckpointStore&,
+                  ProgressObserver&,
+                  const CancellationToken& cancel) override {
+    if (KindOf(run.spec) == kind::kPersonalize) TakeTurns(run.project, cancel);
+    WriteFileAtomic(run.output_folder / artifact::kColorizer, run.job_name);
+    return {{artifact::kColorizer}, {}};
+  }
+  int turns(const std::string& project) { return turns_[project]; }
+
+ private:
+  void TakeTurns(const std::string& project, const CancellationToken& cancel) {
+    SceneBatch::Membership membership(batch_, project);
+    ++began_;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (began_ < attempts_ && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    while (!enough_ && std::chrono::steady_clock::now() < end) {
+      const SceneBatch::Turn turn(membership, cancel);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      ++turns_[project];  // one slot: no other thread is here
+      if (turns_["b"] >= 100) enough_ = true;
+    }
+  }
+
+  const int attempts_;
+  SceneBatch batch_{1};
+  std::atomic<int> began_{0};
+  std::atomic<bool> enough_{false};
+  std::map<std::string, int> turns_;
 };
 
 class WorkerLoopTest : public testing::Test {
@@ -88,8 +126,11 @@ class WorkerLoopTest : public testing::Test {
   }
 
   // A graph of personalize jobs with these seeds (different work) and encoders.
-  JobRecord Submit(const std::vector<uint64_t>& seeds, const std::string& encoder = "") {
+  JobRecord Submit(const std::vector<uint64_t>& seeds,
+                   const std::string& encoder = "",
+                   const std::string& project = "") {
     NewGraph graph;
+    graph.project = project;
     graph.scene = "scenes/test";
     NewJob root;
     root.kind = kind::kPersonalizeScenes;
@@ -110,9 +151,10 @@ class WorkerLoopTest : public testing::Test {
   }
 
   // Runs a worker until the jobs of these graphs have ended.
-  void Work(const std::vector<JobRecord>& roots) {
+  void Work(const std::vector<JobRecord>& roots) { Work(roots, runner_); }
+  void Work(const std::vector<JobRecord>& roots, StageRunner& runner) {
     std::atomic<bool> draining{false};
-    std::thread worker([&] { RunWorker(options_, runner_, draining); });
+    std::thread worker([&] { RunWorker(options_, runner, draining); });
     std::vector<std::string> names;
     for (const JobRecord& root : roots) names.push_back(root.name);
     const auto ids = store_.ResolveWatch(names);
@@ -137,7 +179,6 @@ TEST_F(WorkerLoopTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
   EXPECT_EQ(runner_.most(), 3);
   int succeeded = 0;
   for (const JobRecord& job : store_.ListChildren(root.name)) {
-    EXPECT_EQ(runner_.projects().at(job.name), root.name);
     if (job.state == JobState::kFailed) {
       EXPECT_EQ(job.error->message, "poisoned");
       continue;
@@ -185,6 +226,19 @@ TEST_F(WorkerLoopTest, NoMoreThanTheConfiguredNumberRunAtOnce) {
   Work({root});
   EXPECT_EQ(runner_.most(), 2);
   EXPECT_EQ(store_.GetJob(root.name).state, JobState::kSucceeded);
+}
+
+// Ten jobs of one project against one of another: both get half of the computing.
+TEST_F(WorkerLoopTest, ProjectsShareTheBatchEqually) {
+  options_.batch_scenes = 11;
+  TurnsRunner runner(11);
+  std::vector<JobRecord> roots;
+  for (uint64_t i = 1; i <= 10; ++i) roots.push_back(Submit({i}, "", "a"));
+  roots.push_back(Submit({11}, "", "b"));
+  Work(roots, runner);
+  EXPECT_GE(runner.turns("b"), 100);
+  EXPECT_GT(runner.turns("a"), 60);
+  EXPECT_LT(runner.turns("a"), 160);
 }
 
 TEST_F(WorkerLoopTest, LittleMemoryMeansOneAtATime) {

@@ -184,7 +184,7 @@ TEST_F(BackendsTest, EditServerAdapterColorsAndGenerates) {
                           "mine"});
   StartServer({"--backend", "edit=" + backend.address(), "--retry-backoff-ms", "50"});
   MakeScene();
-  // What the job's spec says in words and numbers reaches the edit server.
+  // Texts and numbers of the job's spec reach the edit server.
   const v1::Job red = ColorKeyView("edit", "red brick"), blue = ColorKeyView("edit", "blue paint");
   EXPECT_GT(MeanOf(red, 1), 3.0);
   EXPECT_LT(MeanOf(blue, 2), -3.0);

@@ -1,4 +1,4 @@
-// Scenes that cannot work: each is refused in one clear line, and the server goes on.
+// Scenes that cannot work: each is refused in one clear line, and the server continues.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -151,7 +151,7 @@ TEST_F(BadRequestsTest, DataFolderInUse) {
 
 TEST_F(BadRequestsTest, ReadOnlyDataFolder) {
   WriteFileAtomic(Path("file"), "in the way");
-  // Below a regular file nobody can write, not even root.
+  // Writing below a regular file fails, even for root.
   for (const std::string& folder : {(Path("file") / "data").string(), std::string("/proc/data")}) {
     const ProcessResult result = Serve({"--listen", "127.0.0.1:0", "--data-dir", folder});
     EXPECT_FALSE(result.timed_out);

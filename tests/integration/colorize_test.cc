@@ -24,7 +24,7 @@ class ColorizeTest : public ServiceTest {
   void ExpectPageToLookAt(const v1::Job& job);
 };
 
-// What `artifact download` brings is what was uploaded as the job's result.
+// `artifact download` returns the bytes that the job uploaded.
 void ColorizeTest::ExpectSameBytesFromArtifactDownload(const std::string& job) {
   const ProcessResult result =
       Client({"artifact", "download", job, "-o", Path("artifacts").string()});
@@ -131,7 +131,7 @@ void ExpectMetrics(const json& metrics) {
     ASSERT_TRUE(metrics[name].is_number()) << name;
     EXPECT_TRUE(std::isfinite(metrics[name].get<double>())) << name;
   }
-  // Far below what it reaches with time, far above what a fault leaves.
+  // Far below the result of a full schedule, far above that of a fault.
   EXPECT_GT(metrics["psnr_l"].get<double>(), 17.0);
   EXPECT_LT(metrics["delta_e00_chroma_2d"].get<double>(), metrics["delta_e00_gray"].get<double>());
   EXPECT_LT(metrics["delta_e00_chroma"].get<double>(), metrics["delta_e00_gray"].get<double>());
@@ -249,7 +249,7 @@ TEST_F(ColorizeTest, ColorsTheKeyViewByJsonHints) {
       << client.Err();
   EXPECT_EQ(colored.state(), v1::Job::STATE_SUCCEEDED) << colored.error().message() << client.Err();
   EXPECT_EQ(NewestJob("select_key_view").spec().select_key_view().view(), "view003");
-  client.Kill();  // the job goes on without its client
+  client.Kill();  // the job continues without its client
   EXPECT_TRUE(server().IsHealthy());
   const ProcessResult cancel = Client({"job", "cancel", NewestJob("colorize_scene").name()});
   EXPECT_EQ(cancel.exit_code, 0) << cancel.err;

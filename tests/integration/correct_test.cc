@@ -84,7 +84,7 @@ TEST_F(CorrectTest, ProposesPlacesAppliesAStrokeAndUndoesIt) {
   EXPECT_EQ(ReadFile(Path("out") / "model.c3g"), before) << "nothing was to be changed";
   EXPECT_EQ(Done(proposed), std::set<std::string>{"correct_colors"});
 
-  // What the user paints is not overwritten.
+  // The user's paint is not overwritten.
   Image painted = to_paint;
   for (int i = 0; i < 40 * 40; ++i) painted.At(0, 20 + i / 40, 20 + i % 40) = 0.9f;
   const std::string mine = EncodePng8(painted);

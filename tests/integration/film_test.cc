@@ -261,7 +261,7 @@ TEST_F(FilmTest, RecolorsATimeRangeAndReusesTheRest) {
   WriteFrames();
   WriteFileAtomic(Path("painted.png"), EncodePng8(FrameOf(8)));
   Image red = FrameOf(12);
-  std::swap_ranges(red.Plane(0), red.Plane(1), red.Plane(2));  // what is blue becomes red
+  std::swap_ranges(red.Plane(0), red.Plane(1), red.Plane(2));  // blue becomes red
   WriteFileAtomic(Path("red.png"), EncodePng8(red));
   const std::vector<std::string> film = {
       "--film", "--key-view", "n108", "--key-color", Path("painted.png").string()};

@@ -1,4 +1,4 @@
-// `color3d key`: select, colour, look, accept, then colour the scene with what was accepted.
+// `color3d key`: select, colour, look, accept, then colour the scene with the accepted key view.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Masks of photos through the service: what they leave out counts neither in training nor in
+// Masks of photos through the service: masked pixels count neither in training nor in
 // scores.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
-// Workers keep to their memory limit: what needs more fails with the numbers, and the rest goes on.
+// Workers keep to their memory limit: a job that needs more fails with the figures; others
+// continue.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -126,7 +127,7 @@ TEST_F(MemoryLimitTest, HugePhotosFailWithFiguresAndSpareOtherJobs) {
   EXPECT_EQ(WorkerPid(), pid) << "the same worker went on";
 }
 
-// The photos are small, and what is given as their colour is not.
+// Small photos with a huge coloured picture.
 TEST_F(MemoryLimitTest, HugeKeyPictureFailsWithFigures) {
   ExpectOtherJobsGoOn();
   const int pid = WorkerPid();

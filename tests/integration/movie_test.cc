@@ -82,7 +82,7 @@ TEST_F(MovieTest, RendersPathsOfResultsJobsAndScenes) {
   ExpectBadInput();
 }
 
-// What is wrong is told in a line, with exit code 2, and leaves no file.
+// Wrong input ends with one line, exit code 2 and no file.
 void MovieTest::ExpectBadInput() {
   const std::string file = Path("bad.mp4").string();
   ExpectRefusal(Client({"turntable", Path("nowhere").string()}), 2, {"there is no folder"});

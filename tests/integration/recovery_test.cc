@@ -1,4 +1,4 @@
-// Workers and servers that die in the middle: the work goes on where it was.
+// Killed workers and servers: jobs resume at their last checkpoint.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -88,7 +88,7 @@ class RecoveryTest : public ServiceTest {
     ExpectNoStepTwice();
   }
 
-  // The curve of an error goes on over attempts: no iteration is there twice.
+  // Error curves continue over attempts: no iteration occurs twice.
   void ExpectNoStepTwice() {
     std::istringstream csv(ReadFile(Path("out") / "curves.csv"));
     std::set<std::string> seen;

@@ -36,7 +36,7 @@ Image WithNoise(Image image, double deviation) {
   return image;
 }
 
-// What goes wrong with photographs; `view` is one of the scene's, in grey.
+// Damaged photographs of a scene; `view` is one of its views, in grey.
 Image BadFrame(const std::string& kind, const Image& view) {
   Image frame(view.width, view.height, 1);
   if (kind == "white") return Image(view.width, view.height, 1, 1.0f);
@@ -164,7 +164,7 @@ TEST_F(SelectTest, ComputesFeaturesOfNewPhotosOnly) {
     fs::resize_file(scratch_.path() / "cache" / "view_features" / entry, 200);
   }
   EXPECT_EQ(Select(scene, KeyViewStrategy::kCoverage), warm) << "torn entries";
-  // The pose is no part of what a photo looks like; its pixels are.
+  // Features depend on the pixels of a photo, not on its pose.
   scene.views[0].camera.fx *= 1.1;
   Select(scene, KeyViewStrategy::kCoverage);
   EXPECT_EQ(CachedViews(), 6);

@@ -43,7 +43,7 @@ class ViewerToolsTest : public ::testing::Test {
     GTEST_SKIP() << kHowToInstall;
   }
 
-  // What the tool makes of `bytes`, as a PLY.
+  // Converts `bytes` to PLY with the tool.
   ViewerGaussians Converted(const std::string& name, const std::string& bytes) {
     const fs::path from = scratch_.path() / name, to = scratch_.path() / (name + ".ply");
     const fs::path log = scratch_.path() / "log";

@@ -66,7 +66,7 @@ RasterCase SmallCase() {
   return r;
 }
 
-TEST(ReferenceTest, GradientMatchesFiniteDifferences) {
+TEST(ReferenceTest, GradientAgreesWithFiniteDifferences) {
   const RasterCase r = SmallCase();
   ReferenceParameters p = ReferenceParameters::From(r.parameters);
   const std::vector<double> background = {0.2};
@@ -103,7 +103,7 @@ TEST(ReferenceTest, GradientMatchesFiniteDifferences) {
   }
 }
 
-TEST(CompareRasterTest, DetectsWrongValuesAndGradients) {
+TEST(CompareRasterTest, FindsWrongValueAndGradient) {
   ThreadPool pool(2);
   RasterCase r = SmallCase();
   EXPECT_TRUE(CompareRaster(r, pool).Passed());

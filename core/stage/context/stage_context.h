@@ -38,7 +38,7 @@ class StageContext {
     // Kept between jobs (FileCache); empty: none.
     std::filesystem::path cache_folder = {};
     SceneBatch* batch = nullptr;  // that personalization takes part in; null: alone
-    std::string project = {};     // fairness in the batch is between projects
+    std::string project = {};     // of the job's owner; scenes in the batch take turns by project
   };
 
   // The references must outlive the context.

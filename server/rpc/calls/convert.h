@@ -11,7 +11,7 @@
 #include "color3d/v1/job.pb.h"
 #include "color3d/v1/scene.pb.h"
 #include "server/planning/spec_check.h"
-#include "server/store/job_store.h"
+#include "server/store/client_store.h"
 
 namespace color3d {
 

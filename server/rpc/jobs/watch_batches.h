@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/base/mutex.h"
-#include "server/store/job_store.h"
+#include "server/store/client_store.h"
 #include "server/store/project_store.h"
 
 namespace color3d {
@@ -25,7 +25,7 @@ class WatchBatches {
  public:
   static constexpr int kMaxEvents = 64;
 
-  explicit WatchBatches(JobStore& store) : store_(store) {}
+  explicit WatchBatches(ClientStore& store) : store_(store) {}
 
   // Returns the events of these jobs after `revision`.
   std::shared_ptr<const WatchBatch> After(int64_t revision,
@@ -42,7 +42,7 @@ class WatchBatches {
                   const std::vector<int64_t>& ids,
                   const ProjectStore& seen_by) const;
 
-  JobStore& store_;
+  ClientStore& store_;
   Mutex mutex_;
   std::map<Key, std::shared_future<Batch>> batches_ COLOR3D_GUARDED_BY(mutex_);
 };

@@ -40,7 +40,11 @@ class PhotoSetTest : public testing::Test {
   std::filesystem::path folder_;
 };
 
+<<<<<<< HEAD
 TEST_F(PhotoSetTest, MatchesOfAPairAgree) {
+=======
+TEST_F(PhotoSetTest, MatchesOfPairShowSamePlace) {
+>>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   Write("photo.png", Ramps(200, 150, 0.2f));
   const PhotoSet photos({{folder_, 1.0}});
   Random random(4);
@@ -73,7 +77,11 @@ TEST_F(PhotoSetTest, MatchesOfAPairAgree) {
   EXPECT_LT(mirrored, 10);  // the world is not: one of seven
 }
 
+<<<<<<< HEAD
 TEST_F(PhotoSetTest, PairsFramesOfAClip) {
+=======
+TEST_F(PhotoSetTest, PairsFramesOfClips) {
+>>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   for (int i = 0; i < 3; ++i) {
     Write("clips/one/" + std::to_string(i) + ".png", Ramps(60, 60, 0.3f * static_cast<float>(i)));
   }
@@ -99,7 +107,7 @@ TEST_F(PhotoSetTest, PairsFramesOfAClip) {
   EXPECT_LT(unknown, 70);
 }
 
-TEST_F(PhotoSetTest, CropsStayInsideAndAreTrueColor) {
+TEST_F(PhotoSetTest, CropsStayInsideAndKeepColor) {
   Write("photo.png", Ramps(90, 50, 0.2f));
   const PhotoSet photos({{folder_, 1.0}});
   Random random(5);
@@ -115,13 +123,13 @@ TEST_F(PhotoSetTest, CropsStayInsideAndAreTrueColor) {
   }
 }
 
-TEST_F(PhotoSetTest, RefusesAFolderWithoutColor) {
+TEST_F(PhotoSetTest, RejectsFolderWithoutColor) {
   Write("gray.png", Image(32, 32, 3, 0.4f));
   EXPECT_THROW(PhotoSet({{folder_, 1.0}}), Error);
   EXPECT_THROW(PhotoSet({}, {{folder_, 1.0}}), Error);
 }
 
-TEST(CropWindowTest, TurnedWindowsStayInsideThePhoto) {
+TEST(CropWindowTest, RotatedWindowsStayInsidePhoto) {
   const BytePhoto photo{40, 90, {}};
   Random random(6);
   for (int i = 0; i < 200; ++i) {

@@ -50,7 +50,11 @@ void ExpectEqual(const WeightMap& expected, const WeightMap& actual) {
     ASSERT_EQ(array.values, actual.at(name).values) << name;
 }
 
+<<<<<<< HEAD
 TEST_F(PretrainerTest, ResumedRunEqualsAnUninterruptedOne) {
+=======
+TEST_F(PretrainerTest, ResumesWithSameResult) {
+>>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   for (double copy_weight : {0.0, 1.0}) {
     options_.copy_weight = options_.contrast_weight = copy_weight;
@@ -71,7 +75,11 @@ TEST_F(PretrainerTest, ResumedRunEqualsAnUninterruptedOne) {
   }
 }
 
+<<<<<<< HEAD
 TEST_F(PretrainerTest, ContinuesFromWeights) {
+=======
+TEST_F(PretrainerTest, StartsFromWeights) {
+>>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   trainer.Step();
@@ -88,7 +96,11 @@ TEST_F(PretrainerTest, ContinuesFromWeights) {
             other.AveragedWeights().at("encoder.norm1.bias").values);
 }
 
+<<<<<<< HEAD
 TEST_F(PretrainerTest, NamesMissingWeights) {
+=======
+TEST_F(PretrainerTest, NamesMissingStartWeights) {
+>>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   const WeightMap good = Pretrainer(options_, photos, std::nullopt).AveragedWeights();
   const auto expect_refused = [&](const WeightMap& weights, const std::string& name) {
@@ -111,7 +123,11 @@ TEST_F(PretrainerTest, NamesMissingWeights) {
   expect_refused(weights, "encoder.norm1.weight");
 }
 
+<<<<<<< HEAD
 TEST_F(PretrainerTest, ScheduleByTime) {
+=======
+TEST_F(PretrainerTest, FollowsScheduleByTime) {
+>>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   const auto change = [&](double progress) {
     Pretrainer trainer(options_, photos, std::nullopt);
@@ -126,7 +142,11 @@ TEST_F(PretrainerTest, ScheduleByTime) {
   EXPECT_LT(change(1.0), 0.05 * change(0.0));
 }
 
+<<<<<<< HEAD
 TEST_F(PretrainerTest, WritesAnAutomaticColorizer) {
+=======
+TEST_F(PretrainerTest, WritesAutomaticColorizer) {
+>>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   trainer.Step();
@@ -137,7 +157,7 @@ TEST_F(PretrainerTest, WritesAnAutomaticColorizer) {
   for (float v : color.ab.data) ASSERT_TRUE(std::isfinite(v));
 }
 
-TEST_F(PretrainerTest, RefusesADamagedCheckpoint) {
+TEST_F(PretrainerTest, RejectsDamagedCheckpoint) {
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   std::string checkpoint = trainer.Checkpoint("{}");

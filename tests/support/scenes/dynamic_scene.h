@@ -18,7 +18,7 @@ namespace color3d {
 
 struct DynamicSceneOptions {
   DynamicCase which = DynamicCase::kSliding;
-  // 1..8, on an arc. A single one that does not move makes a film (Scene::IsFilm).
+  // 1..8, on an arc. A single static one makes a film (CaptureKind::kFilm).
   int cameras = 6;
   // 1..1000 time steps of 1/8 s; 0: 1 for kOneStep, which takes no other, 8 for kStill, else 12.
   int times = 0;
@@ -32,7 +32,7 @@ struct DynamicSceneOptions {
   void Validate() const;        // throws Error{kInvalidArgument}
 };
 
-// What a view shows at one position.
+// The content of a view at one position.
 struct SeenPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // world, m
   double depth = 0.0;                                  // along the camera's z axis, m
@@ -86,7 +86,7 @@ class DynamicScene {
   Room room_;
   std::vector<std::vector<std::optional<Solid>>> movers_;  // per time step
   Scene scene_;
-  // Per camera that stands still, what it sees of the room; empty for cameras that move.
+  // Picture of the room for each standing camera; empty for cameras that move.
   std::vector<std::vector<RoomSample>> still_;
 };
 

@@ -1,4 +1,4 @@
-// Jobs to plan for tests, and what the planner has made of them.
+// Jobs to plan for tests, and the graphs that the planner returned.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -26,6 +26,15 @@ inline v1::JobSpec SceneSpec() {
   spec.set_scene("scenes/test");
   *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = SomeDigest("key");
   return spec;
+}
+
+inline JobRecord Done(const std::string& kind) {
+  JobRecord job;
+  job.name = "jobs/" + kind;
+  job.kind = kind;
+  job.scene = "scenes/test";
+  job.state = JobState::kSucceeded;
+  return job;
 }
 
 inline int IndexOf(const NewGraph& graph, const std::string& kind) {
