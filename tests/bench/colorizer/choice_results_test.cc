@@ -30,11 +30,7 @@ std::vector<ChoicePoint> TwoScenes() {
           PointOf("fox", "crop", "128", 60, 5.5)};
 }
 
-<<<<<<< HEAD
-TEST(ChoiceResults, SurviveAnInterruptedLine) {
-=======
 TEST(ChoiceResults, IgnoreTruncatedLine) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const ScratchFolder folder;
   const auto file = folder.path() / "choices.jsonl";
   EXPECT_TRUE(ReadChoicePoints(file).empty());

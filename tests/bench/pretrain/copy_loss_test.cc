@@ -35,11 +35,7 @@ torch::Tensor SamePlaces() {
   return torch::stack({at.repeat({cells}), at.unsqueeze(1).expand({cells, cells}).flatten()}, 1);
 }
 
-<<<<<<< HEAD
-TEST(CopyLossTest, UsesTheSpaceOfMatching) {
-=======
 TEST(CopyLossTest, UsesSpaceOfMatching) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   torch::manual_seed(1);
   const torch::Tensor mix = torch::randn({24, 24});
   const torch::Tensor cells = torch::mm(torch::randn({300, 24}), mix);
@@ -52,11 +48,7 @@ TEST(CopyLossTest, UsesSpaceOfMatching) {
       SquaredDistances(ours, ours), SquaredDistances(used, used), /*rtol=*/1e-3, /*atol=*/1e-3));
 }
 
-<<<<<<< HEAD
-TEST(CopyLossTest, HandlesFewerSamplesThanChannels) {
-=======
 TEST(CopyLossTest, AcceptsFewerSamplesThanChannels) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   torch::manual_seed(2);
   const torch::Tensor samples = torch::randn({12, 40});
   const torch::Tensor white = WhitenBlock(samples, samples, 8, 2.0);
@@ -65,11 +57,7 @@ TEST(CopyLossTest, AcceptsFewerSamplesThanChannels) {
   EXPECT_LT((white.square().mean(0) - 2.0 / 8).abs().max().item<float>(), 0.02f);
 }
 
-<<<<<<< HEAD
-TEST(CopyLossTest, SameViewCopiesItself) {
-=======
 TEST(CopyLossTest, SameViewHasLowerLossThanAnother) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   torch::manual_seed(3);
   const CopyView view = RandomView();
   CopyView other = RandomView();
@@ -87,11 +75,7 @@ TEST(CopyLossTest, SameViewHasLowerLossThanAnother) {
   EXPECT_LT(same.contrast.item<double>(), 0.5 * wrong.contrast.item<double>());
 }
 
-<<<<<<< HEAD
-TEST(CopyLossTest, NoContrastWithoutCorrespondences) {
-=======
 TEST(CopyLossTest, HasNoContrastWithoutMatches) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   torch::manual_seed(4);
   const CopyView view = RandomView();
   Random random(1);
@@ -105,11 +89,7 @@ TEST(CopyLossTest, HasNoContrastWithoutMatches) {
   EXPECT_EQ(losses.contrast.item<double>(), 0.0);
 }
 
-<<<<<<< HEAD
-TEST(CopyLossTest, DescentLearnsToCopyColors) {
-=======
 TEST(CopyLossTest, DescentImprovesCopiedColors) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   torch::manual_seed(5);
   CopyView first = RandomView(), second = RandomView();
   for (CopyView* view : {&first, &second}) {

@@ -40,11 +40,7 @@ class PhotoSetTest : public testing::Test {
   std::filesystem::path folder_;
 };
 
-<<<<<<< HEAD
-TEST_F(PhotoSetTest, MatchesOfAPairAgree) {
-=======
 TEST_F(PhotoSetTest, MatchesOfPairShowSamePlace) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   Write("photo.png", Ramps(200, 150, 0.2f));
   const PhotoSet photos({{folder_, 1.0}});
   Random random(4);
@@ -77,11 +73,7 @@ TEST_F(PhotoSetTest, MatchesOfPairShowSamePlace) {
   EXPECT_LT(mirrored, 10);  // the world is not: one of seven
 }
 
-<<<<<<< HEAD
-TEST_F(PhotoSetTest, PairsFramesOfAClip) {
-=======
 TEST_F(PhotoSetTest, PairsFramesOfClips) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   for (int i = 0; i < 3; ++i) {
     Write("clips/one/" + std::to_string(i) + ".png", Ramps(60, 60, 0.3f * static_cast<float>(i)));
   }

@@ -50,11 +50,7 @@ void ExpectEqual(const WeightMap& expected, const WeightMap& actual) {
     ASSERT_EQ(array.values, actual.at(name).values) << name;
 }
 
-<<<<<<< HEAD
-TEST_F(PretrainerTest, ResumedRunEqualsAnUninterruptedOne) {
-=======
 TEST_F(PretrainerTest, ResumesWithSameResult) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   for (double copy_weight : {0.0, 1.0}) {
     options_.copy_weight = options_.contrast_weight = copy_weight;
@@ -75,11 +71,7 @@ TEST_F(PretrainerTest, ResumesWithSameResult) {
   }
 }
 
-<<<<<<< HEAD
-TEST_F(PretrainerTest, ContinuesFromWeights) {
-=======
 TEST_F(PretrainerTest, StartsFromWeights) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   trainer.Step();
@@ -96,11 +88,7 @@ TEST_F(PretrainerTest, StartsFromWeights) {
             other.AveragedWeights().at("encoder.norm1.bias").values);
 }
 
-<<<<<<< HEAD
-TEST_F(PretrainerTest, NamesMissingWeights) {
-=======
 TEST_F(PretrainerTest, NamesMissingStartWeights) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   const WeightMap good = Pretrainer(options_, photos, std::nullopt).AveragedWeights();
   const auto expect_refused = [&](const WeightMap& weights, const std::string& name) {
@@ -123,11 +111,7 @@ TEST_F(PretrainerTest, NamesMissingStartWeights) {
   expect_refused(weights, "encoder.norm1.weight");
 }
 
-<<<<<<< HEAD
-TEST_F(PretrainerTest, ScheduleByTime) {
-=======
 TEST_F(PretrainerTest, FollowsScheduleByTime) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   const auto change = [&](double progress) {
     Pretrainer trainer(options_, photos, std::nullopt);
@@ -142,11 +126,7 @@ TEST_F(PretrainerTest, FollowsScheduleByTime) {
   EXPECT_LT(change(1.0), 0.05 * change(0.0));
 }
 
-<<<<<<< HEAD
-TEST_F(PretrainerTest, WritesAnAutomaticColorizer) {
-=======
 TEST_F(PretrainerTest, WritesAutomaticColorizer) {
->>>>>>> 9b3a3ed2da3bce2ef564e5eb5dafc2655bd59c3d
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   trainer.Step();
