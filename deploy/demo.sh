@@ -33,7 +33,7 @@ if [ -n "$photos" ] && [ ! -e "$photos" ]; then
 fi
 
 "$root/deploy/install-deps.sh"
-# Only what it runs: tests/run.sh builds the rest into the same folder.
+# Only the programs of the demo; tests/run.sh builds the rest into the same folder.
 cmake -S "$root" -B "$root/build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCOLOR3D_TESTS=OFF >/dev/null
 cmake --build "$root/build" --target color3d color3d-server color3d-worker color3d-make-scene
 bin="$root/build/bin"

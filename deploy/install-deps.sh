@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Installs what Color3D needs to build and run on Debian 12 (or a later Debian or Ubuntu that has the
+# Installs the packages to build and run Color3D on Debian 12 (or a later Debian or Ubuntu that has the
 # same packages). Run as root or as a user with sudo; does nothing when all is there.
-#   deploy/install-deps.sh           what deploy/demo.sh needs
-#   deploy/install-deps.sh --tests   what tests/run.sh needs, too
-#   deploy/install-deps.sh --fuzz    what tests/run.sh -L fuzz needs, too
+#   deploy/install-deps.sh           packages of deploy/demo.sh
+#   deploy/install-deps.sh --tests   and those of tests/run.sh
+#   deploy/install-deps.sh --fuzz    and those of tests/run.sh -L fuzz
 set -euo pipefail
 
 packages=(

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Documents say what is there. Fails on
+# Checks that documents agree with the sources. Fails on
 #   - a relative link in a *.md to a file or heading that does not exist;
 #   - a `path/of/a.source`, a `CamelCase`, `snake_case` or `CAPITAL_CASE` name or a `--flag` in code quotes
 #     that the sources do not have (not in CHANGELOG.md, which tells of old names, too);
@@ -216,7 +216,7 @@ pass == "comments" {
 END { end_comment(); exit bad }
 AWK
 
-# README.md is read in one go, RESULTS.md is a table: what is longer belongs elsewhere.
+# README.md is read in one go, RESULTS.md is a table: longer texts belong elsewhere.
 words=$(wc -w <README.md)
 lines=$(wc -l <tests/bench/RESULTS.md)
 if [ "$words" -gt 1200 ] || [ "$lines" -gt 200 ]; then

@@ -19,7 +19,7 @@ complain() {
 }
 
 # allow FOLDER REGEX: every include of our own by FOLDER's sources matches REGEX (or is core/base's).
-# What its tests set up is not held against them.
+# Its tests are exempt.
 allow() {
   local bad
   bad=$(grep -rnE '#include "(core|server|client|tests)/' "$1" --include='*.h' --include='*.cc' |

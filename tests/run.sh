@@ -76,6 +76,7 @@ fi
 tests/check_format.sh
 tests/check_layers.sh
 tests/check_docs.sh
+tests/test_targets.py --check-long
 tests/check_proto.sh "$build"
 configure
 cmake --build "$build"

@@ -2,6 +2,7 @@
 """Prints the test programs that a name or a change concerns, one a line.
 
     tests/test_targets.py BUILD --name REGEX       programs, test suites or cases that match
+    tests/test_targets.py --check-long     fails if a pattern after LONG in a CMakeLists.txt names no case
     tests/test_targets.py BUILD --changed [REV]    programs with sources in the folders that changed
                                                    since REV (default: the commit where this branch
                                                    left main, or the last commit on main)
@@ -9,13 +10,16 @@
 Reads BUILD/compile_commands.json, so BUILD must be configured, not built.
 """
 import argparse
+import fnmatch
 import json
 import os
 import re
 import subprocess
+import sys
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 TARGET = re.compile(r"CMakeFiles/([^/]+)\.dir/")
+LONG = re.compile(r"\bLONG\s+([^)]*)\)")
 CASE = re.compile(r"^\s*TEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)", re.MULTILINE)
 
 
@@ -59,12 +63,26 @@ def changed_folders(since):
     return {os.path.dirname(file) for file in files if file}
 
 
+def patterns_without_cases():
+    """Patterns after LONG that match no case: the case was renamed and is long no more."""
+    tests = [read(os.path.join(ROOT, file)) for file in git("ls-files", "*_test.cc") if file]
+    cases = [".".join(case) for text in tests for case in CASE.findall(text)]
+    for file in git("ls-files", "*CMakeLists.txt"):
+        for arguments in LONG.findall(read(os.path.join(ROOT, file))) if file else []:
+            for pattern in re.findall(r"[\w*]+\.[\w*]+", arguments):
+                if not fnmatch.filter(cases, pattern):
+                    yield f"{file}: LONG {pattern} names no case"
+
+
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("build")
+    parser.add_argument("build", nargs="?")
+    parser.add_argument("--check-long", action="store_true")
     parser.add_argument("--name")
     parser.add_argument("--changed", nargs="?", const="")
     arguments = parser.parse_args()
+    if arguments.check_long:
+        sys.exit("\n".join(patterns_without_cases()) or 0)
     sources = sources_of_tests(arguments.build)
     if arguments.name is not None:
         found = targets_by_name(sources, arguments.name)

@@ -9,31 +9,13 @@
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/key_views.h"
 #include "core/stage/run_stages.h"
+#include "tests/support/scenes/wall_pan.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
 namespace {
 
 constexpr int kWidth = 96, kHeight = 72, kFrames = 16;
-
-// A pan along a wall, red on the left and green on the right of the first frame.
-Image LabOf(int frame) {
-  Image lab(kWidth, kHeight, 3);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const double u = x + 1.0 * frame;
-      double l = 50.0;
-      for (int k = 1; k <= 6; ++k) {
-        const double a = 2.1 * k + 1.3;
-        l += 4.0 * std::sin(0.13 * k * (u * std::cos(a) + y * std::sin(a)) + 2.7 * a);
-      }
-      lab.At(0, y, x) = static_cast<float>(l);
-      lab.At(1, y, x) = static_cast<float>(20.0 * std::sin(0.03 * u));
-      lab.At(2, y, x) = static_cast<float>(20.0 * std::cos(0.04 * y));
-    }
-  }
-  return lab;
-}
 
 class AdditionalKeyFrameTest : public StageTest {
  protected:
@@ -44,12 +26,13 @@ class AdditionalKeyFrameTest : public StageTest {
       view.camera =
           view.captured_camera = {kWidth, kHeight, 100.0, 100.0, kWidth / 2.0, kHeight / 2.0};
       view.moment = Moment{0.04 * i, 0};
-      WriteFileAtomic(scratch_.path() / view.image_file, EncodePng16(SrgbFromLab(LabOf(i))));
+      WriteFileAtomic(scratch_.path() / view.image_file,
+                      EncodePng16(SrgbFromLab(WallPan(kWidth, kHeight, i))));
       scene_.views.push_back(view);
     }
     AddInput(artifact::kScene, SceneToJson(scene_));
     AddInput(artifact::kKeyView, R"({"view": "f02.png"})");
-    const Image truth = LabOf(2);
+    const Image truth = WallPan(kWidth, kHeight, 2);
     Image ab(kWidth, kHeight, 2);
     std::copy_n(truth.Plane(1), ab.data.size(), ab.data.begin());
     AddInput(artifact::kKeyColor, EncodeAbPng(ab));
@@ -67,7 +50,7 @@ class AdditionalKeyFrameTest : public StageTest {
   }
   // Adds a key view that is painted in one other colour in the columns from `begin` to `end`.
   std::string AddPainted(int view, int begin, int end) {
-    Image lab = LabOf(view);
+    Image lab = WallPan(kWidth, kHeight, view);
     std::fill_n(lab.Plane(1), lab.PlaneSize(), -25.0f);
     std::fill_n(lab.Plane(2), lab.PlaneSize(), -5.0f);
     const Image srgb = SrgbFromLab(lab);
@@ -114,7 +97,7 @@ TEST_F(AdditionalKeyFrameTest, KeepsColorOfUnpaintedParts) {
   const AbMap before = DecodeAbPng(Run(options)[13], "before");
   options.additional_key_views = {AddPainted(12, 0, kWidth / 2)};
   const AbMap after = DecodeAbPng(Run(options)[13], "after");
-  const Image truth = LabOf(13);
+  const Image truth = WallPan(kWidth, kHeight, 13);
   double painted = 0.0, kept = 0.0, sure = 0.0, was_sure = 0.0;
   int count = 0;
   for (int y = 12; y < kHeight - 12; ++y, ++count) {

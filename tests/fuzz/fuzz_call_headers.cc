@@ -1,4 +1,4 @@
-// Fuzz target: what stands in a call's metadata, and the address that is told of a job's end.
+// Fuzz target: metadata of a call, and addresses of webhooks.
 #include <algorithm>
 #include <cctype>
 #include <string_view>

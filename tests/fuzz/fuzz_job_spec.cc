@@ -1,4 +1,4 @@
-// Fuzz target: CreateJob requests: what is checked of them, and the graphs that are planned.
+// Fuzz target: CreateJob requests: their checks and the planned graphs.
 #include "core/catalogue/stages.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/plan_scenes.h"

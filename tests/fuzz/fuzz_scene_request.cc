@@ -1,4 +1,4 @@
-// Fuzz target: CreateScene requests, and what CommitScene checks of the scene that they declare.
+// Fuzz target: CreateScene requests, and the checks of CommitScene.
 #include "core/base/files.h"
 #include "server/rpc/calls/convert.h"
 #include "server/rpc/scenes/scene_validation.h"

@@ -1,5 +1,5 @@
-// What every fuzz target defines. libFuzzer drives it in builds with COLOR3D_FUZZ; in all others
-// replay_main.cc runs the seeds and seeded mutations of them as a test.
+// The function that every fuzz target defines. libFuzzer drives it in builds with COLOR3D_FUZZ; in
+// all others replay_main.cc runs the seeds and seeded mutations of them as a test.
 #pragma once
 
 #include <cstddef>

@@ -21,7 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   });
   return ReadOrRefuse([&] {
     const nlohmann::json root = ParseFrames(text, "transforms.json");
-    // What a worker accepts, the server has not refused.
+    // The server refuses nothing that a worker accepts.
     if (!outline.is_object) std::abort();
     for (const nlohmann::json& frame : root["frames"]) {
       if (outline.frames == 0) std::abort();

@@ -1,6 +1,6 @@
 // Runs a fuzz target without libFuzzer: on its seeds, on every prefix of them, on a corpus, and on
 // seeded mutations. The same inputs on every run.
-//   NAME_replay CORPUS [RUNS]   the folder's files are seeds, too; of mutations so many
+//   NAME_replay CORPUS [RUNS]   the folder's files are seeds, too; RUNS: number of mutations
 //   NAME_replay FILE...         only these
 //   NAME_replay --write FOLDER  writes the seeds there, for libFuzzer to start from
 #include <fmt/core.h>

@@ -1,4 +1,4 @@
-// What holds for every weight map that a reader accepts.
+// Invariants of every weight map that a reader accepts.
 #pragma once
 
 #include <cstdio>

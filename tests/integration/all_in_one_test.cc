@@ -69,7 +69,7 @@ class AllInOneTest : public ServiceTest {
   }
 };
 
-TEST_F(AllInOneTest, ScenesTrainTogetherAndSurviveTheirWorker) {
+TEST_F(AllInOneTest, BatchSurvivesItsWorker) {
   StartServer(QuickRecovery());
   const std::vector<std::string> scenes = MakeScenes(3);
   const std::string parent = Submit(scenes, 400);
@@ -94,7 +94,7 @@ TEST_F(AllInOneTest, ScenesTrainTogetherAndSurviveTheirWorker) {
   }
 }
 
-TEST_F(AllInOneTest, ManySmallScenesQueueTrainAndFinishUnattended) {
+TEST_F(AllInOneTest, ManySmallScenesFinishUnattended) {
   StartServer();
   const int count = SceneCount();
   const std::vector<std::string> scenes = MakeScenes(count);
@@ -113,7 +113,7 @@ TEST_F(AllInOneTest, ManySmallScenesQueueTrainAndFinishUnattended) {
   EXPECT_LT(peak, int64_t{1500} << 20);
 }
 
-TEST_F(AllInOneTest, ASceneWithoutAKeyViewIsNamed) {
+TEST_F(AllInOneTest, NamesASceneWithoutAKeyView) {
   StartServer();
   ProceduralSceneOptions room = SmallRoom(4);
   WriteProceduralScene(Path("room"), room);

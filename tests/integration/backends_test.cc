@@ -137,7 +137,7 @@ std::string BackendsTest::MissingFor(const std::string& modules) {
          " cannot run it: " + why.substr(line == std::string::npos ? 0 : line + 1);
 }
 
-TEST_F(BackendsTest, TheExampleColorsAndGenerates) {
+TEST_F(BackendsTest, ExampleColorsAndGenerates) {
   const Listener backend(Path("backend"),
                          {(fs::path(COLOR3D_BIN_DIR) / "color3d-example-backend").string(),
                           "--listen",
@@ -147,7 +147,7 @@ TEST_F(BackendsTest, TheExampleColorsAndGenerates) {
   ExpectPicturesOf("example", ColorKeyView("example"));
 }
 
-TEST_F(BackendsTest, TheExampleInPythonColorsAndGenerates) {
+TEST_F(BackendsTest, PythonExampleColorsAndGenerates) {
   ::setenv("PYTHONPATH", PythonScript("").c_str(), 1);
   ::setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
   if (const std::string missing = MissingFor("numpy, PIL"); !missing.empty()) {
@@ -163,7 +163,7 @@ TEST_F(BackendsTest, TheExampleInPythonColorsAndGenerates) {
   ExpectPicturesOf("mine", sepia);
 }
 
-TEST_F(BackendsTest, AnEditServerBehindTheAdapterColorsAndGenerates) {
+TEST_F(BackendsTest, EditServerAdapterColorsAndGenerates) {
   ::setenv("PYTHONPATH", PythonScript("").c_str(), 1);
   ::setenv("PYTHONDONTWRITEBYTECODE", "1", 1);
   if (const std::string missing = MissingFor("grpc"); !missing.empty()) GTEST_SKIP() << missing;
@@ -184,7 +184,7 @@ TEST_F(BackendsTest, AnEditServerBehindTheAdapterColorsAndGenerates) {
                           "mine"});
   StartServer({"--backend", "edit=" + backend.address(), "--retry-backoff-ms", "50"});
   MakeScene();
-  // What the job's spec says in words and numbers reaches the edit server.
+  // Texts and numbers of the job's spec reach the edit server.
   const v1::Job red = ColorKeyView("edit", "red brick"), blue = ColorKeyView("edit", "blue paint");
   EXPECT_GT(MeanOf(red, 1), 3.0);
   EXPECT_LT(MeanOf(blue, 2), -3.0);

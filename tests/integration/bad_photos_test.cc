@@ -1,4 +1,4 @@
-// Scenes that cannot work: each is refused in one clear line, and the server goes on.
+// Scenes that cannot work: each is refused in one clear line, and the server continues.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -92,7 +92,7 @@ TEST_F(BadPhotosTest, TruncatedJpeg) {
   ExpectRefusal(Colorize(room), 2, {"cut.jpg", "truncated"});
 }
 
-TEST_F(BadPhotosTest, TwentyBytesThatClaimToBeAHugePng) {
+TEST_F(BadPhotosTest, TwentyBytesNamedPng) {
   const fs::path room = BareRoom();
   // Signature, length and type of IHDR, and half of it: 60000 px wide.
   std::string bytes("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xea\x60", 20);
@@ -101,7 +101,7 @@ TEST_F(BadPhotosTest, TwentyBytesThatClaimToBeAHugePng) {
   ExpectRefusal(Colorize(room), 2, {"bomb.png"});
 }
 
-TEST_F(BadPhotosTest, WholePngHeaderThatClaims60000Squared) {
+TEST_F(BadPhotosTest, PngHeaderOf60000Squared) {
   const fs::path room = BareRoom();
   std::string png = ReadFile(room / "images" / "view000.png");
   const std::string side("\0\0\xea\x60", 4);
@@ -113,14 +113,14 @@ TEST_F(BadPhotosTest, WholePngHeaderThatClaims60000Squared) {
   ExpectRefusal(result, result.exit_code, {"bomb.png", "60000"});
 }
 
-TEST_F(BadPhotosTest, PhotoOfAnotherShapeThanItsCamera) {
+TEST_F(BadPhotosTest, PhotoShapeDiffersFromCamera) {
   const fs::path room = PosedRoom();
   const Image photo = ReadImage(room / "images" / "view002.png");
   Overwrite(room / "images" / "view002.png", EncodePng8(Resize(photo, 120, 160)));
   ExpectRefusal(Colorize(room), 2, {"view002.png", "120", "160"});
 }
 
-TEST_F(BadPhotosTest, ModelWhosePhotosAreMissing) {
+TEST_F(BadPhotosTest, ModelWithoutItsPhotos) {
   const fs::path room = PosedRoom();
   for (const std::string view : {"1", "2", "3"}) {
     fs::rename(room / "images" / ("view00" + view + ".png"),
@@ -129,7 +129,7 @@ TEST_F(BadPhotosTest, ModelWhosePhotosAreMissing) {
   ExpectRefusal(Colorize(room), 2, {"view001.png", "1 are among those given"});
 }
 
-TEST_F(BadPhotosTest, NotANumberInThePoints) {
+TEST_F(BadPhotosTest, NanInPoints) {
   const fs::path room = PosedRoom();
   const fs::path points = room / "sparse" / "0" / "points3D.txt";
   std::string text = ReadFile(points);
@@ -140,7 +140,7 @@ TEST_F(BadPhotosTest, NotANumberInThePoints) {
   ExpectRefusal(Colorize(room), 2, {"points3D.txt"});
 }
 
-TEST_F(BadPhotosTest, PoseThatIsNoRotation) {
+TEST_F(BadPhotosTest, PoseWithoutARotation) {
   const fs::path room = PosedRoom();
   const fs::path images = room / "sparse" / "0" / "images.txt";
   const std::string text = ReadFile(images);
@@ -152,7 +152,7 @@ TEST_F(BadPhotosTest, PoseThatIsNoRotation) {
   ExpectRefusal(Colorize(room), 2, {"images.txt"});
 }
 
-TEST_F(BadPhotosTest, HalfOfAModel) {
+TEST_F(BadPhotosTest, IncompleteModel) {
   const fs::path room = PosedRoom();
   fs::remove(room / "sparse" / "0" / "cameras.txt");
   ExpectRefusal(Colorize(room), 2, {"cameras"});
@@ -167,7 +167,7 @@ TEST_F(BadPhotosTest, BenchmarkOfMonochromePhotos) {
 }
 
 // COLMAP runs, finds nothing in common, and the message says so.
-TEST_F(BadPhotosTest, PhotosThatDoNotOverlap) {
+TEST_F(BadPhotosTest, PhotosWithoutOverlap) {
   fs::create_directories(Path("noise"));
   for (int i = 0; i < 5; ++i) {
     Random random(static_cast<uint64_t>(i + 1));

@@ -61,7 +61,7 @@ TEST_F(BadRequestsTest, KeyColorWithoutColor) {
       {"no colour"});
 }
 
-TEST_F(BadRequestsTest, KeyColorThatIsNoImage) {
+TEST_F(BadRequestsTest, KeyColorIsNoImage) {
   StartServer();
   GrayRoom();
   WriteFileAtomic(Path("text.png"), "not a picture");
@@ -84,7 +84,7 @@ TEST_F(BadRequestsTest, EmptyHints) {
       Colorize({"--key-view", "view001", "--hints", Path("hints.json").string()}), 2, {"hint"});
 }
 
-TEST_F(BadRequestsTest, KeyViewThatIsNotThere) {
+TEST_F(BadRequestsTest, UnknownKeyView) {
   StartServer();
   GrayRoom();
   ExpectRefusal(Colorize({"--key-view", "view099"}), 2, {"view099"});
@@ -102,7 +102,7 @@ TEST_F(BadRequestsTest, OptionOutOfRange) {
   ExpectRefusal(Colorize({"--max-side", "3"}), 2, {"64"});
 }
 
-TEST_F(BadRequestsTest, TimeBudgetBelowWhatTheSceneNeeds) {
+TEST_F(BadRequestsTest, TimeBudgetTooShort) {
   StartServer();
   ExpectRefusal(Client({"colorize",
                         GrayRoom().string(),
@@ -119,13 +119,13 @@ TEST_F(BadRequestsTest, TimeBudgetBelowWhatTheSceneNeeds) {
                 {"time_budget_seconds is 12", "4 photos", "give at least"});
 }
 
-TEST_F(BadRequestsTest, TimeBudgetThatIsNoTime) {
+TEST_F(BadRequestsTest, UnreadableTimeBudget) {
   StartServer();
   GrayRoom();
   ExpectRefusal(Colorize({"--time-budget", "soon"}), 2, {"soon"});
 }
 
-TEST_F(BadRequestsTest, ServerThatIsNotThere) {
+TEST_F(BadRequestsTest, UnreachableServer) {
   GrayRoom();
   // Port 1 is never ours.
   const ProcessResult result = Colorize({"--server", "127.0.0.1:1"});
@@ -149,9 +149,9 @@ TEST_F(BadRequestsTest, DataFolderInUse) {
   ExpectRefusal(second, second.exit_code, {(Path("server") / "data").string()});
 }
 
-TEST_F(BadRequestsTest, DataFolderThatCannotBeWritten) {
+TEST_F(BadRequestsTest, ReadOnlyDataFolder) {
   WriteFileAtomic(Path("file"), "in the way");
-  // Below a regular file nobody can write, not even root.
+  // Writing below a regular file fails, even for root.
   for (const std::string& folder : {(Path("file") / "data").string(), std::string("/proc/data")}) {
     const ProcessResult result = Serve({"--listen", "127.0.0.1:0", "--data-dir", folder});
     EXPECT_FALSE(result.timed_out);
@@ -160,7 +160,7 @@ TEST_F(BadRequestsTest, DataFolderThatCannotBeWritten) {
   }
 }
 
-TEST_F(BadRequestsTest, ListeningToTheWorldIsRefused) {
+TEST_F(BadRequestsTest, PublicAddressWithoutTls) {
   const ProcessResult result =
       Serve({"--listen", "0.0.0.0:0", "--data-dir", Path("data").string()});
   EXPECT_NE(result.exit_code, 0);
@@ -193,7 +193,7 @@ class SmallDisk {
   bool mounted_ = false;
 };
 
-TEST_F(BadRequestsTest, DiskThatFillsUpInTheMiddle) {
+TEST_F(BadRequestsTest, DiskFillsUpDuringAJob) {
   const SmallDisk disk(Path("server") / "data");
   if (!disk.mounted()) GTEST_SKIP() << "mounting a small file system is not allowed here";
   StartServer({"--reserve-mib", "2"});
@@ -205,7 +205,7 @@ TEST_F(BadRequestsTest, DiskThatFillsUpInTheMiddle) {
   StopServer();
 }
 
-TEST_F(BadRequestsTest, ManifestPathsThatLeaveTheScene) {
+TEST_F(BadRequestsTest, ManifestPathsOutsideTheScene) {
   StartServer();
   for (const char* path : {"../secret.png",
                            "images/../../secret.png",

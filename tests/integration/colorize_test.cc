@@ -24,7 +24,7 @@ class ColorizeTest : public ServiceTest {
   void ExpectPageToLookAt(const v1::Job& job);
 };
 
-// What `artifact download` brings is what was uploaded as the job's result.
+// `artifact download` returns the bytes that the job uploaded.
 void ColorizeTest::ExpectSameBytesFromArtifactDownload(const std::string& job) {
   const ProcessResult result =
       Client({"artifact", "download", job, "-o", Path("artifacts").string()});
@@ -63,7 +63,7 @@ void ColorizeTest::ExpectPageToLookAt(const v1::Job& job) {
   ExpectRefusal(Client({"view", Path("nowhere").string()}), 2, {"there is no folder"});
 }
 
-TEST_F(ColorizeTest, ReadOnlyCommandsAnswerInWordsAndInJson) {
+TEST_F(ColorizeTest, ReadOnlyCommandsPrintTextAndJson) {
   WriteProceduralScene(Path("room"), SmallRoom(3));
   for (const std::vector<std::string>& command :
        {std::vector<std::string>{"server", "info"},
@@ -131,7 +131,7 @@ void ExpectMetrics(const json& metrics) {
     ASSERT_TRUE(metrics[name].is_number()) << name;
     EXPECT_TRUE(std::isfinite(metrics[name].get<double>())) << name;
   }
-  // Far below what it reaches with time, far above what a fault leaves.
+  // Far below the result of a full schedule, far above that of a fault.
   EXPECT_GT(metrics["psnr_l"].get<double>(), 17.0);
   EXPECT_LT(metrics["delta_e00_chroma_2d"].get<double>(), metrics["delta_e00_gray"].get<double>());
   EXPECT_LT(metrics["delta_e00_chroma"].get<double>(), metrics["delta_e00_gray"].get<double>());
@@ -149,7 +149,7 @@ int CountCached(const std::vector<v1::Job>& jobs) {
   return cached;
 }
 
-TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecondTime) {
+TEST_F(ColorizeTest, BenchmarkIsScoredThenServedFromTheCache) {
   WriteProceduralScene(Path("room"), SmallRoom());
   const auto command = [&](const std::string& out) {
     return std::vector<std::string>{"colorize",
@@ -192,7 +192,7 @@ TEST_F(ColorizeTest, BenchmarkGivesSceneAndScoresAndIsServedFromTheCacheTheSecon
   EXPECT_EQ(ReadFile(Path("second") / "scene.ply"), ReadFile(Path("first") / "scene.ply"));
 }
 
-TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColorItThenTheScene) {
+TEST_F(ColorizeTest, ColorsMonochromePhotosFromAPaintedKeyView) {
   WriteProceduralScene(Path("room"), SmallRoom(8, /*gray=*/true));
   const std::string room = Path("room").string(), out = Path("out").string();
   const ProcessResult select = Client({"colorize", room, "-o", out});
@@ -221,7 +221,7 @@ TEST_F(ColorizeTest, MonochromePhotosGiveAKeyViewAndColorItThenTheScene) {
   EXPECT_EQ(KeyView(Path("out")), name);
 }
 
-TEST_F(ColorizeTest, HintsAsJsonColorTheKeyView) {
+TEST_F(ColorizeTest, ColorsTheKeyViewByJsonHints) {
   WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
   WriteFileAtomic(Path("hints.json"),
                   R"([{"x": 60, "y": 30, "radius": 4, "color": "#2f6f7f"},
@@ -249,7 +249,7 @@ TEST_F(ColorizeTest, HintsAsJsonColorTheKeyView) {
       << client.Err();
   EXPECT_EQ(colored.state(), v1::Job::STATE_SUCCEEDED) << colored.error().message() << client.Err();
   EXPECT_EQ(NewestJob("select_key_view").spec().select_key_view().view(), "view003");
-  client.Kill();  // the job goes on without its client
+  client.Kill();  // the job continues without its client
   EXPECT_TRUE(server().IsHealthy());
   const ProcessResult cancel = Client({"job", "cancel", NewestJob("colorize_scene").name()});
   EXPECT_EQ(cancel.exit_code, 0) << cancel.err;
@@ -284,7 +284,7 @@ TEST_F(ColorizeTest, TimeBudgetShortensTheSchedules) {
   EXPECT_GT(metrics["psnr_l"].get<double>(), 17.0);
 }
 
-TEST_F(ColorizeTest, DetachReturnsAtOnceAndWatchAttachesAgain) {
+TEST_F(ColorizeTest, DetachReturnsAtOnceAndWatchReattaches) {
   WriteProceduralScene(Path("room"), SmallRoom(6));
   const ProcessResult detached = Client(std::vector<std::string>{"colorize",
                                                                  Path("room").string(),

@@ -72,7 +72,7 @@ class CorrectTest : public ServiceTest {
   }
 };
 
-TEST_F(CorrectTest, NamesPlacesThenAStrokeIsSeenInTheSceneAndCanBeTakenBack) {
+TEST_F(CorrectTest, ProposesPlacesAppliesAStrokeAndUndoesIt) {
   const std::string before = ReadFile(Path("out") / "model.c3g");
   const json proposed = Correct({});
   ASSERT_FALSE(proposed.at("proposals").empty());
@@ -84,7 +84,7 @@ TEST_F(CorrectTest, NamesPlacesThenAStrokeIsSeenInTheSceneAndCanBeTakenBack) {
   EXPECT_EQ(ReadFile(Path("out") / "model.c3g"), before) << "nothing was to be changed";
   EXPECT_EQ(Done(proposed), std::set<std::string>{"correct_colors"});
 
-  // What the user paints is not overwritten.
+  // The user's paint is not overwritten.
   Image painted = to_paint;
   for (int i = 0; i < 40 * 40; ++i) painted.At(0, 20 + i / 40, 20 + i % 40) = 0.9f;
   const std::string mine = EncodePng8(painted);
@@ -116,7 +116,7 @@ TEST_F(CorrectTest, NamesPlacesThenAStrokeIsSeenInTheSceneAndCanBeTakenBack) {
   ExpectRefused({"--undo", "1"}, "this scene has 0 corrections");
 }
 
-TEST_F(CorrectTest, SaturationAndWhiteBalanceOfTheWholeScene) {
+TEST_F(CorrectTest, ChangesSaturationAndWhiteBalance) {
   Correct({"--saturation", "0"});
   const Image gray = LabFromSrgb(ReadImage(Path("out") / "renders" / kView));
   double chroma = 0.0;
@@ -130,7 +130,7 @@ TEST_F(CorrectTest, SaturationAndWhiteBalanceOfTheWholeScene) {
   ExpectRefused({"--saturation", "9"}, "saturation");
 }
 
-TEST_F(CorrectTest, BadInputSaysWhatToDo) {
+TEST_F(CorrectTest, RefusesBadInputWithARemedy) {
   ExpectRefused({"--view", "nobody", "--at", "5,5", "--color", "#ff0000"}, "nobody");
   ExpectRefused({"--view", "view002", "--at", "5000,5", "--color", "#ff0000"}, "outside");
   ExpectRefused({"--view", "view002", "--at", "5;5", "--color", "#ff0000"}, "give X,Y");

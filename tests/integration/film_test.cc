@@ -82,7 +82,7 @@ class FilmTest : public ServiceTest {
   }
 };
 
-TEST_F(FilmTest, FramesComeBackInColor) {
+TEST_F(FilmTest, ColorsFoldersOfFrames) {
   WriteFrames();
   const ProcessResult result =
       Colorize(Path("frames"), {"--film", "--benchmark", "--key-view", "n109", "--png"});
@@ -110,7 +110,7 @@ TEST_F(FilmTest, FramesComeBackInColor) {
   EXPECT_THAT(turned.err, HasSubstr("coloured without poses, so no camera can move through it"));
 }
 
-TEST_F(FilmTest, ABenchmarkTakesAFilm) {
+TEST_F(FilmTest, BenchmarkTakesAFilm) {
   const ProcessResult result =
       Colorize(WriteVideo(),
                {"--benchmark", "--key-view", "f000009", "--set", "import_scene.film_end_s=1.2"});
@@ -124,7 +124,7 @@ TEST_F(FilmTest, ABenchmarkTakesAFilm) {
   EXPECT_NEAR(movie.times()[12], 1.0, 1e-3) << "at the film's own rate, 12 a second";
 }
 
-TEST_F(FilmTest, CopiesOfAFilmAreNamed) {
+TEST_F(FilmTest, NamesCopiesOfAFilm) {
   fs::create_directories(Path("films"));
   fs::rename(WriteVideo(), Path("films") / "walk.mp4");
   fs::copy_file(Path("films") / "walk.mp4", Path("films") / "walk (1).mp4");
@@ -134,7 +134,7 @@ TEST_F(FilmTest, CopiesOfAFilmAreNamed) {
   EXPECT_THAT(result.err, HasSubstr("walk (1).mp4 is the same film as walk.mp4"));
 }
 
-TEST_F(FilmTest, PosesAreLookedForOnRequestOnly) {
+TEST_F(FilmTest, EstimatesPosesOnRequestOnly) {
   WriteFramesOfAStillCamera();
   const ProcessResult refused = Colorize(Path("frames"), {"--poses"});
   EXPECT_EQ(refused.exit_code, 2);
@@ -148,7 +148,7 @@ TEST_F(FilmTest, PosesAreLookedForOnRequestOnly) {
   EXPECT_EQ(off.err.find("stands still"), std::string::npos);
 }
 
-TEST_F(FilmTest, PosesThatTheSelectionAskedForAreAskedForWhenItsKeyViewIsAccepted) {
+TEST_F(FilmTest, AcceptedKeyViewKeepsThePosesOption) {
   WriteFramesOfAStillCamera();
   const std::string key = Path("key").string();
   const ProcessResult select = Client({"key",
@@ -184,7 +184,7 @@ TEST_F(FilmTest, PosesThatTheSelectionAskedForAreAskedForWhenItsKeyViewIsAccepte
   EXPECT_EQ(turned.exit_code, 0) << turned.err;
 }
 
-TEST_F(FilmTest, APersonalizeJobOfItsOwnLearnsAtTheSizeOfFrames) {
+TEST_F(FilmTest, SeparatePersonalizeJobTrainsAtFrameSize) {
   WriteFrames();
   const std::string key = Path("key").string();
   ASSERT_EQ(Client({"key", "select", Path("frames").string(), "--film", "-o", key}).exit_code, 0);
@@ -202,7 +202,7 @@ TEST_F(FilmTest, APersonalizeJobOfItsOwnLearnsAtTheSizeOfFrames) {
   EXPECT_THAT(ReadFile(Path("colorizer") / "colorizer.c3c"), HasSubstr(R"(max_side_px\":500)"));
 }
 
-TEST_F(FilmTest, AVideoIsColoredFromOnePaintedFrame) {
+TEST_F(FilmTest, ColorsAVideoFromOnePaintedFrame) {
   const fs::path film = WriteVideo();
   const ProcessResult select = Colorize(film, {});
   ASSERT_EQ(select.exit_code, 0) << select.err;
@@ -230,7 +230,7 @@ TEST_F(FilmTest, AVideoIsColoredFromOnePaintedFrame) {
 }
 
 // Only the left half is painted, where the thing walks; the rest is open.
-TEST_F(FilmTest, APartlyPaintedFrameColorsWhatItPaints) {
+TEST_F(FilmTest, PartlyPaintedFrameColorsOnlyItsPaint) {
   WriteFrames();
   const Image truth = FrameOf(6);
   Image painted(kWidth, kHeight, 4);
@@ -257,11 +257,11 @@ TEST_F(FilmTest, APartlyPaintedFrameColorsWhatItPaints) {
   }
 }
 
-TEST_F(FilmTest, ARangeOfTimeIsRecoloredAndNothingElseIsMadeAnew) {
+TEST_F(FilmTest, RecolorsATimeRangeAndReusesTheRest) {
   WriteFrames();
   WriteFileAtomic(Path("painted.png"), EncodePng8(FrameOf(8)));
   Image red = FrameOf(12);
-  std::swap_ranges(red.Plane(0), red.Plane(1), red.Plane(2));  // what is blue becomes red
+  std::swap_ranges(red.Plane(0), red.Plane(1), red.Plane(2));  // blue becomes red
   WriteFileAtomic(Path("red.png"), EncodePng8(red));
   const std::vector<std::string> film = {
       "--film", "--key-view", "n108", "--key-color", Path("painted.png").string()};
@@ -323,7 +323,7 @@ TEST_F(FilmTest, ARangeOfTimeIsRecoloredAndNothingElseIsMadeAnew) {
   EXPECT_THAT(Colorize(Path("frames"), as_photos).err, HasSubstr("is for films without poses"));
 }
 
-TEST_F(FilmTest, TheSelectionTakesFramesOfAFilm) {
+TEST_F(FilmTest, SelectionTakesFramesOfAFilm) {
   WriteFrames();
   const ProcessResult select = Client({"key",
                                        "select",
@@ -350,7 +350,7 @@ TEST_F(FilmTest, TheSelectionTakesFramesOfAFilm) {
   EXPECT_THAT(stored.err, HasSubstr("--film is for a folder"));
 }
 
-TEST_F(FilmTest, SoundAndUnevenTimesGoAlong) {
+TEST_F(FilmTest, KeepsSoundAndUnevenTimes) {
   ThreadPool pool(1);
   Mp4Writer writer(Path("silent.mp4"),
                    {.width = kWidth,
@@ -378,7 +378,7 @@ TEST_F(FilmTest, SoundAndUnevenTimesGoAlong) {
   EXPECT_NEAR(static_cast<double>(onset) / sound.sample_rate, 0.5, 0.01);
 }
 
-TEST_F(FilmTest, WhatIsNoFilmIsRefused) {
+TEST_F(FilmTest, RefusesFilesThatAreNoFilm) {
   WriteFileAtomic(Path("text.mp4"), "this is no film");
   const ProcessResult text = Colorize(Path("text.mp4"), {"--auto"});
   EXPECT_NE(text.exit_code, 0);

@@ -95,7 +95,7 @@ Image KeyColorTest::Colored(const v1::Job& job) {
   return ReadImage(Download(job) / "key_view_colored.png");
 }
 
-TEST_F(KeyColorTest, ABackendColorsTheKeyViewAndItsFactsAreTold) {
+TEST_F(KeyColorTest, BackendColorsTheKeyViewAndIsReported) {
   const ExampleBackend backend(Path("backend"), "127.0.0.1:0");
   ASSERT_NE(backend.address(), "");
   StartServer({"--backend", "example=" + backend.address()});
@@ -121,7 +121,7 @@ TEST_F(KeyColorTest, ABackendColorsTheKeyViewAndItsFactsAreTold) {
       << asked_too_much.error().message();
 }
 
-TEST_F(KeyColorTest, ABackendThatIsDownFailsTheJobWithARemedyAndARetryFindsItUp) {
+TEST_F(KeyColorTest, RetrySucceedsWhenTheBackendIsBack) {
   auto backend = std::make_unique<ExampleBackend>(Path("backend"), "127.0.0.1:0");
   const std::string address = backend->address();
   ASSERT_NE(address, "");
@@ -180,7 +180,7 @@ TEST_F(KeyColorTest, RetryColorsOnlyTheKeyViewThatFailed) {
   EXPECT_EQ(Client({"job", "cancel", parent}).exit_code, 0);
 }
 
-TEST_F(KeyColorTest, CancellingTheJobStopsTheBackendsWork) {
+TEST_F(KeyColorTest, CancellingTheJobStopsTheBackend) {
   const ExampleBackend backend(Path("backend"), "127.0.0.1:0", {"--delay-ms", "5000"});
   StartServer({"--backend", "slow=" + backend.address()});
   WriteProceduralScene(Path("room"), SmallRoom(4, /*gray=*/true));
@@ -198,7 +198,7 @@ TEST_F(KeyColorTest, CancellingTheJobStopsTheBackendsWork) {
 }
 
 // The whole pipeline, from photos alone.
-TEST_F(KeyColorTest, AutoNeedsNothingOfTheUser) {
+TEST_F(KeyColorTest, AutoNeedsNoInput) {
   StartServer();
   WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
   const ProcessResult result =
@@ -214,7 +214,7 @@ TEST_F(KeyColorTest, AutoNeedsNothingOfTheUser) {
 }
 
 // Red and blue swapped, allowed on the left half only.
-TEST_F(KeyColorTest, AnEditChangesColorInsideItsMaskOnly) {
+TEST_F(KeyColorTest, EditChangesColorInsideItsMaskOnly) {
   StartServer();
   WriteProceduralScene(Path("room"), SmallRoom(4));
   const Image photo = ReadImage(Path("room") / "images" / "view002.png");
@@ -253,7 +253,7 @@ TEST_F(KeyColorTest, AnEditChangesColorInsideItsMaskOnly) {
   EXPECT_LT(outside, 2.5) << "8 bits round that much";
 }
 
-TEST_F(KeyColorTest, NamesThatTheServerDoesNotKnowAreRefusedAtOnce) {
+TEST_F(KeyColorTest, RefusesUnknownModelNamesAtOnce) {
   StartServer();
   WriteProceduralScene(Path("room"), SmallRoom(4, /*gray=*/true));
   const Lines command{"colorize", Path("room").string(), "-o", Path("out").string()};
@@ -265,7 +265,7 @@ TEST_F(KeyColorTest, NamesThatTheServerDoesNotKnowAreRefusedAtOnce) {
   ExpectRefusal(Client(command + Lines{"--auto", "--script", "mine"}), 2, {"one source"});
 }
 
-TEST_F(KeyColorTest, AServerDoesNotStartWithModelsThatItCannotUse) {
+TEST_F(KeyColorTest, ServerRefusesUnusableModels) {
   const auto complaint = [&](const Lines& flags) {
     try {
       StartServer(flags);

@@ -1,4 +1,4 @@
-// `color3d key`: select, colour, look, accept, then colour the scene with what was accepted.
+// `color3d key`: select, colour, look, accept, then colour the scene with the accepted key view.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ class KeyTest : public ServiceTest {
   }
 };
 
-TEST_F(KeyTest, SelectColorLookAcceptAndColorTheSceneWithoutDoingItAgain) {
+TEST_F(KeyTest, AcceptedKeyViewIsNotColoredAgain) {
   const std::string out = Path("key").string();
   const ProcessResult select = Client({"key", "select", Path("room").string(), "-o", out});
   ASSERT_EQ(select.exit_code, 0) << select.out << select.err;
@@ -84,7 +84,7 @@ TEST_F(KeyTest, SelectColorLookAcceptAndColorTheSceneWithoutDoingItAgain) {
                 {"additional key view", other});
 }
 
-TEST_F(KeyTest, AnotherViewAndAnOlderColorCanBeTaken) {
+TEST_F(KeyTest, AcceptsAnotherViewAndAnOlderColor) {
   const std::string room = Path("room").string(), out = Path("key").string();
   WriteFileAtomic(Path("hints.json"), R"([{"x": 60, "y": 30, "radius": 4, "color": "#2f6f7f"}])");
   const auto color = [&](const std::string& view) {
@@ -105,7 +105,7 @@ TEST_F(KeyTest, AnotherViewAndAnOlderColorCanBeTaken) {
             "view001.png");
 }
 
-TEST_F(KeyTest, EveryStrategySharesTheFeaturesOfTheFirst) {
+TEST_F(KeyTest, StrategiesShareFeatures) {
   const std::string room = Path("room").string(), out = Path("key").string();
   RunJson({"key", "select", room, "-o", out});
   const fs::path cache = Path("server") / "data" / "cache" / "view_features";
@@ -118,7 +118,7 @@ TEST_F(KeyTest, EveryStrategySharesTheFeaturesOfTheFirst) {
   EXPECT_EQ(ListFiles(cache), entries);
 }
 
-TEST_F(KeyTest, RefusalsSayWhatToDo) {
+TEST_F(KeyTest, RefusalsNameTheRemedy) {
   ExpectRefusal(Client({"key", "accept", "scenes/nothing"}), 2, {"scenes/nothing"});
   ExpectRefusal(Client({"key", "select", "no such folder"}), 2, {"neither a folder", "scene list"});
   const std::string room = Path("room").string();

@@ -93,7 +93,7 @@ TEST_F(KeyViewsTest, ColorsThreeKeyViewsOnceAndReportsThem) {
   EXPECT_TRUE(NewestJob("carry_color").cached());
 }
 
-TEST_F(KeyViewsTest, ABenchmarkChoosesSeveralAndTheGeometryIsMadeOnce) {
+TEST_F(KeyViewsTest, BenchmarkChoosesSeveralForOneGeometry) {
   WriteProceduralScene(Path("room"), SmallRoom(8));
   const auto benchmark = [&](const std::string& out, const std::vector<std::string>& more) {
     return Client(std::vector<std::string>{
@@ -136,7 +136,7 @@ TEST_F(KeyViewsTest, ABenchmarkChoosesSeveralAndTheGeometryIsMadeOnce) {
   EXPECT_EQ(json::parse(select.out).at("key_views").size(), 2u);
 }
 
-// What the service is given of a photo in a benchmark: its L, in 16 bits.
+// The photo as the client sends it in a benchmark: L in 16 bits.
 std::vector<float> GrayLevels(const Image& srgb) {
   std::vector<float> levels;
   for (const float l : LuminanceFromSrgb(srgb).data) {
@@ -239,7 +239,7 @@ class GuardTest : public ServiceTest {
 };
 
 // Nothing but the key view's colours may reach a benchmark's model.
-TEST_F(GuardTest, ColoursOfOtherPhotosDoNotReachTheModel) {
+TEST_F(GuardTest, ColorsOfOtherPhotosDoNotReachTheModel) {
   ProceduralSceneOptions options = SmallRoom(5);
   options.width = 160;
   options.height = 120;
@@ -259,7 +259,7 @@ TEST_F(GuardTest, ColoursOfOtherPhotosDoNotReachTheModel) {
     }
     EXPECT_GT(changed, photo.data.size() / 2) << name;
   }
-  // Pictures in colour that nobody asks for.
+  // Colour pictures that the job does not request.
   for (const char* room : {"first", "second"}) {
     std::filesystem::create_directories(Path(room) / "augment");
     std::filesystem::copy_file(Path(room) / "images/view001.png", Path(room) / "augment/a.png");

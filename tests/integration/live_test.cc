@@ -51,7 +51,7 @@ class LiveTest : public ServiceTest {
   }
 };
 
-TEST_F(LiveTest, PreviewColorsAHandfulWithoutAJob) {
+TEST_F(LiveTest, PreviewColorsPhotosWithoutAJob) {
   const std::string key = (Path("room") / "truth" / "view003.png").string();
   const json answer =
       RunJson({"preview", Path("room").string(), "--key-color", key, "-o", Path("out").string()});
@@ -74,7 +74,7 @@ TEST_F(LiveTest, PreviewColorsAHandfulWithoutAJob) {
   for (const pid_t pid : family) EXPECT_FALSE(IsAlive(pid)) << "left behind";
 }
 
-TEST_F(LiveTest, APersonalizedColorizerColorsOtherPhotosOfItsScene) {
+TEST_F(LiveTest, PersonalizedColorizerColorsOtherPhotos) {
   const std::string scene = Personalize();
   const json list = RunJson({"colorizer", "list"});
   ASSERT_EQ(list.at("colorizers").size(), 1u);
@@ -95,7 +95,7 @@ TEST_F(LiveTest, APersonalizedColorizerColorsOtherPhotosOfItsScene) {
   EXPECT_EQ(preview.at("files").size(), 3u);
 }
 
-TEST_F(LiveTest, RefusalsSayWhatToDo) {
+TEST_F(LiveTest, RefusalsNameTheRemedy) {
   const std::string room = Path("room").string(), out = Path("out").string();
   ExpectRefusal(Client({"colorizer", "apply", "scenes/none", room, "-o", out}), 2, {"scenes/none"});
   ExpectRefusal(

@@ -1,4 +1,4 @@
-// Masks of photos through the service: what they leave out counts neither in training nor in
+// Masks of photos through the service: masked pixels count neither in training nor in
 // scores.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -54,7 +54,7 @@ class MasksTest : public ServiceTest {
   }
 };
 
-TEST_F(MasksTest, WhatStandsBeforeTheSceneIsLeftOut) {
+TEST_F(MasksTest, LeavesOutMaskedForeground) {
   WriteSpoiltRoom();
   const ProcessResult plain = Colorize("plain");
   ASSERT_EQ(plain.exit_code, 0) << plain.err;
@@ -80,7 +80,7 @@ TEST_F(MasksTest, WhatStandsBeforeTheSceneIsLeftOut) {
   EXPECT_THAT(stroke.err, HasSubstr("masked out"));
 }
 
-TEST_F(MasksTest, BadMasksAreRefusedByName) {
+TEST_F(MasksTest, RefusesBadMasksByName) {
   WriteSpoiltRoom();
   const std::string first = ListFiles(Path("masks")).at(0);
   const std::vector<std::string> options = {"--masks", Path("masks").string()};

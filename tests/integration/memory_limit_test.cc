@@ -1,4 +1,5 @@
-// Workers keep to their memory limit: what needs more fails with the numbers, and the rest goes on.
+// Workers keep to their memory limit: a job that needs more fails with the figures; others
+// continue.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -93,7 +94,7 @@ class MemoryLimitTest : public ServiceTest {
   }
 };
 
-TEST_F(MemoryLimitTest, ManyHugePhotosFailWithTheNumbersAndOtherJobsGoOn) {
+TEST_F(MemoryLimitTest, HugePhotosFailWithFiguresAndSpareOtherJobs) {
   ExpectOtherJobsGoOn();
   const int pid = WorkerPid();
   ASSERT_GT(pid, 0);
@@ -126,8 +127,8 @@ TEST_F(MemoryLimitTest, ManyHugePhotosFailWithTheNumbersAndOtherJobsGoOn) {
   EXPECT_EQ(WorkerPid(), pid) << "the same worker went on";
 }
 
-// The photos are small, and what is given as their colour is not.
-TEST_F(MemoryLimitTest, AHugeKeyPictureFailsWithTheNumbers) {
+// Small photos with a huge coloured picture.
+TEST_F(MemoryLimitTest, HugeKeyPictureFailsWithFigures) {
   ExpectOtherJobsGoOn();
   const int pid = WorkerPid();
   WriteFlatPng(Path("view001.png"), 16'000, 12'000, 3, 100);

@@ -26,7 +26,7 @@ class MovieTest : public ServiceTest {
   void ExpectBadInput();
 };
 
-TEST_F(MovieTest, TurntableAndPathsOfAFolderOfResultsAJobAndAScene) {
+TEST_F(MovieTest, RendersPathsOfResultsJobsAndScenes) {
   const ProcessResult turned = Client({"turntable", Out(), "--seconds", "1", "--fps", "12"});
   ASSERT_EQ(turned.exit_code, 0) << turned.err;
   EXPECT_NE(turned.out.find("turntable.mp4"), std::string::npos) << turned.out;
@@ -82,7 +82,7 @@ TEST_F(MovieTest, TurntableAndPathsOfAFolderOfResultsAJobAndAScene) {
   ExpectBadInput();
 }
 
-// What is wrong is told in a line, with exit code 2, and leaves no file.
+// Wrong input ends with one line, exit code 2 and no file.
 void MovieTest::ExpectBadInput() {
   const std::string file = Path("bad.mp4").string();
   ExpectRefusal(Client({"turntable", Path("nowhere").string()}), 2, {"there is no folder"});

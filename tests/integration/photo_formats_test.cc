@@ -67,7 +67,7 @@ class PhotoFormatsTest : public ServiceTest {
   }
 };
 
-TEST_F(PhotoFormatsTest, EveryFormatIsReadInALockedInWorker) {
+TEST_F(PhotoFormatsTest, SandboxedWorkerReadsEveryFormat) {
   std::vector<Image> photos;
   for (int i = 0; i < 6; ++i) photos.push_back(Photo("view00" + std::to_string(i)));
   Replace("view000", ".webp", WebpFile(photos[0]));
@@ -95,7 +95,7 @@ TEST_F(PhotoFormatsTest, EveryFormatIsReadInALockedInWorker) {
   }
 }
 
-TEST_F(PhotoFormatsTest, ResultsInTheFolderOfThePhotosAreNoPhotos) {
+TEST_F(PhotoFormatsTest, ResultsBesidePhotosAreNotPhotos) {
   const std::string images = (Path("room") / "images").string();
   std::vector<std::string> scenes;
   for (int run = 0; run < 2; ++run) {

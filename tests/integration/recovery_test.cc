@@ -1,4 +1,4 @@
-// Workers and servers that die in the middle: the work goes on where it was.
+// Killed workers and servers: jobs resume at their last checkpoint.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -88,7 +88,7 @@ class RecoveryTest : public ServiceTest {
     ExpectNoStepTwice();
   }
 
-  // The curve of an error goes on over attempts: no iteration is there twice.
+  // Error curves continue over attempts: no iteration occurs twice.
   void ExpectNoStepTwice() {
     std::istringstream csv(ReadFile(Path("out") / "curves.csv"));
     std::set<std::string> seen;
@@ -118,7 +118,7 @@ class RecoveryTest : public ServiceTest {
   }
 };
 
-TEST_F(RecoveryTest, JobOfAKilledWorkerGoesOnFromItsCheckpoint) {
+TEST_F(RecoveryTest, KilledWorkersJobResumesFromItsCheckpoint) {
   const std::unique_ptr<Process> client = StartColorize();
   const int64_t step = WaitForTheMiddle(*client);
   const std::string name = Geometry().name();
@@ -140,7 +140,7 @@ TEST_F(RecoveryTest, JobOfAKilledWorkerGoesOnFromItsCheckpoint) {
   EXPECT_FALSE(IsAlive(worker));
 }
 
-TEST_F(RecoveryTest, JobOfAKilledServerGoesOnWhenItIsBack) {
+TEST_F(RecoveryTest, KilledServersJobResumesAfterRestart) {
   const std::unique_ptr<Process> client = StartColorize();
   const int64_t step = WaitForTheMiddle(*client);
   const std::string address = server().address();
@@ -158,7 +158,7 @@ TEST_F(RecoveryTest, JobOfAKilledServerGoesOnWhenItIsBack) {
   ExpectFinished(*client);
 }
 
-TEST_F(RecoveryTest, DrainedServerReleasesItsJobWithoutCountingAnAttempt) {
+TEST_F(RecoveryTest, DrainReleasesJobsWithoutCountingAnAttempt) {
   const std::unique_ptr<Process> client = StartColorize();
   const int64_t step = WaitForTheMiddle(*client);
   client->Signal(SIGKILL);
@@ -170,7 +170,7 @@ TEST_F(RecoveryTest, DrainedServerReleasesItsJobWithoutCountingAnAttempt) {
   EXPECT_EQ(Geometry().attempt(), 1);
 }
 
-TEST_F(RecoveryTest, CancelledJobStopsSoonAndCanBeRetried) {
+TEST_F(RecoveryTest, CancelledJobStopsAndCanBeRetried) {
   const std::unique_ptr<Process> client = StartColorize();
   WaitForTheMiddle(*client);
   const std::string root = NewestJob("colorize_scene").name();

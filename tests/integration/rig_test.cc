@@ -55,7 +55,7 @@ class RigTest : public ServiceTest {
   const DynamicScene made_{{.which = DynamicCase::kSliding, .cameras = 3, .times = 9}};
 };
 
-TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
+TEST_F(RigTest, PosedFilmsBecomeADynamicScene) {
   WriteFilms();
   WriteFileAtomic(Path("painted.png"), EncodePng8(made_.RenderSrgb(made_.ViewOf(1, 3))));
   const ProcessResult result = Colorize("rig",
@@ -98,7 +98,7 @@ TEST_F(RigTest, FilmsOfCamerasWithPosesBecomeAColoredSceneThatMoves) {
   }
 }
 
-TEST_F(RigTest, OptionsOfFilmsThatARigHasNoUseForAreTold) {
+TEST_F(RigTest, ReportsFilmOptionsThatDoNotApply) {
   WriteFilms();
   const ProcessResult films = Colorize("rig", {"--deflicker"});
   EXPECT_EQ(films.exit_code, 0) << films.err;
@@ -110,7 +110,7 @@ TEST_F(RigTest, OptionsOfFilmsThatARigHasNoUseForAreTold) {
               HasSubstr("film_frames_per_second is left aside: pictures whose times and poses"));
 }
 
-TEST_F(RigTest, ScoresAreToldByHowViewsAreHeldOut) {
+TEST_F(RigTest, ScoresAreGroupedByHeldOutKind) {
   WriteFilms();  // and the pictures
   const ProcessResult result = Colorize("pictures",
                                         {"--benchmark",
@@ -133,7 +133,7 @@ TEST_F(RigTest, ScoresAreToldByHowViewsAreHeldOut) {
   EXPECT_THAT(ReadFile(Path("out") / "report.html"), HasSubstr("delta_e00_chroma_block"));
 }
 
-TEST_F(RigTest, WhatDoesNotFitIsNamed) {
+TEST_F(RigTest, NamesInputThatDoesNotFit) {
   WriteFilms();
   fs::remove(Path("rig/cam01.mp4"));
   const ProcessResult missing = Colorize("rig", {"--auto"});

@@ -36,7 +36,7 @@ Image WithNoise(Image image, double deviation) {
   return image;
 }
 
-// What goes wrong with photographs; `view` is one of the scene's, in grey.
+// Damaged photographs of a scene; `view` is one of its views, in grey.
 Image BadFrame(const std::string& kind, const Image& view) {
   Image frame(view.width, view.height, 1);
   if (kind == "white") return Image(view.width, view.height, 1, 1.0f);
@@ -132,12 +132,12 @@ class SelectTest : public ::testing::Test {
   fs::path scene_folder_;
 };
 
-TEST_F(SelectTest, BadFramesOfTheProceduralRoomNeverWin) {
+TEST_F(SelectTest, NeverSelectsBadFramesOfTheRoom) {
   WriteProceduralScene(scratch_.path() / "room", {.views = 8, .width = 240, .height = 180});
   ExpectNoBadFrameWins(Import(scratch_.path() / "room"), /*singly=*/true);
 }
 
-TEST_F(SelectTest, BadFramesOfRealScenesNeverWin) {
+TEST_F(SelectTest, NeverSelectsBadFramesOfRealScenes) {
   const fs::path scenes = fs::path(COLOR3D_SHARED_DATA) / "scenes";
   if (!fs::exists(scenes)) GTEST_SKIP() << "no shared data";
   for (const char* name : {"fern", "banana", "fox", "sceaux"}) {
@@ -146,7 +146,7 @@ TEST_F(SelectTest, BadFramesOfRealScenesNeverWin) {
   }
 }
 
-TEST_F(SelectTest, OnlyNewPhotosAreComputedAndTheAnswerIsTheSame) {
+TEST_F(SelectTest, ComputesFeaturesOfNewPhotosOnly) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 6, .width = 160, .height = 120});
   QuietRun run;
@@ -164,7 +164,7 @@ TEST_F(SelectTest, OnlyNewPhotosAreComputedAndTheAnswerIsTheSame) {
     fs::resize_file(scratch_.path() / "cache" / "view_features" / entry, 200);
   }
   EXPECT_EQ(Select(scene, KeyViewStrategy::kCoverage), warm) << "torn entries";
-  // The pose is no part of what a photo looks like; its pixels are.
+  // Features depend on the pixels of a photo, not on its pose.
   scene.views[0].camera.fx *= 1.1;
   Select(scene, KeyViewStrategy::kCoverage);
   EXPECT_EQ(CachedViews(), 6);
@@ -173,7 +173,7 @@ TEST_F(SelectTest, OnlyNewPhotosAreComputedAndTheAnswerIsTheSame) {
   EXPECT_EQ(CachedViews(), 7);
 }
 
-TEST_F(SelectTest, TracksFallBackWithAReasonAndTheRankingIsAPicture) {
+TEST_F(SelectTest, TracksFallBackWithAReason) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 5, .width = 160, .height = 120});
   QuietRun run;
@@ -192,7 +192,7 @@ TEST_F(SelectTest, TracksFallBackWithAReasonAndTheRankingIsAPicture) {
   EXPECT_THROW(Select(scene, KeyViewStrategy::kTracks, &cancel), Error);
 }
 
-TEST_F(SelectTest, AnUnreadablePhotoIsNamed) {
+TEST_F(SelectTest, NamesAnUnreadablePhoto) {
   scene_folder_ = scratch_.path() / "room";
   WriteProceduralScene(scene_folder_, {.views = 3, .width = 160, .height = 120});
   QuietRun run;

@@ -33,7 +33,7 @@ std::vector<std::string> Lines(const std::string& text) {
   return lines;
 }
 
-// Progress and notes go to stderr too; what went wrong begins with the program's name.
+// Progress and notes go to stderr too; errors begin with the program's name.
 std::vector<std::string> Complaints(const std::string& text) {
   std::vector<std::string> lines = Lines(text);
   std::erase_if(lines, [](const std::string& line) {

@@ -76,7 +76,7 @@ class ServiceTest : public testing::Test {
   // Creates a job and waits for its end; its name. Fails the test unless it succeeds.
   std::string RunJob(const v1::JobSpec& spec) const;
 
-  // What every refusal must be: this exit code, one line of complaint on stderr, the last one, that
+  // Expects a refusal: this exit code, one line of complaint on stderr, the last one, that
   // holds all `words`, and a server that goes on.
   void ExpectRefusal(const ProcessResult& result,
                      int exit_code,

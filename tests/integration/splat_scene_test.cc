@@ -39,7 +39,7 @@ class SplatSceneServiceTest : public ServiceTest {
   }
 };
 
-TEST_F(SplatSceneServiceTest, AGreySplatComesBackInColorInItsOwnFrame) {
+TEST_F(SplatSceneServiceTest, ColorsAGraySplatInItsOwnFrame) {
   ViewerGaussians gray = BallOnGround(3000, 0.0f, 1);
   gray.position[3] = std::nanf("");
   const fs::path file = Write("bust.ply", SplatPly(gray));
@@ -68,7 +68,7 @@ TEST_F(SplatSceneServiceTest, AGreySplatComesBackInColorInItsOwnFrame) {
   EXPECT_EQ(geometry->at("reason"), "the scene's Gaussians were given");
 }
 
-TEST_F(SplatSceneServiceTest, KeyViewIsSelectedColoredAndAccepted) {
+TEST_F(SplatSceneServiceTest, SelectsColorsAndAcceptsAKeyView) {
   ThreadPool pool(2);
   const fs::path file = Write("bust.spz", EncodeSpz(BallOnGround(1500), SpzVersion::k4, pool));
   const ProcessResult selected =
@@ -84,7 +84,7 @@ TEST_F(SplatSceneServiceTest, KeyViewIsSelectedColoredAndAccepted) {
   EXPECT_THAT(Client({"scene", "list"}).out, HasSubstr("splat"));
 }
 
-TEST_F(SplatSceneServiceTest, WhatIsNoSplatIsRefusedByName) {
+TEST_F(SplatSceneServiceTest, RefusesOtherFilesByName) {
   ThreadPool pool(1);
   ViewerGaussians nan = BallOnGround(20);
   for (float& logit : nan.opacity_logit) logit = std::nanf("");

@@ -43,7 +43,7 @@ class ViewerToolsTest : public ::testing::Test {
     GTEST_SKIP() << kHowToInstall;
   }
 
-  // What the tool makes of `bytes`, as a PLY.
+  // Converts `bytes` to PLY with the tool.
   ViewerGaussians Converted(const std::string& name, const std::string& bytes) {
     const fs::path from = scratch_.path() / name, to = scratch_.path() / (name + ".ply");
     const fs::path log = scratch_.path() / "log";
@@ -70,7 +70,7 @@ GaussianModel Cloud(int degree) {
   return model;
 }
 
-TEST_F(ViewerToolsTest, SplatTransformReadsOurFilesAndSeesTheSame) {
+TEST_F(ViewerToolsTest, SplatTransformReadsOurFilesAlike) {
   ThreadPool pool(2);
   const ExportFrame frame{2.0, {1.0, -3.0, 0.5}, {0.0, 0.0, 0.0}};
   const Camera camera{160, 120, 150.0, 150.0, 80.0, 60.0};

@@ -1,4 +1,4 @@
-// What a long computation is given when nobody listens and nothing is kept, for tests and
+// Run control of a computation without progress, cancellation or checkpoints, for tests and
 // benchmarks.
 #pragma once
 

@@ -11,6 +11,7 @@
 #include "core/color/lab.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/recolor/time_ranges.h"
+#include "tests/support/scenes/wall_pan.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {
@@ -19,25 +20,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr int kWidth = 96, kHeight = 72, kFrames = 18, kKey = 7;
-
-// A pan along a wall whose colour changes from left to right.
-Image LabOf(int frame) {
-  Image lab(kWidth, kHeight, 3);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      const double u = x + 1.0 * frame;
-      double l = 50.0;
-      for (int k = 1; k <= 6; ++k) {
-        const double a = 2.1 * k + 1.3;
-        l += 4.0 * std::sin(0.13 * k * (u * std::cos(a) + y * std::sin(a)) + 2.7 * a);
-      }
-      lab.At(0, y, x) = static_cast<float>(l);
-      lab.At(1, y, x) = static_cast<float>(20.0 * std::sin(0.03 * u));
-      lab.At(2, y, x) = static_cast<float>(20.0 * std::cos(0.04 * y));
-    }
-  }
-  return lab;
-}
 
 Scene FilmOf(int frames) {
   Scene scene;
@@ -64,11 +46,11 @@ class RecolorRangesTest : public StageTest {
   RecolorRangesTest() : scene_(FilmOf(kFrames)) {
     for (int i = 0; i < kFrames; ++i) {
       WriteFileAtomic(scratch_.path() / scene_.views[i].image_file,
-                      EncodePng16(SrgbFromLab(LabOf(i))));
+                      EncodePng16(SrgbFromLab(WallPan(kWidth, kHeight, i))));
     }
     AddInput(artifact::kScene, SceneToJson(scene_));
     AddInput(artifact::kKeyView, fmt::format(R"({{"view": "f{:02}.png"}})", kKey));
-    const Image truth = LabOf(kKey);
+    const Image truth = WallPan(kWidth, kHeight, kKey);
     Image ab(kWidth, kHeight, 2);
     std::copy_n(truth.Plane(1), ab.data.size(), ab.data.begin());
     AddInput(artifact::kKeyColor, EncodeAbPng(ab));
@@ -83,7 +65,7 @@ class RecolorRangesTest : public StageTest {
   }
   // The frame painted in one other colour between two columns.
   std::filesystem::path PaintedFile(int view, float a = -25.0f, int from = 0, int to = kWidth) {
-    Image lab = LabOf(view);
+    Image lab = WallPan(kWidth, kHeight, view);
     std::fill_n(lab.Plane(1), lab.PlaneSize(), a);
     std::fill_n(lab.Plane(2), lab.PlaneSize(), -5.0f);
     const Image srgb = SrgbFromLab(lab);

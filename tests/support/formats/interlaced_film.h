@@ -10,7 +10,7 @@ namespace color3d {
 // odd.
 using FieldGray = std::function<double(int frame, int field, int x)>;
 
-// MPEG-2 at 25 frames a second; the container is told by the ending of `file`. Throws
+// MPEG-2 at 25 frames a second; the ending of `file` selects the container. Throws
 // std::runtime_error.
 void WriteInterlacedFilm(
     const std::filesystem::path& file, int width, int height, int frames, const FieldGray& gray);

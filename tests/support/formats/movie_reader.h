@@ -1,4 +1,4 @@
-// What a player sees of a movie: decoded and converted by FFmpeg's libraries.
+// Frames of a movie as a player shows them: decoded and converted by FFmpeg's libraries.
 #pragma once
 
 #include <filesystem>

@@ -22,7 +22,7 @@ struct NumberedFilm {
   bool is_flat = false;
 };
 
-// 96 x 64 px at 25 frames a second; the container is told by the ending of `file`. Below the number
+// 96 x 64 px at 25 frames a second; the ending of `file` selects the container. Below the number
 // a texture moves. False where FFmpeg's libraries here have no such encoder. Throws
 // std::runtime_error.
 bool WriteNumberedFilm(const std::filesystem::path& file, const NumberedFilm& film);

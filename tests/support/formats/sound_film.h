@@ -17,7 +17,7 @@ struct GivenSound {
   std::function<double(double)> level;  // -1..1 at a time (s, as begin_s)
 };
 
-// The pictures of `film` as they are, with sound; the container is told by the ending of `out`.
+// The pictures of `film` as they are, with sound; the ending of `out` selects the container.
 // Throws std::runtime_error.
 void AddSound(const std::filesystem::path& film,
               const GivenSound& sound,

@@ -1,4 +1,4 @@
-// A reader of .splat4d for tests, written after the format's own decoder: what a player sees.
+// A reader of .splat4d for tests, written after the format's own decoder.
 #pragma once
 
 #include <cstdint>

@@ -13,7 +13,7 @@ struct ToneStream {
   std::string encoder = "ffv1";
   std::string pixel_format = "gray";
   int width = 64, height = 48;  // px
-  // What the stream says of itself; empty: nothing.
+  // Tags of the stream; empty: none.
   std::string range = {};      // "tv", "pc"
   std::string transfer = {};   // "smpte2084", "arib-std-b67"
   std::string primaries = {};  // "bt2020"
@@ -23,7 +23,7 @@ struct ToneStream {
   std::function<double(double)> tone = [](double x) { return x; };
 };
 
-// Three equal frames at 25 a second; the container is told by the ending of `file`. False where
+// Three equal frames at 25 a second; the ending of `file` selects the container. False where
 // FFmpeg's libraries here have no such encoder. Throws std::runtime_error.
 bool WriteToneFilm(const std::filesystem::path& file, const std::vector<ToneStream>& streams);
 

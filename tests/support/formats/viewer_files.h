@@ -1,4 +1,4 @@
-// Readers of the files that the export writes for viewers, for tests: what a viewer would see. PLY,
+// Readers of the files that the export writes for viewers, for tests. PLY,
 // SOG and SPZ are the product's own (splat_file.h), the rest is here: each takes whole files and
 // throws std::runtime_error where one is not as its format says.
 #pragma once
@@ -23,7 +23,7 @@ std::map<std::string, std::string> ReadStoredZip(std::string_view bytes);
 // Which Gaussian of `file` each of `original` became: the nearest by position.
 std::vector<size_t> PartnersIn(const ViewerGaussians& file, const ViewerGaussians& original);
 
-// What the reference 3DGS renderer draws over black: 3 channels, 0..1.
+// The picture of the reference 3DGS renderer over black: 3 channels, 0..1.
 Image RenderForViewers(const ViewerGaussians& gaussians,
                        const Camera& camera,
                        const Pose& cam_from_file,

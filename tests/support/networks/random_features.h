@@ -1,5 +1,5 @@
 // A ConvNeXt that has learned nothing: random features that resemble a scattering transform (Bruna
-// & Mallat 2013). What pre-training starts from and is compared with. Deterministic: our own
+// & Mallat 2013). Start of pre-training, and its baseline. Deterministic: our own
 // generator, no torch.
 #pragma once
 

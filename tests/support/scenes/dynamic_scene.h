@@ -32,7 +32,7 @@ struct DynamicSceneOptions {
   void Validate() const;        // throws Error{kInvalidArgument}
 };
 
-// What a view shows at one position.
+// The content of a view at one position.
 struct SeenPoint {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // world, m
   double depth = 0.0;                                  // along the camera's z axis, m
@@ -86,7 +86,7 @@ class DynamicScene {
   Room room_;
   std::vector<std::vector<std::optional<Solid>>> movers_;  // per time step
   Scene scene_;
-  // Per camera that stands still, what it sees of the room; empty for cameras that move.
+  // Picture of the room for each standing camera; empty for cameras that move.
   std::vector<std::vector<RoomSample>> still_;
 };
 

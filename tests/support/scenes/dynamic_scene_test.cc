@@ -48,7 +48,7 @@ struct Differences {
 
 class EveryCase : public testing::TestWithParam<DynamicCase> {};
 
-TEST_P(EveryCase, PointsOfTheStillPartHaveTheSameColourInAllTheirViews) {
+TEST_P(EveryCase, BackgroundPointsKeepTheirColor) {
   const DynamicScene made(Small(GetParam()));
   const Scene& scene = made.scene();
   ASSERT_EQ(scene.points.size(), 200u);
@@ -75,7 +75,7 @@ TEST_P(EveryCase, PointsOfTheStillPartHaveTheSameColourInAllTheirViews) {
   EXPECT_GT(Median(differences.other), 3.0 * Median(differences.same));
 }
 
-TEST_P(EveryCase, PointsLieOnWhatStandsStillExactly) {
+TEST_P(EveryCase, PointsLieOnTheBackground) {
   const DynamicScene made(Small(GetParam()));
   for (const SparsePoint& point : made.scene().points) {
     std::set<int> cameras;
@@ -95,7 +95,7 @@ TEST_P(EveryCase, PointsLieOnWhatStandsStillExactly) {
   }
 }
 
-TEST_P(EveryCase, AMoversPointKeepsItsColourWhereItsMotionTakesIt) {
+TEST_P(EveryCase, MovingPointsKeepTheirColor) {
   const DynamicScene made(Small(GetParam()));
   Differences differences;
   double farthest = 0.0;
@@ -134,7 +134,7 @@ TEST_P(EveryCase, AMoversPointKeepsItsColourWhereItsMotionTakesIt) {
 
 // Cameras stand still: a pixel that shows no mover has one colour for ever, one that does mostly
 // another than without.
-TEST_P(EveryCase, MasksHoldAllThatChanges) {
+TEST_P(EveryCase, MasksHoldAllChanges) {
   const DynamicScene made(Small(GetParam()));
   double share = 0.0;
   int unlike = 0, masked = 0;
@@ -173,7 +173,7 @@ TEST_P(EveryCase, MasksHoldAllThatChanges) {
   }
 }
 
-TEST_P(EveryCase, MasksAndDepthAgreeWithWhatIsLookedAt) {
+TEST_P(EveryCase, MasksAndDepthAgreeWithThePicture) {
   DynamicSceneOptions options = Small(GetParam());
   options.supersampling = 3;  // the middle sample is the pixel's centre
   const DynamicScene made(options);
@@ -211,7 +211,7 @@ std::vector<double> MovingShares(DynamicCase which) {
   return shares;
 }
 
-TEST(DynamicScene, ThingsAppearVanishAndCrossWhenTheCaseSays) {
+TEST(DynamicScene, ObjectsAppearVanishAndCrossOnTime) {
   const std::vector<double> appearing = MovingShares(DynamicCase::kAppearing);
   ASSERT_EQ(appearing.size(), 12u);
   for (int t = 0; t < 12; ++t) {
@@ -225,7 +225,7 @@ TEST(DynamicScene, ThingsAppearVanishAndCrossWhenTheCaseSays) {
   for (double share : MovingShares(DynamicCase::kTurning)) EXPECT_GT(share, 0.03);
 }
 
-TEST(DynamicScene, ScenesAreAsTheImporterGivesThem) {
+TEST(DynamicScene, ScenesEqualImportedOnes) {
   DynamicSceneOptions options = Small(DynamicCase::kSliding);
   EXPECT_TRUE(DynamicScene(options).scene().capture().is_dynamic);
   EXPECT_EQ(DynamicScene(options).scene().views.size(), 36u);
@@ -296,7 +296,7 @@ TEST(DynamicScene, SameSeedSamePixelsOnAnyNumberOfThreads) {
   }
 }
 
-TEST(DynamicScene, BadOptionsAreRefused) {
+TEST(DynamicScene, RefusesBadOptions) {
   const auto refused = [](auto change) {
     DynamicSceneOptions options;
     change(options);

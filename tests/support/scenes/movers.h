@@ -1,4 +1,4 @@
-// What moves in the made-up scenes that move, and how. Pure functions.
+// Moving objects of the synthetic dynamic scenes, and their motion. Pure functions.
 #pragma once
 
 #include <optional>
@@ -27,7 +27,7 @@ std::string DynamicCaseName(DynamicCase which);
 // The inverse; throws Error{kInvalidArgument} that lists the names.
 DynamicCase DynamicCaseFromName(std::string_view name);
 
-// False for kOneStep and kStill, whose things belong to what stands still.
+// False for kOneStep and kStill, whose objects belong to the background.
 bool IsMoving(DynamicCase which);
 
 // The things at time step `step` of `times`, always in the same order; nothing while one is not

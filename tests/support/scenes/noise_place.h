@@ -9,7 +9,7 @@
 
 namespace color3d {
 
-// What a camera sees of the place `seed` from `from` px (at most 36) to the right: smooth noise,
+// Picture of the place `seed` from `from` px (at most 36) to the right: smooth noise,
 // 0.2 to 0.8, 1 channel.
 inline Image NoisePlace(uint64_t seed, int width, int height, int from) {
   constexpr int kGrainPx = 4;

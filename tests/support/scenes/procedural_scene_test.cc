@@ -37,7 +37,7 @@ double StandardDeviation(const Image& plane) {
   return std::sqrt(std::max(0.0, squares / n - (sum / n) * (sum / n)));
 }
 
-TEST(ProceduralScene, PicturesHaveTextureAndColourAndAreNotClipped) {
+TEST(ProceduralScene, PicturesAreTexturedColoredAndNotClipped) {
   const ProceduralScene room(Small());
   const Image srgb = room.RenderSrgb(2);
   EXPECT_GT(Colorfulness(srgb), 20.0);
@@ -48,7 +48,7 @@ TEST(ProceduralScene, PicturesHaveTextureAndColourAndAreNotClipped) {
   EXPECT_LT(extreme, srgb.data.size() / 50);
 }
 
-TEST(ProceduralScene, PointsLieOnTheDepthOfEveryViewThatSeesThem) {
+TEST(ProceduralScene, PointsLieOnTheDepthOfTheirViews) {
   const ProceduralScene room(Small());
   ASSERT_EQ(room.scene().points.size(), 300u);
   const Image depth = room.RenderDepth(3);
@@ -67,7 +67,7 @@ TEST(ProceduralScene, PointsLieOnTheDepthOfEveryViewThatSeesThem) {
   EXPECT_GT(close, 0.9 * checked);  // depth edges within a pixel differ
 }
 
-TEST(ProceduralScene, TheSamePointHasTheSameColourInTwoViews) {
+TEST(ProceduralScene, PointsHaveOneColorInAllViews) {
   ProceduralSceneOptions options = Small();
   options.width = 320;
   options.height = 240;

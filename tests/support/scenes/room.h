@@ -1,4 +1,4 @@
-// A furnished room made of boxes and ellipsoids, lit by one area lamp: what a ray sees and how
+// A furnished room made of boxes and ellipsoids, lit by one area lamp: where a ray ends and how
 // bright it is. World: metres, x right, y down, z into the room. Immutable, thread-safe.
 #pragma once
 

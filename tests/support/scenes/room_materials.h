@@ -1,4 +1,4 @@
-// What the surfaces of the procedural room look like: two-colour patterns with fractal brightness
+// Materials of the procedural room: two-colour patterns with fractal brightness
 // on top, so that every material has a luminance texture of its own at several scales and colour
 // can be learned from grey. Pure functions.
 #pragma once

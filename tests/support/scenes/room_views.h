@@ -1,4 +1,4 @@
-// Cameras in the made-up room and what they see of it, sample by sample. Pure functions.
+// Cameras in the procedural room and their pictures, sample by sample. Pure functions.
 #pragma once
 
 #include <optional>

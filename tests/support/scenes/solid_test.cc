@@ -16,7 +16,7 @@ Solid Make(Solid::Shape shape) {
   return solid;
 }
 
-TEST(Solid, RaysMeetASheetOnItsSurfaceFromBothSides) {
+TEST(Solid, RaysHitASheetFromBothSides) {
   const Solid sheet = Make(Solid::Shape::kSheet);
   int met = 0;
   for (const double from : {-3.0, 3.0}) {
@@ -40,7 +40,7 @@ TEST(Solid, RaysMeetASheetOnItsSurfaceFromBothSides) {
 }
 
 // The normal of the surface that rays meet, by differences.
-TEST(Solid, NormalsStandOnTheSurface) {
+TEST(Solid, NormalsArePerpendicular) {
   for (const auto shape : {Solid::Shape::kBox, Solid::Shape::kEllipsoid, Solid::Shape::kSheet}) {
     const Solid solid = Make(shape);
     const Vector3d origin(0.1, 0.0, -3.0), direction(0.01, 0.005, 1.0);
@@ -56,7 +56,7 @@ TEST(Solid, NormalsStandOnTheSurface) {
   }
 }
 
-TEST(Solid, MaterialPointsTurnAndWaveWithTheirSolid) {
+TEST(Solid, MaterialPointsMoveWithTheirSolid) {
   Solid solid = Make(Solid::Shape::kBox);
   const Vector3d corner = solid.OnMaterial(solid.InWorld({0.6, 0.4, 0.1}));
   EXPECT_LT((corner - Vector3d(0.6, 0.4, 0.1)).norm(), 1e-12);

@@ -1,4 +1,4 @@
-// Splats for tests: what other programs might give us.
+// Splat files of other programs, for tests.
 #pragma once
 
 #include <cmath>

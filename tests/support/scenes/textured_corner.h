@@ -50,7 +50,7 @@ struct CornerRay {
   bool moves = false;  // it meets the board
 };
 
-// What a ray sees: floor y = 1, wall z = 2, wall x = -1.5, and the board before them.
+// The surface that a ray meets: floor y = 1, wall z = 2, wall x = -1.5, and the board before them.
 inline CornerRay TraceCorner(const Eigen::Vector3d& origin,
                              const Eigen::Vector3d& direction,
                              const std::optional<MovingBoard>& board = {}) {

@@ -44,7 +44,7 @@ class ChaosService {
   static std::vector<Fault> AllFaults();
   int faults() const;
 
-  // Ends the server and looks at all that it leaves: what is wrong, a line each.
+  // Ends the server and checks its data folder. Returns the faults, a line each.
   std::vector<std::string> EndAndAudit();
   // Steps that were begun by more than one attempt: without one, nothing was ever taken over.
   int RepeatedSteps() const;
@@ -65,7 +65,7 @@ class ChaosService {
   std::vector<std::string> problems_;
 };
 
-// What a finished job and its children left, without the processes that did it.
+// Results of a finished job and its children, without the processes that ran it.
 std::string ResultOf(TestClient& client, const std::string& job);
 
 }  // namespace color3d::testing

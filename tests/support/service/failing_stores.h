@@ -63,7 +63,7 @@ class Faults {
   std::set<std::string> seen_;
 };
 
-// What a worker calls.
+// Calls of a worker.
 class FailingStore : public SqliteJobStore {
  public:
   FailingStore(const std::filesystem::path& file, const Clocks& clocks, Faults& faults)
@@ -133,7 +133,7 @@ class FailingStore : public SqliteJobStore {
   Faults& faults_;
 };
 
-// What workers and uploads call.
+// Calls of workers and uploads.
 class FailingBlobs : public FileBlobStore {
  public:
   FailingBlobs(const std::filesystem::path& folder, Faults& faults)

@@ -1,4 +1,4 @@
-// Jobs to plan for tests, and what the planner has made of them.
+// Jobs to plan for tests, and the graphs that the planner returned.
 #pragma once
 
 #include <gtest/gtest.h>

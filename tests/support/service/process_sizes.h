@@ -1,4 +1,4 @@
-// What processes hold, as Linux says.
+// Memory, descriptors and threads of processes, from /proc.
 #pragma once
 
 #include <sys/types.h>

@@ -26,7 +26,7 @@ TEST(Processes, MissingProgramIsExitCode127) {
   EXPECT_EQ(RunProcess({"/no/such/program"}, folder.path(), seconds(20)).exit_code, 127);
 }
 
-TEST(Processes, TimeLimitKillsTheWholeFamily) {
+TEST(Processes, TimeLimitKillsAllDescendants) {
   const ScratchFolder folder;
   // The grandchild leaves the process group, as a supervisor's workers may.
   Process process({"sh", "-c", "setsid sleep 300 & sleep 300"}, folder.path());

@@ -1,7 +1,7 @@
 // color3d-test-worker: the worker loop with scripted stages instead of the method library. Every
 // kind leaves the artifacts that its successors ask for. A select_key_view job with
 // STRATEGY_MANUAL takes its script from `view`: words separated by commas.
-//   steps=N  ms=N       N steps of so many milliseconds, a checkpoint after each
+//   steps=N  ms=N       N steps of the given milliseconds, a checkpoint after each
 //   crash, throw, oom, unavailable_once, hang (deaf to cancellation), freeze_writing (stops itself,
 //   once, while it holds the store's write lock)
 #include <signal.h>
@@ -53,7 +53,7 @@ Script ParseScript(const std::string& text) {
   return script;
 }
 
-// What other stages ask this one for; a folder gets two files.
+// Artifacts that other stages need of this one; a folder gets two files.
 std::vector<std::string> ArtifactsOf(const std::string& kind) {
   const Stage& stage = StageOf(kind);
   if (stage.leaves.empty()) return {};

@@ -40,7 +40,7 @@ class ServerProcess {
                                           folder / "data",
                                           "--workers",
                                           std::to_string(workers)};
-    // What a test does not say otherwise.
+    // Defaults.
     const std::vector<std::pair<const char*, const char*>> defaults = {
         {"--listen", "127.0.0.1:0"},
         {"--worker-program", COLOR3D_TEST_WORKER},

@@ -1,4 +1,4 @@
-// What tests of stages share: a context on a scratch folder, and a tiny scene.
+// Fixture of the tests of stages: a context on a scratch folder, and a tiny scene.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -58,7 +58,7 @@ class StageTest : public ::testing::Test {
     WriteFileAtomic(path, bytes);
     inputs_[name] = path;
   }
-  // Runs a stage and adds what it leaves to the inputs, below `folder`. Returns the names.
+  // Runs a stage and adds its artifacts to the inputs, below `folder`. Returns the names.
   template <class Stage>
   std::vector<std::string> RunForInputs(const Stage& stage, const std::string& folder = "") {
     StageContext context = MakeContext();
