@@ -52,14 +52,16 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 30))
       ->capture_default_str();
   serve->add_option("--port-file", options->port_file, "Write the address here once it is bound");
-  serve->add_option("--log-level", options->log_level, "trace, debug, info, warn, error, off")
+  serve
+      ->add_option("--log-level", options->worker.log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
-  serve->add_option("--log-format", options->log_format, "text, or json: one object a line")
+  serve->add_option("--log-format", options->worker.log_format, "text, or json: one object a line")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
   serve->add_option(
       "--metrics-listen", options->metrics_listen, "HOST:PORT that Prometheus may read (/metrics)");
-  serve->add_flag("!--no-sandbox", options->sandbox, "Do not lock workers, COLMAP and scripts in");
+  serve->add_flag(
+      "!--no-sandbox", options->worker.sandbox, "Do not lock workers, COLMAP and scripts in");
   serve->add_flag("--insecure-any-address",
                   options->insecure_any_address,
                   "Allow --listen on other than loopback addresses without TLS and tokens");
@@ -97,7 +99,7 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
           "https://HOST:PORT, or http://HOST:PORT in a network you trust; repeatable. Also "
           "COLOR3D_BACKENDS, separated by ';'")
       ->allow_extra_args(false);
-  serve->add_option("--reserve-mib", options->reserve_mib, "Disk space to keep free, MiB")
+  serve->add_option("--reserve-mib", options->worker.reserve_mib, "Disk space to keep free, MiB")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
   serve
@@ -161,13 +163,10 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
   serve->add_option("--worker-program", options->worker_program)->group("");
-  serve->add_option("--lease-seconds", options->lease_seconds)->group("");
-  serve->add_option("--heartbeat-seconds", options->heartbeat_seconds)->group("");
-  serve->add_option("--checkpoint-seconds", options->checkpoint_seconds)->group("");
-  serve->add_option("--stuck-seconds", options->stuck_seconds)->group("");
-  serve->add_option("--retry-backoff-ms", options->retry_backoff_ms)->group("");
+  VisitTimings(options->worker, [serve](const char* flag, auto& value) {
+    serve->add_option(flag, value)->group("");
+  });
   serve->add_option("--max-attempts", options->max_attempts)->group("");
-  serve->add_option("--stop-grace-seconds", options->stop_grace_seconds)->group("");
   serve->add_option("--worker-backoff-ms", options->worker_backoff_ms)->group("");
   serve->add_option("--probe-seconds", options->probe_seconds)->group("");
 }

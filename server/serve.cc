@@ -40,6 +40,7 @@
 #include "server/storage/upload_store.h"
 #include "server/store/sqlite_job_store.h"
 #include "server/worker/supervisor.h"
+#include "server/worker/worker_settings.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -126,38 +127,17 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   const int threads =
       options.threads > 0 ? options.threads : std::max(1, machine / std::max(1, options.workers));
   const int64_t memory_mib = WorkerMemoryMib(options, 0.75 / std::max(1, options.workers));
-  setup.arguments = {"--data-dir",
-                     options.data_folder.string(),
-                     "--threads",
-                     fmt::to_string(threads),
-                     "--memory-mib",
-                     fmt::to_string(memory_mib),
-                     "--log-level",
-                     options.log_level,
-                     "--log-format",
-                     options.log_format,
-                     "--lease-seconds",
-                     fmt::to_string(options.lease_seconds),
-                     "--heartbeat-seconds",
-                     fmt::to_string(options.heartbeat_seconds),
-                     "--checkpoint-seconds",
-                     fmt::to_string(options.checkpoint_seconds),
-                     "--stuck-seconds",
-                     fmt::to_string(options.stuck_seconds),
-                     "--drain-grace-seconds",
-                     fmt::to_string(options.drain_seconds * 0.75),
-                     "--stop-grace-seconds",
-                     fmt::to_string(options.stop_grace_seconds),
-                     "--retry-backoff-ms",
-                     fmt::to_string(options.retry_backoff_ms),
-                     "--reserve-mib",
-                     fmt::to_string(options.reserve_mib)};
+  WorkerSettings settings = options.worker;
+  settings.data_folder = options.data_folder;
+  settings.threads = threads;
+  settings.memory_mib = memory_mib;
+  settings.drain_grace_seconds = options.drain_seconds * 0.75;
+  setup.arguments = ToFlags(settings);
   const std::vector<std::string> model_flags = ToFlags(models);
   setup.arguments.insert(setup.arguments.end(), model_flags.begin(), model_flags.end());
-  if (!options.sandbox) setup.arguments.emplace_back("--no-sandbox");
-  setup.max_stopped = Milliseconds(3.0 * options.lease_seconds);
-  setup.max_stopped_holding = Milliseconds(options.lease_seconds / 6.0);
-  setup.max_silent = Milliseconds(std::max(3.0 * options.lease_seconds, 60.0));
+  setup.max_stopped = Milliseconds(3.0 * options.worker.lease_seconds);
+  setup.max_stopped_holding = Milliseconds(options.worker.lease_seconds / 6.0);
+  setup.max_silent = Milliseconds(std::max(3.0 * options.worker.lease_seconds, 60.0));
   setup.max_backoff = std::chrono::milliseconds(options.worker_backoff_ms);
   setup.first_backoff = std::min(setup.first_backoff, setup.max_backoff);
   return setup;
@@ -186,27 +166,16 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   // A name of its own: a worker that has outlived its server removes its socket when it ends.
   const std::string socket = "inference-" + fmt::to_string(::getpid());
   const int machine = std::max(1u, std::thread::hardware_concurrency());
-  setup->inference_arguments = {
-      "--inference",
-      socket,
-      "--data-dir",
-      options.data_folder.string(),
-      "--threads",
-      fmt::to_string(options.live_threads > 0 ? options.live_threads : machine),
-      "--memory-mib",
-      fmt::to_string(WorkerMemoryMib(options, 0.5)),
-      "--log-level",
-      options.log_level,
-      "--log-format",
-      options.log_format,
-      "--drain-grace-seconds",
-      fmt::to_string(options.drain_seconds * 0.5),
-      "--reserve-mib",
-      fmt::to_string(options.reserve_mib)};
+  WorkerSettings settings = options.worker;
+  settings.data_folder = options.data_folder;
+  settings.threads = options.live_threads > 0 ? options.live_threads : machine;
+  settings.memory_mib = WorkerMemoryMib(options, 0.5);
+  settings.drain_grace_seconds = options.drain_seconds * 0.5;
+  std::vector<std::string>& arguments = setup->inference_arguments;
+  arguments = ToFlags(settings);
   const std::vector<std::string> model_flags = ToFlags(models);
-  setup->inference_arguments.insert(
-      setup->inference_arguments.end(), model_flags.begin(), model_flags.end());
-  if (!options.sandbox) setup->inference_arguments.emplace_back("--no-sandbox");
+  arguments.insert(arguments.end(), model_flags.begin(), model_flags.end());
+  arguments.insert(arguments.end(), {"--inference", socket});
   const auto demand = std::make_shared<InferenceDemand>();
   setup->inference_demand = demand;
   InferenceLink link;
@@ -242,7 +211,7 @@ ServerSample SampleOf(const ServeOptions& options,
   sample.max_connections = connections.max;
   sample.connections_closed = connections.closed;
   sample.connections_refused = connections.refused;
-  sample.reserve_bytes = options.reserve_mib << 20;
+  sample.reserve_bytes = options.worker.reserve_mib << 20;
   if (!options.tls_certificate.empty()) {
     sample.certificate_end_s = CertificateEnd(options.tls_certificate);
   }
@@ -261,7 +230,7 @@ std::string ProbeOurselves(const RpcServer& server,
 }  // namespace
 
 void Serve(const ServeOptions& options) {
-  SetUpLog("server", options.log_level, options.log_format, {});
+  SetUpLog("server", options.worker.log_level, options.worker.log_format, {});
   if (RaiseDescriptorLimit() < kFewDescriptors) {
     spdlog::warn("only {} files and connections may be open (ulimit -n); raise it to {} or more",
                  DescriptorLimit(),
@@ -285,11 +254,11 @@ void Serve(const ServeOptions& options) {
   const Clock clock = SystemClock();
   StoreOptions store_options;
   store_options.program_version = COLOR3D_VERSION;
-  store_options.retry_backoff_ms = options.retry_backoff_ms;
+  store_options.retry_backoff_ms = options.worker.retry_backoff_ms;
   store_options.max_attempts = options.max_attempts;
   SqliteJobStore store(paths.Store(), StoreRole::kServer, SystemClocks(), store_options);
   BlobStoreOptions blob_options;
-  blob_options.reserve_bytes = options.reserve_mib << 20;
+  blob_options.reserve_bytes = options.worker.reserve_mib << 20;
   FileBlobStore blobs(paths.Blobs(), blob_options);
   Ballast ballast(paths.BallastFile(), BallastBytes(paths.root));
   RpcServerOptions rpc;
@@ -341,7 +310,7 @@ void Serve(const ServeOptions& options) {
       });
   if (!options.port_file.empty()) WriteFileAtomic(options.port_file, server.address() + "\n");
   MaintenanceTiming chores;
-  chores.reap = std::clamp(Milliseconds(options.lease_seconds / 10.0),
+  chores.reap = std::clamp(Milliseconds(options.worker.lease_seconds / 10.0),
                            std::chrono::milliseconds(100),
                            std::chrono::milliseconds(5'000));
   // No sign of life while the store cannot be read, or nobody would be answered: systemd's watchdog
@@ -350,7 +319,7 @@ void Serve(const ServeOptions& options) {
   chores.keep_uncommitted = std::chrono::hours(24) * options.keep_uncommitted_days;
   chores.low_space_bytes = options.low_space_mib << 20;
   chores.ballast = &ballast;
-  chores.reserve_bytes = options.reserve_mib << 20;
+  chores.reserve_bytes = options.worker.reserve_mib << 20;
   chores.on_life = [&probe] {
     if (probe->IsAnswering()) NotifyServiceManager("WATCHDOG=1");
   };

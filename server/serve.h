@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "server/worker/worker_settings.h"
+
 namespace color3d {
 
 struct ServeOptions {
@@ -20,15 +22,15 @@ struct ServeOptions {
   std::filesystem::path data_folder;
   std::filesystem::path port_file;  // empty: none
   int workers = 1;
+  // Passed on to the workers. `serve` sets the folder, threads, memory and grace of each itself.
+  WorkerSettings worker;
   int threads = 0;  // of each worker; 0: the machine's, shared among the workers
   // Of the inference worker; 0: the machine's.
   int live_threads = 0;
   // Of each worker, MiB; 0: three quarters of the machine's, shared among the workers, and half of
   // the machine's for the inference worker.
   int64_t worker_memory_mib = 0;
-  std::string log_level = "info";
   double drain_seconds = 20.0;
-  int64_t reserve_mib = 256;
   int64_t low_space_mib =
       512;  // free; below it no job is begun; 0: jobs are begun until it is full
   int max_unfinished_jobs = 2'000;
@@ -39,21 +41,13 @@ struct ServeOptions {
   int keep_uncommitted_days = 7;          // of scenes that were never committed; 0: for ever
   int keep_days = 0;                      // of jobs after their end, unless pinned; 0: for ever
   std::string metrics_listen;             // HOST:PORT for Prometheus; empty: none
-  bool sandbox = true;                    // workers are locked in, where the machine can
-  std::string log_format = "text";        // or "json"
   std::filesystem::path notify_secret;    // file; needed with the next
   std::vector<std::string> notify_allow;  // addresses that may be told of ended jobs
   std::vector<std::string> models;        // "NAME=FILE"
   std::vector<std::string> backends;      // "NAME=ADDRESS"
   // For tests.
   std::filesystem::path worker_program;  // empty: color3d-worker beside this program
-  double lease_seconds = 60.0;
-  double heartbeat_seconds = 10.0;
-  double checkpoint_seconds = 20.0;
-  double stuck_seconds = 900.0;
-  int64_t retry_backoff_ms = 2'000;
   int max_attempts = 3;
-  double stop_grace_seconds = 60.0;
   double probe_seconds = 10.0;  // between two looks whether the server answers
   int64_t worker_backoff_ms = 10'000;
 };

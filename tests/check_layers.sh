@@ -169,7 +169,7 @@ public server/planning asked_formats job_spec key_view_jobs plan_scenes planner 
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store chore_store client_store job job_store project_store worker_store sqlite_job_store store_file user_models
-public server/worker supervisor
+public server/worker supervisor worker_settings
 
 # Branches on the kind of a capture belong to its tables (core/catalogue/captures) and to import, which
 # determines the kind. Other sources read a property of it on at most this many lines each; lower a

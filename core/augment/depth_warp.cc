@@ -17,7 +17,7 @@ namespace {
 constexpr float kMaxDepthStep = 0.04f;
 constexpr double kMaxStretch = 2.5;      // maximum target area of a source pixel, px
 constexpr double kMinDepthShare = 0.02;  // minimum depth, relative to the source
-constexpr float kHiddenShare =
+constexpr float kOccludedDepthRatio =
     1.15f;  // relative depth behind the target's surface that counts as occluded
 
 struct Vertex {
@@ -58,7 +58,7 @@ class ForwardWarp {
         const float depth = depth_.At(0, y, x);
         if (!std::isfinite(depth)) continue;
         const float seen = target_depth.Empty() ? 0.0f : target_depth.At(0, y, x);
-        if (seen > 0.0f && depth > kHiddenShare * seen) continue;
+        if (seen > 0.0f && depth > kOccludedDepthRatio * seen) continue;
         picture.weight.At(0, y, x) = 1.0f;
         for (int c = 0; c < 3; ++c) {
           picture.lab.At(c, y, x) =

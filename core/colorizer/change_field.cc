@@ -18,7 +18,7 @@ constexpr double kSamePlace = 0.75;  // share of the maximum covariance
 constexpr double kWorthInferring = 1e-5;
 
 // Unknown positions coincide, away from all known ones.
-torch::Tensor InSpace(const torch::Tensor& positions) {
+torch::Tensor EmbedPositions(const torch::Tensor& positions) {
   const torch::Tensor known = positions.slice(1, 3, 4);
   return torch::cat({positions.slice(1, 0, 3) * known, (1.0 - known) * kUnknownApart}, 1);
 }
@@ -31,13 +31,13 @@ FieldPlaces Rows(const FieldPlaces& places, const torch::Tensor& rows) {
 }
 
 // Mean of the wanted colours, weighted by similarity.
-torch::Tensor WantedNear(const torch::Tensor& alike, const torch::Tensor& wanted) {
+torch::Tensor WeightedTarget(const torch::Tensor& alike, const torch::Tensor& wanted) {
   const torch::Tensor weights = alike.square();
   return torch::matmul(weights, wanted) / weights.sum(1, /*keepdim=*/true).clamp_min(1e-12);
 }
 
 // Returns the part of `change` that leads towards `limit`, at most up to it. Rows are (a, b).
-torch::Tensor UpTo(const torch::Tensor& limit, const torch::Tensor& change) {
+torch::Tensor LimitTo(const torch::Tensor& limit, const torch::Tensor& change) {
   const torch::Tensor length = change.square().sum(1, /*keepdim=*/true).clamp_min(1e-9);
   return change * ((limit * change).sum(1, /*keepdim=*/true) / length).clamp(0.0, 1.0);
 }
@@ -51,7 +51,7 @@ ChangeField::ChangeField(FieldPlaces places,
                          const ChangeFieldOptions& options)
     : options_(options), places_(std::move(places)), wanted_(std::move(wanted)) {
   if (wanted_.size(0) == 0) return;
-  torch::Tensor covariance = Alike(places_, places_);
+  torch::Tensor covariance = Covariance(places_, places_);
   const double most = options_.wide + options_.near;
   const torch::Tensor later = correction_of_row.unsqueeze(0) > correction_of_row.unsqueeze(1);
   const torch::Tensor repeated =
@@ -68,10 +68,10 @@ ChangeField::ChangeField(FieldPlaces places,
   inverse_ = inverse_.to(torch::kFloat32);
 }
 
-torch::Tensor ChangeField::Alike(const FieldPlaces& a, const FieldPlaces& b) const {
+torch::Tensor ChangeField::Covariance(const FieldPlaces& a, const FieldPlaces& b) const {
   const torch::Tensor looks = SquaredDistances(a.features, b.features);
   const torch::Tensor space =
-      SquaredDistances(InSpace(a.positions), InSpace(b.positions)).clamp_min_(0.0);
+      SquaredDistances(EmbedPositions(a.positions), EmbedPositions(b.positions)).clamp_min_(0.0);
   const torch::Tensor seen = (a.seen.unsqueeze(1) - b.seen.unsqueeze(0)).abs_();
   const torch::Tensor wide =
       (looks / -options_.wide_looks).exp_() / (1.0 + space.sqrt() / options_.wide_space);
@@ -83,9 +83,10 @@ torch::Tensor ChangeField::Alike(const FieldPlaces& a, const FieldPlaces& b) con
 ChangeField::Answer ChangeField::At(const FieldPlaces& places) const {
   const int64_t count = places.features.size(0);
   if (!inverse_.defined()) return {torch::zeros({count, 2}), torch::zeros({count})};
-  const torch::Tensor alike = Alike(places, places_);
+  const torch::Tensor alike = Covariance(places, places_);
   const torch::Tensor told = (torch::matmul(alike, inverse_) * alike).sum(1);
-  return {UpTo(WantedNear(alike, wanted_) - places.colors, torch::matmul(alike, inverse_x_change_)),
+  return {LimitTo(WeightedTarget(alike, wanted_) - places.colors,
+                  torch::matmul(alike, inverse_x_change_)),
           (told / (options_.wide + options_.near)).clamp_(0.0, 1.0)};
 }
 
@@ -94,9 +95,9 @@ std::vector<ChangeField::Proposal> ChangeField::Propose(const FieldPlaces& place
                                                         int count) const {
   const torch::Tensor scale = deviation.unsqueeze(1) * deviation.unsqueeze(0);
   // Posterior covariance of the places, given the painted ones.
-  torch::Tensor covariance = Alike(places, places);
+  torch::Tensor covariance = Covariance(places, places);
   if (inverse_.defined()) {
-    const torch::Tensor alike = Alike(places, places_);
+    const torch::Tensor alike = Covariance(places, places_);
     covariance -= torch::matmul(torch::matmul(alike, inverse_), alike.t());
   }
   covariance *= scale;

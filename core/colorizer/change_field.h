@@ -62,7 +62,7 @@ class ChangeField {
                                 int count) const;
 
  private:
-  torch::Tensor Alike(const FieldPlaces& a, const FieldPlaces& b) const;  // [n_a, n_b]
+  torch::Tensor Covariance(const FieldPlaces& a, const FieldPlaces& b) const;  // [n_a, n_b]
 
   ChangeFieldOptions options_;
   FieldPlaces places_;

@@ -261,7 +261,7 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
     turn.reset();
     Train(session, control, membership);
     turn.emplace(membership, control.cancel);
-    session.Conclude(control.progress);
+    session.KeepBetterParameters(control.progress);
     parts.curve = session.curve();
     parts.threads = control.pool.thread_count();
     return std::make_shared<const PersonalColorizer>(std::move(parts));

@@ -32,7 +32,7 @@ std::vector<KnownCells> FurtherCells(const TapEncoder& encoder,
   KnownCells previous;
   for (const TrainingPicture& picture : pictures.subspan(1)) {
     cancel.ThrowIfCancelled();
-    KnownCells cells = CellsOf(encoder, picture, options.relative_chroma);
+    KnownCells cells = ComputeKnownCells(encoder, picture, options.relative_chroma);
     view_noise->Add(placed(key), placed(cells), random);
     if (!found.empty()) view_noise->Add(placed(previous), placed(cells), random);
     const torch::Tensor sure = (cells.weights > options.min_weight).nonzero().squeeze(1);
@@ -53,7 +53,7 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
                                    const CancellationToken& cancel)
     : FeatureNeighbors(encoder, options, Whitening(std::vector<Whitening::Projection>()), {}) {
   torch::NoGradGuard no_grad;
-  const KnownCells key = CellsOf(encoder, pictures.front(), options.relative_chroma);
+  const KnownCells key = ComputeKnownCells(encoder, pictures.front(), options.relative_chroma);
   // Cells without a colour would make similar places grey.
   torch::Tensor colored = (key.weights > 0.0).nonzero().squeeze(1);
   if (colored.size(0) == 0) colored = torch::arange(key.weights.size(0));
@@ -145,7 +145,7 @@ NeighborColors FeatureNeighbors::Lookup(const std::vector<torch::Tensor>& taps,
   const int64_t height = cells.rows, width = cells.columns;
   CellQueries queries{whitening_.Apply(cells.blocks), {}};
   if (!position.Empty()) {
-    queries.positions = PlacesOf(position, cells.Count());
+    queries.positions = CellPositions(position, cells.Count());
   }
   torch::Tensor rows;
   if (wanted.defined()) {

@@ -23,11 +23,11 @@ struct KnownCells {
 torch::Tensor PaddedTensor(const Image& image);
 
 // Returns [count,4], the mean known position of each cell, as in CellBank.
-torch::Tensor PlacesOf(const Image& position, int64_t count);
+torch::Tensor CellPositions(const Image& position, int64_t count);
 
-KnownCells CellsOf(const TapEncoder& encoder,
-                   const TrainingPicture& picture,
-                   const RelativeChroma& relative);
+KnownCells ComputeKnownCells(const TapEncoder& encoder,
+                             const TrainingPicture& picture,
+                             const RelativeChroma& relative);
 
 // Concatenates the rows of `parts`. Requires: at least one part.
 KnownCells Join(const std::vector<KnownCells>& parts);

@@ -21,10 +21,10 @@ namespace color3d {
 namespace {
 
 constexpr uint64_t kSeed = 1;
-constexpr int64_t kMostObserved = 800;  // maximum number of cells over all corrections
-constexpr int64_t kFewest = 8;          // minimum number of cells of each correction
-constexpr double kTouched = 0.02;       // minimum painted share of a cell
-constexpr double kChanged = 3.0;        // minimum change of colour, Lab units
+constexpr int64_t kMaxObservedCells = 800;  // maximum number of cells over all corrections
+constexpr int64_t kMinCells = 8;            // minimum number of cells of each correction
+constexpr double kMinPaintedShare = 0.02;   // minimum painted share of a cell
+constexpr double kMinChange = 3.0;          // minimum change of colour, Lab units
 // The expected squared error of a colour grows with the squared distance to the training cells, up
 // to this multiple of its median.
 constexpr double kLeastVariance = 0.1;
@@ -41,7 +41,7 @@ PlacedPicture AtSide(const PlacedPicture& picture, int max_side_px) {
   return small;
 }
 
-torch::Tensor SeenOf(const Image& seen, int64_t count) {
+torch::Tensor CellSeenShares(const Image& seen, int64_t count) {
   return seen.Empty() ? torch::zeros({count})
                       : CellMeans(PaddedTensor(seen)).squeeze(1).contiguous();
 }
@@ -52,8 +52,8 @@ torch::Tensor RowsToObserve(const torch::Tensor& change,
                             const torch::Tensor& weights,
                             int64_t most,
                             Random& random) {
-  const torch::Tensor touched = weights > kTouched;
-  const torch::Tensor changed = change.square().sum(1) > kChanged * kChanged;
+  const torch::Tensor touched = weights > kMinPaintedShare;
+  const torch::Tensor changed = change.square().sum(1) > kMinChange * kMinChange;
   const auto draw = [&](const torch::Tensor& wanted) {
     const torch::Tensor rows = wanted.nonzero().squeeze(1);
     return rows.index_select(0, SampleRows(rows.size(0), most / 2, random));
@@ -114,12 +114,14 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
                               ResizeWeighted(ab, correction.painted, width, height),
                               Resize(correction.painted, width, height)};
       picture.position = small.position;
-      return CellsOf(encoder_, picture, relative_chroma_);
+      return ComputeKnownCells(encoder_, picture, relative_chroma_);
     };
     const KnownCells cells = cells_of(correction.ab);
     const torch::Tensor before = cells_of(correction.picture.ab).colors;
-    const torch::Tensor rows = RowsToObserve(
-        cells.colors - before, cells.weights, std::max(2 * kFewest, kMostObserved / count), random);
+    const torch::Tensor rows = RowsToObserve(cells.colors - before,
+                                             cells.weights,
+                                             std::max(2 * kMinCells, kMaxObservedCells / count),
+                                             random);
     if (rows.size(0) == 0) {
       throw InvalidArgument(
           "correction {} of {} paints too small an area; paint a larger one", number + 1, count);
@@ -128,7 +130,7 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
     features.push_back(learnt_.whitening().Apply(observed.blocks));
     colors.push_back(before.index_select(0, rows));
     positions.push_back(observed.positions);
-    seen.push_back(SeenOf(small.seen, cells.weights.size(0)).index_select(0, rows));
+    seen.push_back(CellSeenShares(small.seen, cells.weights.size(0)).index_select(0, rows));
     wanted.push_back(observed.colors);
     weights.push_back(observed.weights);
     numbers.push_back(torch::full({rows.size(0)}, number, torch::kInt64));
@@ -156,8 +158,8 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
     const FieldPlaces places{
         learnt_.whitening().Apply(cells.blocks),
         CellMeans(PaddedTensor(ToRelative(relative_chroma_, small.luminance, small.ab))),
-        PlacesOf(small.position, cells.Count()),
-        SeenOf(small.seen, cells.Count())};
+        CellPositions(small.position, cells.Count()),
+        CellSeenShares(small.seen, cells.Count())};
     const ChangeField::Answer answer = field_->At(places);
     const Image coarse = ImageFromTensor(torch::cat({answer.change, answer.share.unsqueeze(1)}, 1)
                                              .t()

@@ -249,7 +249,7 @@ void TrainingSession::Step(ProgressObserver& progress, ThreadPool* helpers) {
   if (Progress() * kReports >= static_cast<double>(course_.curve.size())) Report(progress);
 }
 
-void TrainingSession::Conclude(ProgressObserver& progress) {
+void TrainingSession::KeepBetterParameters(ProgressObserver& progress) {
   if (course_.stopped_early)
     progress.OnError(course_.iteration, "stopped_early_iteration", course_.iteration);
   if (average_.empty() || course_.iteration == 0) return;

@@ -47,7 +47,7 @@ class TrainingSession {
   std::string Checkpoint() const;
   // Sets the model to the better one of the last and the averaged parameters. Call once, at the
   // end.
-  void Conclude(ProgressObserver& progress);
+  void KeepBetterParameters(ProgressObserver& progress);
 
   const std::vector<TrainingPoint>& curve() const { return course_.curve; }
   int rollbacks() const { return course_.rollbacks; }

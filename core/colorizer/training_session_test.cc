@@ -38,7 +38,7 @@ class TrainingTest : public SmallColorizerTest {
         checkpoints.Save(session.Checkpoint());
       }
     }
-    session.Conclude(progress);
+    session.KeepBetterParameters(progress);
     return {session.curve(), session.rollbacks(), session.iteration(), session.stopped_early()};
   }
   static void ExpectSameParameters(const PersonalModel& x, const PersonalModel& y) {

@@ -12,6 +12,7 @@
 #include "server/worker/lease_keeper.h"
 #include "server/worker/live_engine.h"
 #include "server/worker/stage_runner.h"
+#include "server/worker/worker_settings.h"
 
 namespace color3d {
 
@@ -22,8 +23,8 @@ struct WorkerOptions {
   LeaseTiming timing;
   std::chrono::milliseconds checkpoint_interval{20'000};
   std::chrono::milliseconds poll{250};
-  int64_t retry_backoff_ms = 2'000;
-  int64_t reserve_mib = 256;  // disk space to keep free
+  int64_t retry_backoff_ms = WorkerSettings().retry_backoff_ms;
+  int64_t reserve_mib = WorkerSettings().reserve_mib;  // disk space to keep free
   // The process ends (and is started afresh) when it is idle above this, or after so many jobs:
   // torch's memory grows with the number of distinct picture sizes.
   int64_t recycle_memory_bytes = int64_t{2} << 30;

@@ -20,6 +20,7 @@
 #include "server/storage/file_blob_store.h"
 #include "server/worker/inference_worker.h"
 #include "server/worker/worker_loop.h"
+#include "server/worker/worker_settings.h"
 
 namespace color3d {
 namespace {
@@ -30,16 +31,8 @@ constexpr int64_t kMaxFileBytes = int64_t{16} << 30;
 constexpr int64_t kMaxMemoryMib = int64_t{1} << 30;
 
 struct WorkerArguments {
+  WorkerSettings settings;
   WorkerOptions options;
-  std::string log_level = "info", log_format = "text";
-  bool sandbox = true;
-  int64_t memory_mib = 0;  // 0: no limit
-  double lease_seconds = 60.0;
-  double heartbeat_seconds = 10.0;
-  double checkpoint_seconds = 20.0;
-  double stuck_seconds = 900.0;
-  double drain_grace_seconds = 15.0;
-  double stop_grace_seconds = 60.0;
   std::vector<std::string> models;
   std::vector<std::string> backends;
   std::string inference;  // socket; empty: a worker for jobs
@@ -53,11 +46,12 @@ std::chrono::milliseconds Milliseconds(double seconds) {
 
 // Flags without a group are hidden: they are set by `serve` and by tests.
 void AddFlags(CLI::App* app, WorkerArguments* arguments) {
+  WorkerSettings& settings = arguments->settings;
   WorkerOptions& options = arguments->options;
-  app->add_option("--data-dir", options.data_folder, "The server's data directory")->required();
+  app->add_option("--data-dir", settings.data_folder, "The server's data directory")->required();
   app->add_option("--name", options.name, "Name in logs and in GetServerInfo")
       ->capture_default_str();
-  app->add_option("--threads", options.threads, "Threads of computing")
+  app->add_option("--threads", settings.threads, "Threads of computing")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   app->add_option("--batch-scenes",
@@ -66,13 +60,13 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   app->add_option("--memory-mib",
-                  arguments->memory_mib,
+                  settings.memory_mib,
                   "Memory that this process may take, and each that it starts, MiB; 0: no limit")
       ->check(CLI::Range(int64_t{0}, kMaxMemoryMib));
-  app->add_flag("!--no-sandbox", arguments->sandbox, "Do not lock this process in");
-  app->add_option("--log-format", arguments->log_format, "text or json")
+  app->add_flag("!--no-sandbox", settings.sandbox, "Do not lock this process in");
+  app->add_option("--log-format", settings.log_format, "text or json")
       ->check(CLI::IsMember({"text", "json"}));
-  app->add_option("--log-level", arguments->log_level, "trace, debug, info, warn, error, off")
+  app->add_option("--log-level", settings.log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
   app->add_option("--model", arguments->models, "NAME=FILE: weights that jobs may name")
       ->allow_extra_args(false);
@@ -84,27 +78,28 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
   app->add_option("--max-batch", arguments->max_batch)->group("");
   app->add_option("--idle-seconds", arguments->idle_seconds)->group("");
   app->add_option("--parent-pid", options.parent)->group("");
-  app->add_option("--lease-seconds", arguments->lease_seconds)->group("");
-  app->add_option("--heartbeat-seconds", arguments->heartbeat_seconds)->group("");
-  app->add_option("--checkpoint-seconds", arguments->checkpoint_seconds)->group("");
-  app->add_option("--stuck-seconds", arguments->stuck_seconds)->group("");
-  app->add_option("--drain-grace-seconds", arguments->drain_grace_seconds)->group("");
-  app->add_option("--stop-grace-seconds", arguments->stop_grace_seconds)->group("");
-  app->add_option("--retry-backoff-ms", options.retry_backoff_ms)->group("");
-  app->add_option("--reserve-mib", options.reserve_mib)->group("");
+  VisitTimings(settings,
+               [app](const char* flag, auto& value) { app->add_option(flag, value)->group(""); });
+  app->add_option("--drain-grace-seconds", settings.drain_grace_seconds)->group("");
+  app->add_option("--reserve-mib", settings.reserve_mib)->group("");
   app->add_option("--recycle-jobs", options.recycle_jobs)->group("");
   app->add_option("--code-version", options.code_version)->group("");
 }
 
 void Complete(WorkerArguments* arguments) {
+  const WorkerSettings& settings = arguments->settings;
   WorkerOptions& options = arguments->options;
+  options.data_folder = settings.data_folder;
+  options.threads = settings.threads;
+  options.reserve_mib = settings.reserve_mib;
+  options.retry_backoff_ms = settings.retry_backoff_ms;
   options.release = COLOR3D_VERSION;
-  options.timing.lease = Milliseconds(arguments->lease_seconds);
-  options.timing.heartbeat = Milliseconds(arguments->heartbeat_seconds);
-  options.timing.stuck = Milliseconds(arguments->stuck_seconds);
-  options.timing.stop_grace = Milliseconds(arguments->stop_grace_seconds);
-  options.timing.drain_grace = Milliseconds(arguments->drain_grace_seconds);
-  options.checkpoint_interval = Milliseconds(arguments->checkpoint_seconds);
+  options.timing.lease = Milliseconds(settings.lease_seconds);
+  options.timing.heartbeat = Milliseconds(settings.heartbeat_seconds);
+  options.timing.stuck = Milliseconds(settings.stuck_seconds);
+  options.timing.stop_grace = Milliseconds(settings.stop_grace_seconds);
+  options.timing.drain_grace = Milliseconds(settings.drain_grace_seconds);
+  options.checkpoint_interval = Milliseconds(settings.checkpoint_seconds);
   options.models = ParseUserModels(arguments->models, arguments->backends);
   // Another build may compute something else: its results are not taken for ours.
   if (options.code_version.empty()) {
@@ -174,8 +169,8 @@ void LimitMemory(int64_t memory_mib) {
 
 // What this process decodes is strangers'. Threads that were there before are OpenBLAS's own.
 void LockIn(const WorkerArguments& arguments) {
-  SetSandboxing(arguments.sandbox);
-  if (!arguments.sandbox) return;
+  SetSandboxing(arguments.settings.sandbox);
+  if (!arguments.settings.sandbox) return;
   ProcessLimits limits;  // cores would hold what strangers uploaded
   limits.file_bytes = kMaxFileBytes;
   SandboxRules rules;
@@ -184,7 +179,7 @@ void LockIn(const WorkerArguments& arguments) {
   for (const auto& [name, file] : models.files) {
     for (const std::filesystem::path& part : FilesOfModel(file)) rules.readable.push_back(part);
   }
-  rules.writable = {arguments.options.data_folder, std::filesystem::temp_directory_path()};
+  rules.writable = {arguments.settings.data_folder, std::filesystem::temp_directory_path()};
   rules.sockets = Sockets::kAll;  // model servers
   rules.may_start_processes = true;
   const Sandbox sandbox(rules);
@@ -200,18 +195,18 @@ void LockIn(const WorkerArguments& arguments) {
 }
 
 void ServeInference(const WorkerArguments& arguments, const WorkerProgram& program) {
-  const DataPaths paths(arguments.options.data_folder);
-  FileBlobStore blobs(paths.Blobs(), {arguments.options.reserve_mib << 20});
+  const DataPaths paths(arguments.settings.data_folder);
+  FileBlobStore blobs(paths.Blobs(), {arguments.settings.reserve_mib << 20});
   const std::unique_ptr<LiveEngine> engine = program.make_engine(
-      {blobs, ParseUserModels(arguments.models, arguments.backends), arguments.options.threads});
+      {blobs, ParseUserModels(arguments.models, arguments.backends), arguments.settings.threads});
   InferenceOptions options;
-  options.data_folder = arguments.options.data_folder;
+  options.data_folder = arguments.settings.data_folder;
   options.socket = arguments.inference;
   options.name = arguments.options.name;
   options.parent = arguments.options.parent;
   options.max_batch = arguments.max_batch;
   options.idle = Milliseconds(arguments.idle_seconds);
-  options.drain_grace = Milliseconds(arguments.drain_grace_seconds);
+  options.drain_grace = Milliseconds(arguments.settings.drain_grace_seconds);
   RunInference(options, *engine, g_draining);
 }
 
@@ -224,19 +219,19 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
   AddFlags(&app, &arguments);
   CLI11_PARSE(app, argc, argv);
   HandleStopSignals();
-  ShareMallocArenas(arguments.options.threads);
+  ShareMallocArenas(arguments.settings.threads);
   if (arguments.options.parent != 0) {
     // When the server dies, however it dies, this worker drains.
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != arguments.options.parent) return 1;
   }
   try {
-    const DataPaths paths(arguments.options.data_folder);
+    const DataPaths paths(arguments.settings.data_folder);
     SetUpLog(arguments.options.name,
-             arguments.log_level,
-             arguments.log_format,
+             arguments.settings.log_level,
+             arguments.settings.log_format,
              paths.Logs() / (arguments.options.name + ".log"));
-    LimitMemory(arguments.memory_mib);
+    LimitMemory(arguments.settings.memory_mib);
     LockIn(arguments);
     if (arguments.inference.empty()) {
       Complete(&arguments);

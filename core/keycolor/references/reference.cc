@@ -127,11 +127,11 @@ void AddCells(const TapEncoder& encoder,
   cells.reference.insert(cells.reference.end(), rows.size(0), reference);
 }
 
-ReferenceCells CellsOf(const std::vector<Image>& references,
-                       const Image& key_luminance,
-                       const TapEncoder& encoder,
-                       const ReferenceOptions& options,
-                       const CancellationToken& cancel) {
+ReferenceCells SampleReferenceCells(const std::vector<Image>& references,
+                                    const Image& key_luminance,
+                                    const TapEncoder& encoder,
+                                    const ReferenceOptions& options,
+                                    const CancellationToken& cancel) {
   ReferenceCells cells;
   Random random(options.seed);
   const int64_t pictures = static_cast<int64_t>(references.size() * kScales.size());
@@ -174,7 +174,8 @@ KeyMatches Match(const std::vector<Image>& references,
   torch::NoGradGuard no_grad;
   SetTorchThreads(control.pool.thread_count(), /*blas_threads=*/1);
   control.progress.OnProgress(0, 0, "describing the reference pictures");
-  const ReferenceCells known = CellsOf(references, luminance, encoder, options, control.cancel);
+  const ReferenceCells known =
+      SampleReferenceCells(references, luminance, encoder, options, control.cancel);
   std::vector<torch::Tensor> blocks;
   for (const std::vector<torch::Tensor>& parts : known.blocks) blocks.push_back(torch::cat(parts));
   // Shares follow the order of the taps, even if the finest one has a larger stride.

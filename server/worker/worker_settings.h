@@ -1,0 +1,44 @@
+// Settings that `serve` passes on to its worker processes as flags: one list of fields, defaults
+// and hidden flags for both programs. A plain value.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace color3d {
+
+struct WorkerSettings {
+  std::filesystem::path data_folder;
+  int threads = 1;
+  int64_t memory_mib = 0;  // of the process, and of each that it starts; 0: no limit
+  bool sandbox = true;     // lock the process in, where the machine can
+  std::string log_level = "info";
+  std::string log_format = "text";  // or "json"
+  int64_t reserve_mib = 256;        // disk space to keep free
+  double drain_grace_seconds = 15.0;
+  // Hidden flags of both programs, for tests (VisitTimings).
+  double lease_seconds = 60.0;
+  double heartbeat_seconds = 10.0;
+  double checkpoint_seconds = 20.0;
+  double stuck_seconds = 900.0;
+  double stop_grace_seconds = 60.0;
+  int64_t retry_backoff_ms = 2'000;
+};
+
+// Calls visit(flag, member) for each timing that is a hidden flag of `serve` and of the worker.
+template <typename Settings, typename Visit>
+void VisitTimings(Settings& settings, const Visit& visit) {
+  visit("--lease-seconds", settings.lease_seconds);
+  visit("--heartbeat-seconds", settings.heartbeat_seconds);
+  visit("--checkpoint-seconds", settings.checkpoint_seconds);
+  visit("--stuck-seconds", settings.stuck_seconds);
+  visit("--stop-grace-seconds", settings.stop_grace_seconds);
+  visit("--retry-backoff-ms", settings.retry_backoff_ms);
+}
+
+// Command line flags by which a worker process reads these settings.
+std::vector<std::string> ToFlags(const WorkerSettings& settings);
+
+}  // namespace color3d
