@@ -15,7 +15,7 @@ class OutFolderTest : public testing::Test {
     fs::create_directory(out_);
     fs::create_directory(elsewhere_);
   }
-  // What SafePathBelow throws for the name; empty when it throws nothing.
+  // Returns the message of SafePathBelow for the name; empty if it does not throw.
   std::string Refusal(const std::string& name) {
     try {
       SafePathBelow(out_, name);

@@ -44,7 +44,7 @@ CaptureLayout LayoutOfName(std::string_view name);
 // nothing else fits.
 CaptureLayout DetectCapture(const std::vector<std::string>& files);
 
-// What import makes of a capture.
+// Kind of scene that import makes of a capture.
 enum class CaptureKind {
   kStatic,   // posed views of a place, without times
   kFilm,     // frames of one camera without poses: coloured, not reconstructed

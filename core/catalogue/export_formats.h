@@ -13,7 +13,7 @@ namespace color3d {
 
 enum class ExportFormat { kPly, kSog, kSpz, kGlb, kSplat, kSplat4d, kMoments };
 
-// Whether a format is written when its option is unset.
+// Default of the option of a format.
 enum class ExportDefault {
   kOff,
   kOn,

@@ -169,8 +169,8 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
       AllOrNone(frames, "camera", [](const FrameTime& f) { return !f.camera.empty(); });
   std::vector<double> times = ShiftedTimes(frames);
   if (*std::max_element(times.begin(), times.end()) == 0.0) {
-    result.note = fmt::format("all {} frames were taken at one time: a scene that stands still",
-                              frames.size());
+    result.note =
+        fmt::format("all {} frames were taken at one time: the scene is static", frames.size());
     return result;
   }
   const bool by_folder = !named && SomeShareATime(times);

@@ -154,8 +154,8 @@ Image ReadMask(const fs::path& scene_folder,
   }
   if (!any) {
     throw InvalidArgument(
-        "{} leaves nothing of the photo: white is what counts, black what is ignored; leave the "
-        "photo out or mend it",
+        "{} masks out the whole photo: white is used, black is ignored; correct the mask or "
+        "leave the photo out",
         what);
   }
   return mask;

@@ -94,7 +94,8 @@ TEST_F(PhotoMasksTest, NamesBadMasks) {
   EXPECT_THAT(ErrorOf(read),
               AllOf(HasSubstr("masks/a.png"), HasSubstr("6 x 8 px"), HasSubstr("8 x 6 px")));
   Write("masks/a.png", EncodePng8(Image(8, 6, 1, 0.4f)));
-  EXPECT_THAT(ErrorOf(read), AllOf(HasSubstr("masks/a.png"), HasSubstr("leaves nothing")));
+  EXPECT_THAT(ErrorOf(read),
+              AllOf(HasSubstr("masks/a.png"), HasSubstr("masks out the whole photo")));
   Write("masks/a.png", "garbage");
   EXPECT_THAT(ErrorOf(read), HasSubstr("masks/a.png"));
 }

@@ -93,7 +93,7 @@ TEST_F(MasksTest, RefusesBadMasksByName) {
   WriteFileAtomic(Path("masks") / first, EncodePng8(Image(photo.width, photo.height, 1, 0.0f)));
   const ProcessResult black = Colorize("out", options);
   EXPECT_NE(black.exit_code, 0);
-  EXPECT_THAT(black.err, HasSubstr("leaves nothing of the photo"));
+  EXPECT_THAT(black.err, HasSubstr("masks out the whole photo"));
   EXPECT_FALSE(fs::exists(Path("out") / "scene.ply"));
   Image clear(photo.width, photo.height, 4, 0.5f);
   std::fill_n(clear.Plane(3), clear.PlaneSize(), 0.0f);
@@ -101,7 +101,7 @@ TEST_F(MasksTest, RefusesBadMasksByName) {
   const ProcessResult transparent = Colorize("out");
   EXPECT_NE(transparent.exit_code, 0);
   EXPECT_THAT(transparent.err, HasSubstr(first));
-  EXPECT_THAT(transparent.err, HasSubstr("leaves nothing of the photo"));
+  EXPECT_THAT(transparent.err, HasSubstr("masks out the whole photo"));
 }
 
 }  // namespace

@@ -8,8 +8,8 @@
 
 namespace color3d::client {
 
-// Of files that are equal byte for byte, keeps the one with the shortest name and adds a note for
-// each other one. Keeps the order.
+// Among files that are equal byte for byte, keeps the one with the shortest name and adds a note
+// for each other one. Keeps the order.
 void RemoveCopies(std::vector<LocalFile>* films, std::vector<std::string>* notes);
 
 }  // namespace color3d::client

@@ -49,7 +49,7 @@ TEST_F(FilmCopiesTest, KeepsOtherFilms) {
   EXPECT_EQ(folder.notes.size(), 1u);
 }
 
-// What a file of poses counts or names is not changed behind its back.
+// Films that a file of poses names or counts are not removed.
 TEST_F(FilmCopiesTest, KeepsAllFilmsWithPoses) {
   Write("a.mp4", "moving");
   Write("b.mp4", "moving");

@@ -145,7 +145,7 @@ TEST_F(ModelFilesTest, AdviceKeepsPoses) {
   EXPECT_THAT(Paths(folder.photos), ElementsAre("images/a.jpg", "images/b.jpg"));
   EXPECT_EQ(folder.photos[0].file, root() / "Images/a.jpg");
   EXPECT_EQ(folder.model_files.size(), 3u);
-  // What is said of the folder of photos leads to them with their poses.
+  // Advice about the folder of photos includes the poses.
   EXPECT_THAT(CollectPhotos(root() / "Images").notes,
               ElementsAre(HasSubstr("to use them, give " + root().string())));
   fs::rename(root() / "Images", root() / "scans");

@@ -93,7 +93,7 @@ TEST_F(CameraFilms, NamesFaultsOfTransformsJson) {
   EXPECT_THAT(Said(Frame("a.mp4") + "," + Frame("b.mp4", "\"time\":1,")),
               HasSubstr("frame 1: b.mp4 is a film, whose frames have times of their own"));
   EXPECT_THAT(Said(Frame("a.mp4")), HasSubstr("the pose of one film"));
-  // What lies outside of the scene is never looked for.
+  // Files outside of the scene are ignored.
   EXPECT_THAT(Said(Frame("../outside/c.mp4") + "," + Frame("b.mp4")),
               HasSubstr("there is no film ../outside/c.mp4 in the scene"));
   EXPECT_THAT(Said(Frame("a.mp4", "\"h\":96,") + "," + Frame("b.mp4")), HasSubstr("96 x 96 px"));

@@ -67,7 +67,7 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
   }
   if (frames.empty()) {
     none.note = fmt::format(
-        "{} names no photo as the COLMAP model does ({}): the scene is taken to stand still",
+        "{} names no photo as the COLMAP model does ({}): the scene is treated as static",
         kTimesFile,
         SummarizeNames(without, 3));
     return none;

@@ -176,7 +176,7 @@ TEST_F(GivenPoints, AcceptsColmapPointsWithoutTracks) {
   ExpectTheSamePoints(Run());
 }
 
-// Of the photos that saw a point one is left: where all points are like that, they are kept.
+// Only one photo of each point is left: if that is true of all points, they are kept.
 TEST_F(GivenPoints, KeepsPointsOfDeletedPhotos) {
   Scene scene = scene_;
   for (SparsePoint& point : scene.points) point.views = {0, 1};

@@ -1,4 +1,4 @@
-// Poses of photos as people bring them: COLMAP's texts of other programs, names that differ, LLFF.
+// Poses from other programs: COLMAP text files, names that differ, LLFF.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -158,7 +158,7 @@ TEST_F(PosesOfPhotos, UsesModelWithMostPhotos) {
   EXPECT_THAT(result.warnings,
               ElementsAre("there are 2 COLMAP models; the one in sparse/1 is used, since it has "
                           "most photos (sparse/0 has 2 of 4, sparse/1 has 4 of 4)"));
-  // One that cannot be read does not stand in the way of others.
+  // An unreadable model does not prevent the use of others.
   WriteFileAtomic(Model() / "images.txt", "1 2 3\n");
   result = Run();
   EXPECT_EQ(result.scene.views.size(), 4u);
@@ -237,7 +237,7 @@ TEST_F(PosesOfPhotos, ReadsPosesBoundsOfPhotos) {
     EXPECT_LT(got.cam_from_world.rotation.angularDistance(scene_.views[i].cam_from_world.rotation),
               1e-6);
   }
-  // Which photo is missing nobody knows.
+  // The missing photo is unknown.
   fs::remove(folder_.path() / "images/0002.png");
   std::vector<std::string> warnings;
   EXPECT_FALSE(ReadPosesOfPhotos(folder_.path(), &warnings).has_value());
@@ -246,7 +246,7 @@ TEST_F(PosesOfPhotos, ReadsPosesBoundsOfPhotos) {
                                     "are 3")));
 }
 
-// Whatever is wrong, nobody learns where the server keeps its files.
+// No message discloses server paths.
 TEST_F(PosesOfPhotos, MessagesHideServerPaths) {
   const auto expect = [&](const std::string& said) {
     EXPECT_NE(said, "");

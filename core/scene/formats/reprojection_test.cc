@@ -8,7 +8,7 @@ namespace {
 
 using ::testing::IsEmpty;
 
-// What all cameras have alike is judged by itself, and few observations are no evidence.
+// Errors common to all cameras are judged by themselves; few observations are ignored.
 TEST(Reprojection, WarnsOfLargeErrorsAndOutlierCameras) {
   // The same error in pixels where all cameras have it.
   CameraReprojection camera{1, {"a.png"}, 100, 1.6, 1.5};

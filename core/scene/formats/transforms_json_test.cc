@@ -154,7 +154,7 @@ TEST_F(TransformsFile, FramesHaveTimes) {
   std::vector<std::string> warnings;
   WriteFileAtomic(file(), TimedJson("\"time\":2,", "\"time\":2,"));
   EXPECT_FALSE(ReadTransformsJson(file(), folder_.path(), &warnings).views[0].moment);
-  EXPECT_THAT(warnings.at(0), HasSubstr("stands still"));
+  EXPECT_THAT(warnings.at(0), HasSubstr("the scene is static"));
 }
 
 TEST_F(TransformsFile, NamesFrameOfBadTime) {

@@ -270,7 +270,7 @@ void HoldOutCamera(const std::string& camera, ImportResult* result) {
 void RequireSeveralPositions(const Scene& scene) {
   if (scene.capture().is_reconstructed) return;
   throw InvalidArgument(
-      "the frames are all of one camera that stands still: nothing can be reconstructed of them. "
+      "all frames are of one static camera: nothing can be reconstructed from them. "
       "Colour them as a film: leave the poses out and give --film, with --poses as a relief "
       "(2.5D)");
 }

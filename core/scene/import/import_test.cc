@@ -208,7 +208,7 @@ TEST_F(Import, RefusesTimesWithOnePose) {
   }
   WritePhotos(scene, folder_.path());
   WriteTransformsJson(scene, folder_.path() / "transforms.json");
-  EXPECT_THAT(Said(), HasSubstr("one camera that stands still"));
+  EXPECT_THAT(Said(), HasSubstr("one static camera"));
 }
 
 TEST_F(Import, RecentersGeographicCoordinates) {

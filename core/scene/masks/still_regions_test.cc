@@ -26,7 +26,7 @@ Scene SceneOf(const std::filesystem::path& folder, double distortion) {
   return scene;
 }
 
-// Of 16 x 12 px: a block of 4 x 3 px moves, near a corner.
+// 16 x 12 px, with a moving block of 4 x 3 px near a corner.
 Image Moving() {
   Image moving(16, 12, 1);
   for (int y = 1; y < 4; ++y) {

@@ -202,11 +202,11 @@ void RequireParallax(const std::vector<LocalFeatures>& features,
   colmap.Note(Describe(evidence));
   if (!evidence.IsFromOnePlace()) return;
   if (order == PhotoOrder::kSequence) {
-    throw InvalidArgument("the camera only turns or zooms, so that no depth can follow: {}",
+    throw InvalidArgument("the camera only rotates or zooms, which gives no depth: {}",
                           Describe(evidence));
   }
   throw InvalidArgument(
-      "the photos were taken from one place, so that no depth can follow: {}. Take photos from "
+      "the photos were taken from one place, which gives no depth: {}. Take photos from "
       "different places, a step to the side for each (a tenth of the distance to what you "
       "photograph, or more); turning the camera or letting it stand does not help; log: {}",
       Describe(evidence),
@@ -248,7 +248,7 @@ void RequirePlaced(size_t placed, size_t count, PhotoOrder order, const fs::path
   if (placed >= kMinPlaced) return;
   if (order == PhotoOrder::kSequence) {
     throw InvalidArgument(
-        "{} of {} frames could be placed: they have too little in common that stands still; log: "
+        "{} of {} frames could be placed: they share too few static features; log: "
         "{}",
         placed == 0 ? "none" : fmt::format("only {}", placed),
         count,

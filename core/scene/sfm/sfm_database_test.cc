@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What COLMAP 3.8 writes of four photos, in the order in which its threads were ready.
+// Rows of four photos as COLMAP 3.8 writes them, in the order in which its threads finish.
 class SfmDatabaseTest : public testing::Test {
  protected:
   SfmDatabaseTest() {
@@ -57,7 +57,7 @@ TEST_F(SfmDatabaseTest, NumbersPhotosByName) {
   EXPECT_EQ(database.ReadDescriptors("nothing"), "");
 }
 
-// As a worker: it may write beside the database and nowhere else.
+// As in a sandboxed worker, which may write beside the database only.
 TEST_F(SfmDatabaseTest, NeedsNoTemporaryFolder) {
   SandboxRules rules;
   rules.writable = {folder_.path()};

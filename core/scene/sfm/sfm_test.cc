@@ -1,5 +1,5 @@
-// Structure-from-motion for real: COLMAP on rendered photos of a textured room corner whose camera
-// positions are known, and on a real photo series when it is there.
+// Structure-from-motion end to end: COLMAP on rendered photos of a textured room corner whose
+// camera positions are known, and on a real photo series if it is available.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

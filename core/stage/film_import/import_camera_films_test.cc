@@ -144,7 +144,7 @@ TEST_F(ImportCameraFilmsTest, OneTimeIsAStillScene) {
   const Scene scene = Import({.stride = 100});
   ASSERT_EQ(scene.views.size(), 3u);
   EXPECT_FALSE(scene.views[0].moment);
-  EXPECT_THAT(observer_.text, HasSubstr("stands still"));
+  EXPECT_THAT(observer_.text, HasSubstr("the scene is static"));
 }
 
 TEST_F(ImportCameraFilmsTest, OddRatesAreTold) {
