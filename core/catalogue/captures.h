@@ -1,6 +1,6 @@
 // Captures: how the files of a scene are laid out, and what kind of scene import makes of them. All
-// layouts and kinds are listed here; clients, the server and import detect a layout by the same
-// function. Thread-safe.
+// layouts and kinds are listed here; the server and import detect a layout by the same function.
+// Thread-safe.
 #pragma once
 
 #include <string>
