@@ -4,11 +4,11 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/lib/photos/photo_folder.h"
+#include "client/options/additional_key_view.h"
 #include "client/options/key_color_flags.h"
 #include "color3d/v1/job.pb.h"
 
@@ -40,19 +40,6 @@ struct ColorizeOptions {
   // Checks that need no server. Throws Error if options exclude each other or files cannot be read.
   void Check() const;
 };
-
-// An additional key view: the photo's name and the source of its colour.
-struct AdditionalKeyView {
-  std::string view;
-  KeyColorFlags color;
-  // Films only: the range of time that it recolours, seconds; either end may be open.
-  std::optional<double> begin_s = {};
-  std::optional<double> end_s = {};
-  bool HasRange() const { return begin_s || end_s; }
-};
-// "VIEW=COLOURED.png", "VIEW=POINTS.json" or "VIEW=auto", and "@BEGIN-END" behind it or not. Throws
-// Error{kInvalidArgument} for other text, and what checking the file throws.
-AdditionalKeyView ParseAdditionalKeyView(const std::string& text);
 
 // Uploads the pictures of the additional key views and names them in the spec.
 void AddKeyViews(Connection& connection,
