@@ -19,12 +19,11 @@ if [ -z "$joined" ]; then
   echo "check_includes: no source of a unity build has changed"
   exit 0
 fi
-# All sources get the include paths and macros of all targets. The compiler finds /usr/include by itself,
-# and only in its own place.
-flags=$(grep -oE ' -(isystem |I|D)[^ "]+' "$build/compile_commands.json" | sort -u |
-  grep -vE 'isystem /usr/(include|lib/\.\./include)$' | tr '\n' ' ')
-# shellcheck disable=SC2086 # the flags are words
-if ! xargs -P "$(nproc)" -I{} g++ -std=c++20 -I. $flags -x c++ -fsyntax-only -w {} <<<"$joined"; then
+# All sources get the include paths and macros of all targets.
+flags=$(mktemp)
+trap 'rm -f "$flags"' EXIT
+tests/compile_flags.py "$build" >"$flags"
+if ! xargs -P "$(nproc)" -I{} g++ -std=c++20 -I. "@$flags" -x c++ -fsyntax-only -w {} <<<"$joined"; then
   echo "check_includes: include what each source named above uses" >&2
   exit 1
 fi

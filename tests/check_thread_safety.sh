@@ -18,12 +18,11 @@ sources=$(git grep -l --untracked '#include "core/base/mutex.h"' -- '*.h' '*.cc'
 done | sort -u)
 # All sources get the include paths and macros of all targets. Clang finds /usr/include by itself,
 # and only in its own place.
-flags=$(grep -oE ' -(isystem |I|D)[^ "]+' "$build/compile_commands.json" | sort -u |
-  grep -vE 'isystem /usr/(include|lib/\.\./include)$' | tr '\n' ' ')
+flags=$(mktemp)
 findings=$(mktemp)
-trap 'rm -f "$findings"' EXIT
-# shellcheck disable=SC2086 # the flags are words
-xargs -P "$(nproc)" -I{} clang++ -std=c++20 -I. $flags -x c++ -fsyntax-only -Wno-everything -Wthread-safety {} \
+trap 'rm -f "$flags" "$findings"' EXIT
+tests/compile_flags.py "$build" >"$flags"
+xargs -P "$(nproc)" -I{} clang++ -std=c++20 -I. "@$flags" -x c++ -fsyntax-only -Wno-everything -Wthread-safety {} \
   <<<"$sources" 2>"$findings" || true
 if grep -q 'thread-safety' "$findings"; then
   grep -A3 'thread-safety' "$findings" >&2
