@@ -4,13 +4,12 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "server/storage/ballast.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
@@ -104,9 +103,9 @@ class Maintenance {
   Scrubber scrubber_;
   std::chrono::steady_clock::time_point next_scrub_{};
   ChoreCounts counts_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::thread reaper_, sweeper_;
 };
 

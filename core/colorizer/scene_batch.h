@@ -9,15 +9,14 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
 #include <list>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "core/base/cancellation.h"
+#include "core/base/mutex.h"
 #include "core/encoder/encoder.h"
 
 namespace color3d {
@@ -76,17 +75,18 @@ class SceneBatch {
   };
 
  private:
-  // Whose turn it is; null when nobody waits. With the mutex held.
-  const Member* Next() const;
+  // The member whose turn is next, or null if none waits.
+  const Member* Next() const COLOR3D_REQUIRES(mutex_);
 
   const int slots_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  int free_slots_;
-  std::list<Member> members_;
-  std::map<std::string, double> project_seconds_;  // of projects with members
-  std::mutex encoder_mutex_;
-  std::map<std::string, std::weak_ptr<const Encoder>> encoders_;
+  mutable Mutex mutex_;
+  CondVar changed_;
+  int free_slots_ COLOR3D_GUARDED_BY(mutex_);
+  std::list<Member> members_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<std::string, double> project_seconds_
+      COLOR3D_GUARDED_BY(mutex_);  // of projects with members
+  Mutex encoder_mutex_;
+  std::map<std::string, std::weak_ptr<const Encoder>> encoders_ COLOR3D_GUARDED_BY(encoder_mutex_);
 };
 
 }  // namespace color3d

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <mutex>
 
 #include "core/base/error.h"
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -26,7 +26,7 @@ class Ballast {
  private:
   const std::filesystem::path file_;
   const int64_t bytes_;
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;  // one call at a time
 };
 
 // How long the ballast of a folder's disk is: 16 MiB, and at most a twentieth of the disk.

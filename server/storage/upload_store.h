@@ -8,12 +8,12 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/base/digest.h"
+#include "core/base/mutex.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/stale_files.h"
 
@@ -52,7 +52,6 @@ class UploadStore {
     friend class UploadStore;
     struct Session;
     Writer() = default;
-    void RequireOwner() const;
     UploadStore* store_ = nullptr;
     UploadName name_;
     std::shared_ptr<Session> session_;
@@ -80,17 +79,17 @@ class UploadStore {
 
  private:
   std::filesystem::path PartPath(const UploadName& name) const;
-  // With the mutex held: what is on the disk of an upload that nobody writes.
-  void CountOnDisk(const std::string& part);
+  // Counts the bytes on disk of an upload that is not being written.
+  void CountOnDisk(const std::string& part) COLOR3D_REQUIRES(mutex_);
 
   std::filesystem::path folder_;
   BlobStore& blobs_;
   int64_t max_blob_bytes_;
   StaleFiles stale_;
-  std::mutex mutex_;
-  std::map<std::string, std::weak_ptr<Writer::Session>> sessions_;
+  Mutex mutex_;
+  std::map<std::string, std::weak_ptr<Writer::Session>> sessions_ COLOR3D_GUARDED_BY(mutex_);
   // By owner and file: what is announced of uploads that are being written, else what is there.
-  std::map<std::string, std::map<std::string, int64_t>> bytes_;
+  std::map<std::string, std::map<std::string, int64_t>> bytes_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "core/base/digest.h"
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -62,8 +62,8 @@ class FileDigests {
     std::string identity;
     FileDigest digest;
   };
-  std::mutex mutex_;
-  std::map<std::filesystem::path, Known> known_;
+  Mutex mutex_;
+  std::map<std::filesystem::path, Known> known_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d
