@@ -168,8 +168,8 @@ public server/notify notifier webhook
 public server/planning asked_formats job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
-public server/store job job_store project_store sqlite_job_store store_file user_models
-public server/worker supervisor
+public server/store chore_store client_store job job_store project_store sqlite_job_store store_file user_models worker_store
+public server/worker supervisor worker_settings
 
 if [ "$failed" -ne 0 ]; then exit 1; fi
 echo "check_layers: ok"
