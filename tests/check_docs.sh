@@ -4,7 +4,8 @@
 #   - a `path/of/a.source`, a `CamelCase`, `snake_case` or `CAPITAL_CASE` name or a `--flag` in code quotes
 #     that the sources do not have (not in CHANGELOG.md, which tells of old names, too);
 #   - a comment that cites a document, or a section of one, that does not exist: STILL.md "Stage 1a"
-#     means a heading that begins like that in the one METHOD.md of the repository.
+#     means a heading that begins like that in the one STILL.md of the repository;
+#   - a README.md of more than 1200 words, or a tests/bench/RESULTS.md of more than 200 lines.
 # Names of other projects' things stand in the list below.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -214,6 +215,14 @@ pass == "comments" {
 }
 END { end_comment(); exit bad }
 AWK
+
+# README.md is read in one go, RESULTS.md is a table: what is longer belongs elsewhere.
+words=$(wc -w <README.md)
+lines=$(wc -l <tests/bench/RESULTS.md)
+if [ "$words" -gt 1200 ] || [ "$lines" -gt 200 ]; then
+  echo "check_docs: README.md has $words words (at most 1200), tests/bench/RESULTS.md $lines lines (at most 200)" >&2
+  exit 1
+fi
 
 mapfile -t documents <"$lists/documents"
 mapfile -t citing <"$lists/citing"

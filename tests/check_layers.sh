@@ -168,8 +168,42 @@ public server/notify notifier webhook
 public server/planning asked_formats job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
-public server/store chore_store client_store job job_store project_store sqlite_job_store store_file user_models worker_store
+public server/store chore_store client_store job job_store project_store worker_store sqlite_job_store store_file user_models
 public server/worker supervisor worker_settings
+
+# Branches on the kind of a capture belong to its tables (core/catalogue/captures) and to import, which
+# determines the kind. Other sources read a property of it on at most this many lines each; lower a
+# number when it falls, and do not raise it: a new kind is a row, not a new branch.
+kind_branches='
+core/stage/carry_color.cc 2
+core/stage/colorize_scene.cc 5
+core/stage/colorize_views.cc 2
+core/stage/evaluate.cc 1
+core/stage/film/temporal_scores.cc 1
+core/stage/movie/film_clock.cc 1
+core/stage/movie/movie.cc 7
+core/stage/recolor/time_ranges.cc 3
+core/stage/reconstruct_geometry.cc 1
+core/stage/render.cc 2
+core/stage/report/next_key_view.cc 1
+core/stage/report/report_views.cc 1
+core/stage/select_key_view.cc 4
+core/stage/sources/chroma_budget.h 1
+server/planning/colorize_scene_graph.cc 5
+server/planning/time_budget.cc 9
+server/rpc/jobs/job_service.cc 2
+server/rpc/scenes/scene_validation.cc 2
+server/worker/stage_runner.cc 1
+'
+pattern='capture\(\)|ColoredAs\(|([!=]=|case) Capture(Kind|Layout)::|\<facts(\.|->)is_(film|splat|dynamic)\>'
+branches=$(grep -rnE "$pattern" core server client --include='*.h' --include='*.cc' |
+  grep -vE '^[^:]*_test\.cc:|^core/(catalogue/captures|scene/(scene|scene_json|import/[a-z_]+)|stage/(film_import/[a-z_]+|import_scene|formats/artifact_io))\.(h|cc):' || true)
+for file in $(cut -d: -f1 <<<"$branches" | sort -u); do
+  most=$(awk -v file="$file" '$1 == file { print $2 }' <<<"$kind_branches")
+  lines=$(grep "^$file:" <<<"$branches")
+  [ "$(wc -l <<<"$lines")" -le "${most:-0}" ] ||
+    complain "$file branches on the kind of a capture more than ${most:-0} times:" "$lines"
+done
 
 if [ "$failed" -ne 0 ]; then exit 1; fi
 echo "check_layers: ok"

@@ -58,13 +58,17 @@ if [ -n "$name$changed" ]; then
   [ -n "$targets" ] || { echo "run.sh: no test program matches" >&2; exit 1; }
   # shellcheck disable=SC2086
   cmake --build "$build" --target $targets
-  programs="^($(paste -sd'|' <<<"$targets"))\$"
+  # The tests of these programs: a fast one is one test of its own name, others have suites of cases.
+  programs="^($(for program in $targets; do
+    echo "$program\$"
+    "$build/bin/$program" --gtest_list_tests | sed -nE 's|^([A-Za-z0-9_/]+\.)$|\1|p'
+  done | sort -u | paste -sd'|'))"
   if [ -n "$changed" ]; then
-    run_tests -j 2 -L "$programs" -L '^(fast|stability)$'
-  elif grep -qE "$name" <<<"$targets"; then
-    run_tests -L "$programs"
-  else  # cases; a quick program runs whole, as one test
-    run_tests -R "$name|$programs"
+    run_tests -j 2 -R "$programs" -L '^(fast|stability)$'
+  elif grep -qE -e "$name" <<<"$targets"; then
+    run_tests -R "$programs"
+  else  # cases; a fast program runs whole, as one test
+    run_tests -R "$name|^($(paste -sd'|' <<<"$targets"))\$"
   fi
   exit
 fi
@@ -75,7 +79,9 @@ tests/check_docs.sh
 tests/check_proto.sh "$build"
 configure
 cmake --build "$build"
+tests/check_includes.sh "$build"
 tests/check_tidy.sh "$build"
+tests/check_thread_safety.sh "$build"
 if [ -n "$label" ]; then
   run_tests -L "^$label\$"
 else

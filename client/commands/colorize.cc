@@ -104,7 +104,7 @@ class Colorize {
   void TakeFilmForBenchmark() {
     frames_.emplace();
     const v1::ImportSceneSpec import = ImportSpec(options_, "").import_scene();
-    FilmAsFrames film = TakeFramesOfFilm(
+    FilmAsFrames film = DecodeFilmFrames(
         folder_,
         import.has_film_end_s() ? std::optional(import.film_end_s()) : std::nullopt,
         frames_->path(),

@@ -112,7 +112,7 @@ LiveSummary ColorizeToFiles(Connection& connection,
       }
       return;
     }
-    const fs::path file = PlaceBelow(out, names[i]);
+    const fs::path file = SafePathBelow(out, names[i]);
     if (answer.has_image_digest()) {
       const FileDigest digest{answer.image_digest().sha256(), answer.image_digest().size_bytes()};
       DownloadBlob(connection, digest, file, [](int64_t) {});

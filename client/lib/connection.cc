@@ -25,7 +25,7 @@ constexpr std::chrono::minutes kPatienceWithFullServer{10};
 constexpr std::string_view kHttps = "https://";
 constexpr int kMaxMessageBytes = 64 << 20;  // a scene of 10,000 files with long names
 
-// Adds the token to every call. Credentials of calls would do so over TLS alone.
+// Adds the token to every call. Call credentials would do so over TLS only.
 class TokenBearer : public grpc::experimental::Interceptor {
  public:
   explicit TokenBearer(const std::string& value) : value_(value) {}
@@ -79,11 +79,11 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, static_cast<int>(kFirstWait.count()));
   arguments.SetInt(GRPC_ARG_MIN_RECONNECT_BACKOFF_MS, 1000);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, static_cast<int>(kLongestWait.count()));
-  // A connection that swallows what is sent is given up after 20 s, not at each call's time limit.
+  // A connection without answers is closed after 20 s, not at the time limit of each call.
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, 10'000);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, 10'000);
   arguments.SetInt(GRPC_ARG_HTTP2_MAX_PINGS_WITHOUT_DATA, 0);
-  // http_proxy in the environment is not meant for this machine.
+  // http_proxy in the environment does not apply to this machine.
   if (is_here) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   if (!server.token.empty()) interceptors.push_back(std::make_unique<TokenBearers>(server.token));
@@ -91,7 +91,7 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
       address, CredentialsFor(server), arguments, std::move(interceptors));
 }
 
-// A failure of the server's own is in its log under the call's id.
+// Internal failures are in the server's log under the id of the call.
 RpcError WithRequestId(const RpcError& error,
                        const grpc::Status& status,
                        const grpc::ClientContext& context) {
@@ -107,7 +107,7 @@ RpcError WithRequestId(const RpcError& error,
                    status.error_details()});
 }
 
-// What a call says when there is no connection: over TLS, why the other side is not believed.
+// Error of a call without a connection; over TLS, the reason why the certificate is rejected.
 std::string WhyUnreachable(const std::shared_ptr<grpc::Channel>& channel) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(2));
@@ -139,7 +139,7 @@ bool Backoff::Wait(const CancellationToken& cancel, milliseconds at_least) {
 bool FullServerWait::Wait(const RpcError& error, const std::function<bool()>& keep_going) {
   const auto now = steady_clock::now();
   if (!error.IsTurnedAway() || now - since_ > kPatienceWithFullServer) return false;
-  connection_.SayWait(error);
+  connection_.ReportWait(error);
   while (steady_clock::now() < now + error.RetryDelay()) {
     if (keep_going && !keep_going()) return true;
     if (!keep_going) connection_.cancel().ThrowIfCancelled();
@@ -185,7 +185,7 @@ Connection::Connection(const ServerTarget& server, const CancellationToken& canc
   bytes_ = google::bytestream::ByteStream::NewStub(channel_);
 }
 
-void Connection::SayWait(const RpcError& error) const {
+void Connection::ReportWait(const RpcError& error) const {
   if (!on_wait_) return;
   on_wait_(std::string(error.what()) + " (waiting " + std::to_string(error.RetryDelay().count()) +
            " s)");
@@ -193,7 +193,7 @@ void Connection::SayWait(const RpcError& error) const {
 
 void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& call,
                        std::chrono::seconds time_limit) {
-  std::optional<Backoff> backoff;  // since the first failure, which may have taken long to be seen
+  std::optional<Backoff> backoff;  // starts at the first failure, which may take long to detect
   FullServerWait turned_away(*this);
   while (true) {
     grpc::ClientContext context;

@@ -1,5 +1,5 @@
-// A connection to one server: its stubs, time limits and retries. Thread-safe; no call blocks
-// longer than its time limit.
+// Connection to one server: stubs, time limits and retries. Thread-safe; no call blocks longer than
+// its time limit.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -24,15 +24,15 @@ namespace color3d::client {
 
 inline constexpr char kDefaultServer[] = "127.0.0.1:50551";
 
-// Waits between attempts: 0.2 s, doubling up to 3 s, while less than `patience` has passed since
-// the last success. Not thread-safe.
+// Delays between attempts: 0.2 s, doubling up to 3 s, for at most `patience` after the last
+// success. Not thread-safe.
 class Backoff {
  public:
   explicit Backoff(std::chrono::milliseconds patience = std::chrono::seconds(30));
-  // Something worked: be patient anew.
+  // Call it after a success.
   void Reset();
-  // False when patience is over; else sleeps, not less than `at_least`. Throws Error{kCancelled} as
-  // soon as `cancel` is set.
+  // Returns false if patience is exhausted; else sleeps, at least `at_least`. Throws
+  // Error{kCancelled} as soon as `cancel` is set.
   bool Wait(const CancellationToken& cancel,
             std::chrono::milliseconds at_least = std::chrono::milliseconds(0));
 
@@ -42,15 +42,15 @@ class Backoff {
   std::chrono::steady_clock::time_point since_;
 };
 
-// Which server, and how it is spoken to.
+// Address and credentials of a server.
 struct ServerTarget {
   std::string address = kDefaultServer;    // HOST:PORT, unix:PATH, or https://HOST:PORT for TLS
   std::filesystem::path ca;                // PEM: roots in place of the system's; TLS
   std::filesystem::path certificate, key;  // PEM: our own, where the server asks for one; TLS
   std::string token;                       // empty: none
-  // Told when a server that is full lets us wait; empty: nobody.
+  // Called when a busy server makes the client wait; may be empty.
   std::function<void(const std::string&)> on_wait = {};
-  // How long a server that is gone is waited for.
+  // Maximum time to wait for an unreachable server.
   std::chrono::milliseconds patience = std::chrono::seconds(30);
 
   bool UsesTls() const;
@@ -61,17 +61,17 @@ struct ServerTarget {
 class Connection {
  public:
   // Waits at most 4 s for the server. `cancel` must outlive the connection; it ends retries and
-  // transfers. Throws Error{kUnavailable} that says how to start a server.
-  // kInvalidArgument for an address that is none, for a token that would travel in the clear to
+  // transfers. Throws Error{kUnavailable} that says how to start a server. Throws
+  // Error{kInvalidArgument} for a malformed address, for a token that would travel unencrypted to
   // another machine, and for files that cannot be read.
   Connection(const ServerTarget& server, const CancellationToken& cancel);
 
   const std::string& address() const { return address_; }
   const CancellationToken& cancel() const { return cancel_; }
-  // With the patience that the target says.
+  // Returns a Backoff with the target's patience.
   Backoff NewBackoff() const { return Backoff(patience_); }
-  // Says that a full server lets us wait, to whoever wants to know.
-  void SayWait(const RpcError& error) const;
+  // Reports the wait for a busy server to on_wait.
+  void ReportWait(const RpcError& error) const;
 
   v1::SceneService::Stub& scenes() { return *scenes_; }
   v1::JobService::Stub& jobs() { return *jobs_; }
@@ -81,9 +81,9 @@ class Connection {
   v1::ColorizerService::Stub& colorizers() { return *colorizers_; }
   google::bytestream::ByteStream::Stub& bytes() { return *bytes_; }
 
-  // One unary call, e.g. Call(&v1::JobService::Stub::GetJob, connection.jobs(), request). Repeated
-  // while the server cannot be reached, and for ten minutes while it is too full for more (requests
-  // that create something carry a request_id, so that is safe). Throws RpcError.
+  // Makes one unary call, e.g. Call(&v1::JobService::Stub::GetJob, connection.jobs(), request).
+  // Retries while the server is unreachable, and for ten minutes while it is busy (requests that
+  // create something carry a request_id, so retries are safe). Throws RpcError.
   template <typename Stub, typename Request, typename Response>
   Response Call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                 Stub& stub,
@@ -117,16 +117,16 @@ class Connection {
   std::unique_ptr<google::bytestream::ByteStream::Stub> bytes_;
 };
 
-// Waits while a server is too full for more, ten minutes at most. The connection outlives it. Not
+// Waits while a server is busy, ten minutes at most. The connection must outlive it. Not
 // thread-safe.
 class FullServerWait {
  public:
   explicit FullServerWait(const Connection& connection) : connection_(connection) { Reset(); }
-  // Something worked: be patient anew.
+  // Call it after a success.
   void Reset() { since_ = std::chrono::steady_clock::now(); }
-  // True when it has waited as long as the server asked for, or until `keep_going` said no; false
-  // at once for other errors, and when patience is over. Throws Error{kCancelled} as Backoff,
-  // unless there is a `keep_going`.
+  // Returns true after the delay that the server asked for, or as soon as `keep_going` returns
+  // false. Returns false at once for other errors and if patience is exhausted. Throws
+  // Error{kCancelled} as Backoff, unless there is a `keep_going`.
   bool Wait(const RpcError& error, const std::function<bool()>& keep_going = {});
 
  private:
@@ -137,7 +137,7 @@ class FullServerWait {
 // "cannot reach a server at ...: start one with ...".
 Error UnreachableError(const std::string& address);
 
-// "lost the server at ...": of one that was there before.
+// "lost the server at ...": for a server that answered before.
 Error LostServerError(const std::string& address);
 
 }  // namespace color3d::client

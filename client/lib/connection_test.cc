@@ -24,7 +24,7 @@ TEST(Connection, SaysHowToStartAServer) {
   EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
 }
 
-TEST(Connection, AnAddressThatIsWrittenWronglySaysHow) {
+TEST(Connection, MalformedAddressNamesRemedy) {
   const CancellationToken cancel;
   const auto refusal = [&](const std::string& address) -> std::string {
     try {
@@ -40,7 +40,7 @@ TEST(Connection, AnAddressThatIsWrittenWronglySaysHow) {
   EXPECT_THAT(refusal("unix:/" + std::string(200, 'a')), ::testing::HasSubstr("201 bytes"));
 }
 
-TEST(Connection, NoTokenTravelsInTheClearToAnotherMachine) {
+TEST(Connection, SendsNoTokenUnencryptedToOtherMachine) {
   const CancellationToken cancel;
   for (const char* elsewhere :
        {"10.1.2.3:1", "127.0.0.1.example.org:1", "localhost.example.org:1", "[::2]:1"}) {

@@ -11,7 +11,7 @@ namespace {
 
 namespace bs = google::bytestream;
 
-// A stream that delivers nothing for long is cut by its time limit, so a range stays small.
+// Streams that stall are cut by their time limit, so ranges are small.
 constexpr int64_t kRangeBytes = int64_t{16} << 20;
 constexpr std::chrono::seconds kRangeTimeLimit{300};
 
@@ -20,7 +20,7 @@ class Download {
   Download(Connection& connection, const FileDigest& digest, fs::path part)
       : connection_(connection), digest_(digest), part_(std::move(part)) {}
 
-  // Leaves the whole verified blob in the part file.
+  // Writes the whole verified blob to the part file.
   void Run(const std::function<void(int64_t)>& progress) {
     RemoveUnlessPlainFile(part_);
     std::error_code none;
@@ -52,8 +52,8 @@ class Download {
   }
 
  private:
-  // Only of what it sends from the first to the last byte the server sees that it is damaged; it
-  // then sets it aside, for the next upload or run to heal. Throws what it says.
+  // The server notices that a blob is damaged only if it sends all of it in one stream; it then
+  // moves it aside, so that the next upload or run replaces it. Throws the error of the server.
   void ReceiveWhole(const std::function<void(int64_t)>& progress) {
     std::error_code none;
     fs::remove(part_, none);
@@ -64,7 +64,7 @@ class Download {
     ThrowIfFailed(status);
   }
 
-  // Goes on where the last one ended; 0 `most_bytes`: to the end.
+  // Continues after the last range; `most_bytes` 0: to the end.
   grpc::Status Receive(int64_t most_bytes,
                        std::chrono::seconds time_limit,
                        const std::function<void(int64_t)>& progress) {

@@ -10,7 +10,7 @@ namespace {
 namespace fs = std::filesystem;
 using DownloadTest = BreakingServerTest;
 
-TEST_F(DownloadTest, DownloadResumesAndLeavesNothingElseBehind) {
+TEST_F(DownloadTest, ResumesAndLeavesNoOtherFiles) {
   blobs_.blobs[name_] = bytes_;
   blobs_.drops = 2;
   blobs_.limit = 700'000;
@@ -21,7 +21,7 @@ TEST_F(DownloadTest, DownloadResumesAndLeavesNothingElseBehind) {
   EXPECT_NO_THROW(Download());  // it is there already
 }
 
-TEST_F(DownloadTest, DownloadRefusesOtherBytes) {
+TEST_F(DownloadTest, RefusesOtherBytes) {
   blobs_.blobs[name_] = bytes_;
   blobs_.corrupt = true;
   try {
@@ -33,7 +33,7 @@ TEST_F(DownloadTest, DownloadRefusesOtherBytes) {
   EXPECT_FALSE(fs::exists(target_));
 }
 
-TEST_F(DownloadTest, TheServerIsLedToSeeWhatIsDamaged) {
+TEST_F(DownloadTest, DamagedBlobIsSetAsideAndReplaced) {
   blobs_.blobs[name_] = bytes_;
   blobs_.corrupt = true;
   try {
@@ -51,14 +51,14 @@ TEST_F(DownloadTest, TheServerIsLedToSeeWhatIsDamaged) {
   EXPECT_EQ(ReadFile(target_), bytes_) << "healed";
 }
 
-TEST_F(DownloadTest, DownloadWaitsWhileTheServerIsFull) {
+TEST_F(DownloadTest, WaitsWhileServerIsBusy) {
   blobs_.blobs[name_] = bytes_;
   blobs_.turned_away = 1;
   Download();
   EXPECT_EQ(ReadFile(target_), bytes_);
 }
 
-TEST_F(DownloadTest, ALinkInPlaceOfThePartOrOfTheFileIsNotFollowed) {
+TEST_F(DownloadTest, DoesNotFollowSymbolicLinks) {
   blobs_.blobs[name_] = bytes_;
   const fs::path precious = scratch_.path() / "precious";
   WriteFileAtomic(precious, "mine");
@@ -72,7 +72,7 @@ TEST_F(DownloadTest, ALinkInPlaceOfThePartOrOfTheFileIsNotFollowed) {
   EXPECT_EQ(ReadFile(target_), bytes_);
 }
 
-TEST_F(DownloadTest, ADigestThatIsNoneMakesNoName) {
+TEST_F(DownloadTest, RefusesMalformedDigest) {
   for (const std::string& digest :
        {std::string("../../../x"), std::string("/etc/"), std::string(), std::string(64, 'G')}) {
     try {
@@ -87,7 +87,7 @@ TEST_F(DownloadTest, ADigestThatIsNoneMakesNoName) {
   EXPECT_FALSE(fs::exists(target_.parent_path()));
 }
 
-TEST_F(DownloadTest, AServerThatVanishesLeavesWordOfWhatIsThereAndHowToGoOn) {
+TEST_F(DownloadTest, LostServerNamesFilesAndNextStep) {
   blobs_.blobs[name_] = bytes_;
   Connection impatient(
       {.address = connection_->address(), .patience = std::chrono::milliseconds(100)}, cancel_);
@@ -117,7 +117,7 @@ TEST_F(DownloadTest, AServerThatVanishesLeavesWordOfWhatIsThereAndHowToGoOn) {
   EXPECT_FALSE(fs::exists(out / "lost.bin"));
 }
 
-TEST_F(DownloadTest, NamesAndLinksDoNotLeadOutOfTheFolder) {
+TEST_F(DownloadTest, NamesAndLinksStayInFolder) {
   blobs_.blobs[name_] = bytes_;
   const fs::path out = scratch_.path() / "out", elsewhere = scratch_.path() / "elsewhere";
   fs::create_directory(out);
@@ -133,7 +133,7 @@ TEST_F(DownloadTest, NamesAndLinksDoNotLeadOutOfTheFolder) {
   EXPECT_FALSE(fs::exists(scratch_.path() / "x.bin"));
 }
 
-TEST_F(DownloadTest, DownloadOfAMissingBlobIsNotFound) {
+TEST_F(DownloadTest, MissingBlobIsNotFound) {
   try {
     Download();
     FAIL();

@@ -60,7 +60,7 @@ class DrainingTest : public ::testing::Test {
   std::optional<Connection> connection_;
 };
 
-TEST_F(DrainingTest, ACallGoesOnWithTheNextServerAsTheSameRequest) {
+TEST_F(DrainingTest, RetriesSameRequestWithNextServer) {
   jobs_.refusals = 2;
   jobs_.refusal = StatusOf(grpc::StatusCode::UNAVAILABLE, "DRAINING");
   EXPECT_EQ(Create().name(), "jobs/1");
@@ -68,7 +68,7 @@ TEST_F(DrainingTest, ACallGoesOnWithTheNextServerAsTheSameRequest) {
   EXPECT_THAT(jobs_.request_ids, Each("the same"));
 }
 
-TEST_F(DrainingTest, WhatNoTimeMendsIsNotAskedAgain) {
+TEST_F(DrainingTest, DoesNotRetryPermanentErrors) {
   jobs_.refusals = 2;
   jobs_.refusal = StatusOf(grpc::StatusCode::FAILED_PRECONDITION, "INPUT_MISSING");
   try {

@@ -1,4 +1,4 @@
-// What the program's exit status says. Scripts rely on these numbers.
+// Exit statuses of the program. Scripts rely on these numbers.
 #pragma once
 
 #include "color3d/v1/job.pb.h"
@@ -17,7 +17,7 @@ enum class ExitCode {
 
 ExitCode ExitCodeOf(ErrorCode code);
 
-// Of a finished job. A failed one whose error is the input's fault is kBadInput.
+// Exit status for a finished job. kBadInput if it failed because of its input.
 ExitCode ExitCodeOf(const v1::Job& job);
 
 }  // namespace color3d::client

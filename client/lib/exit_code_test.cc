@@ -60,7 +60,7 @@ TEST(RpcError, ReadsDetails) {
   EXPECT_EQ(error.violations()[0].description, "is truncated");
 }
 
-TEST(RpcError, TellsWhatMaySucceedLater) {
+TEST(RpcError, IdentifiesTransientErrors) {
   const RpcError broken(grpc::Status(grpc::StatusCode::UNAVAILABLE, "failed to connect"));
   EXPECT_TRUE(broken.IsTransient());
   EXPECT_TRUE(broken.IsUnreachable());

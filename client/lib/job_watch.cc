@@ -15,9 +15,9 @@ using std::chrono::steady_clock;
 
 constexpr milliseconds kTick{200};
 constexpr std::chrono::seconds kPatience{60};
-// The server sends a keepalive every 30 s: a stream that is silent for longer is dead.
+// The server sends a keepalive every 30 s; a stream silent for longer is broken.
 constexpr std::chrono::seconds kSilence{100};
-// The present state of all jobs comes first; a stream that broke sooner may have sent part of it.
+// The current state of all jobs comes first; a stream that broke earlier may have sent part of it.
 constexpr std::chrono::seconds kSnapshotTime{2};
 
 // One WatchJobs stream, read on a thread of its own so that the caller stays responsive.
@@ -37,7 +37,7 @@ class Stream {
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
-  // The next event; nullopt after `limit` or at the end.
+  // Returns the next event; nullopt after `limit` or at the end.
   std::optional<v1::JobEvent> Next(milliseconds limit) {
     MutexLock lock(mutex_);
     const auto end = steady_clock::now() + limit;
@@ -48,7 +48,7 @@ class Stream {
     changed_.NotifyAll();
     return event;
   }
-  // Set when the stream has ended and all its events were taken.
+  // True if the stream has ended and all its events were taken.
   std::optional<grpc::Status> End() {
     const MutexLock lock(mutex_);
     if (!ended_ || !events_.empty()) return std::nullopt;
@@ -64,7 +64,7 @@ class Stream {
       MutexLock lock(mutex_);
       events_.push_back(event);
       changed_.NotifyAll();
-      // Whoever takes events slowly slows the stream down.
+      // Slow consumers slow the stream down.
       while (events_.size() >= kMaxWaiting && !stopping_) changed_.Wait(mutex_);
     }
     const grpc::Status status = reader_->Finish();
@@ -122,11 +122,11 @@ WatchEnd WatchJobs(Connection& connection,
     if (!end) continue;
     const RpcError error(*end);
     if (error.grpc_code() == grpc::StatusCode::OUT_OF_RANGE && revision > 0) {
-      revision = 0;  // the events in between are gone: take the present state
+      revision = 0;  // events in between are lost: request the current state
       continue;
     }
     const bool again = turned_away.Wait(error, keep_going);
-    // A draining server may be back soon, with the same jobs.
+    // A draining server may be back soon with the same jobs.
     if (!again && !error.IsTransient()) throw error;
     if (!keep_going()) return WatchEnd::kStopped;
     if (again) {

@@ -1,4 +1,4 @@
-// Follows jobs to their end over WatchJobs, through broken connections and server restarts.
+// Follows jobs to their end with WatchJobs, across broken connections and server restarts.
 #pragma once
 
 #include <functional>
@@ -15,17 +15,18 @@ enum class WatchEnd {
   kStopped,   // `keep_going` returned false
 };
 
-// `on_event` gets every state change and progress of the jobs and of their children, in order, on
-// the calling thread; `keep_going` is asked about five times a second. A broken stream resumes at
-// the last revision seen. Throws RpcError; Error{kUnavailable} when the server stays away for 60 s.
+// `on_event` receives every state change and progress of the jobs and their children, in order, on
+// the calling thread; `keep_going` is called about five times a second. After a broken stream it
+// resumes at the last revision seen. Throws RpcError; Error{kUnavailable} if the server is
+// unreachable for 60 s.
 WatchEnd WatchJobs(Connection& connection,
                    const std::vector<std::string>& names,
                    const std::function<void(const v1::JobEvent&)>& on_event,
                    const std::function<bool()>& keep_going);
 
-// Fresh state.
+// Returns the current state of a job.
 v1::Job GetJob(Connection& connection, const std::string& name);
-// The jobs whose parent `name` is, oldest first.
+// Returns the jobs whose parent is `name`, oldest first.
 std::vector<v1::Job> ListChildren(Connection& connection, const std::string& name);
 
 bool IsFinished(v1::Job::State state);

@@ -11,7 +11,7 @@ namespace {
 using ::testing::ElementsAre;
 using JobWatchTest = BreakingServerTest;
 
-TEST_F(JobWatchTest, WatchResumesAtTheLastRevision) {
+TEST_F(JobWatchTest, ResumesAtLastRevision) {
   const grpc::Status broken(grpc::StatusCode::UNAVAILABLE, "broken");
   jobs_.script = {{{3, 5}, broken, 2200}, {{8}, broken}, {{9}, grpc::Status::OK}};
   std::vector<int64_t> seen;
@@ -25,7 +25,7 @@ TEST_F(JobWatchTest, WatchResumesAtTheLastRevision) {
   EXPECT_THAT(jobs_.asked, ElementsAre(0, 5, 8));
 }
 
-TEST_F(JobWatchTest, WatchTakesTheWholeStateAgainWhenTheFirstStreamBroke) {
+TEST_F(JobWatchTest, RereadsStateIfFirstStreamBreaks) {
   const grpc::Status broken(grpc::StatusCode::UNAVAILABLE, "broken");
   jobs_.script = {{{7}, broken}, {{7}, grpc::Status::OK}};
   WatchJobs(
@@ -33,14 +33,14 @@ TEST_F(JobWatchTest, WatchTakesTheWholeStateAgainWhenTheFirstStreamBroke) {
   EXPECT_THAT(jobs_.asked, ElementsAre(0, 0));
 }
 
-TEST_F(JobWatchTest, WatchGoesOnWhereTheServerHasEndedTheCallWithItself) {
+TEST_F(JobWatchTest, ResumesAfterServerCancelsCall) {
   jobs_.script = {{{7}, grpc::Status(grpc::StatusCode::CANCELLED, "")}, {{7}, grpc::Status::OK}};
   WatchJobs(
       *connection_, {"jobs/1"}, [](const v1::JobEvent&) {}, [] { return true; });
   EXPECT_THAT(jobs_.asked, ElementsAre(0, 0));
 }
 
-TEST_F(JobWatchTest, WatchWaitsWhileTheServerIsFullUnlessAskedToStop) {
+TEST_F(JobWatchTest, WaitsWhileServerIsBusyUnlessStopped) {
   jobs_.script = {{{}, TurnedAway()}, {{7}, grpc::Status::OK}, {{}, TurnedAway()}};
   const auto watch = [&](const std::function<bool()>& keep_going) {
     return WatchJobs(
@@ -50,7 +50,7 @@ TEST_F(JobWatchTest, WatchWaitsWhileTheServerIsFullUnlessAskedToStop) {
   EXPECT_EQ(watch([&] { return jobs_.asked.size() < 3; }), WatchEnd::kStopped);
 }
 
-TEST_F(JobWatchTest, WatchStartsAnewWhenItsRevisionIsGone) {
+TEST_F(JobWatchTest, RestartsIfRevisionIsGone) {
   const grpc::Status broken(grpc::StatusCode::UNAVAILABLE, "broken");
   const grpc::Status gone(grpc::StatusCode::OUT_OF_RANGE, "compacted");
   jobs_.script = {{{4}, broken, 2200}, {{}, gone}, {{6}, grpc::Status::OK}};
@@ -59,7 +59,7 @@ TEST_F(JobWatchTest, WatchStartsAnewWhenItsRevisionIsGone) {
   EXPECT_THAT(jobs_.asked, ElementsAre(0, 4, 0));
 }
 
-TEST_F(JobWatchTest, WatchStopsWhenAskedAndThrowsWhatTheServerSays) {
+TEST_F(JobWatchTest, StopsOnRequestAndThrowsServerErrors) {
   jobs_.script = {{{1}, grpc::Status::OK, 5000},
                   {{}, grpc::Status(grpc::StatusCode::NOT_FOUND, "no such job")}};
   int events = 0;

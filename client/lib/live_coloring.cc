@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int64_t kMaxInlineBytes = 3 << 20;
-// A worker that starts, and a queue of others' pictures, take their time.
+// Time for a worker to start, and for the pictures of others in the queue.
 constexpr auto kStreamLimit = std::chrono::minutes(30);
 
 using Stream = grpc::ClientReaderWriter<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>;
@@ -24,7 +24,7 @@ class LiveRound {
   LiveRound(Connection& connection, const LiveSource& source, const LiveOptions& options)
       : connection_(connection), source_(source), options_(options) {}
 
-  // One stream for those of `pictures` in `pending`; takes those that are answered for good out.
+  // Sends those of `pictures` in `pending` in one stream; removes the ones that got a final answer.
   grpc::Status Run(const std::vector<LivePicture>& pictures,
                    std::set<size_t>* pending,
                    const OnAnswer& on_answer);
@@ -45,8 +45,8 @@ class LiveRound {
   Mutex mutex_;
   CondVar answered_;
   int in_flight_ COLOR3D_GUARDED_BY(mutex_) = 0;
-  bool over_ COLOR3D_GUARDED_BY(mutex_) = false;  // the answers are no longer read
-  std::exception_ptr write_error_;                // the writer's, read after it has ended
+  bool over_ COLOR3D_GUARDED_BY(mutex_) = false;  // answers are no longer read
+  std::exception_ptr write_error_;                // of the writer; read after it has ended
 };
 
 v1::ColorizeImagesRequest LiveRound::RequestFor(const LivePicture& picture, size_t number) {

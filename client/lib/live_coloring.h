@@ -1,4 +1,4 @@
-// Pictures coloured live over ColorizeImages. Not thread-safe.
+// Colours pictures interactively with ColorizeImages. Not thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace color3d::client {
 
-// What colours the pictures: exactly one of them.
+// Source of the colours. Requires: exactly one is set.
 struct LiveSource {
   std::string colorizer;              // "colorizers/..."
   std::string scene;                  // "scenes/...", by its newest colorizer
@@ -30,13 +30,13 @@ struct LiveOptions {
   int in_flight = 0;  // pictures sent and not yet answered, at most; 0: as many as the server takes
 };
 
-// Opens the stream, so that the server gets its inference worker ready, and closes it again.
+// Opens and closes a stream, so that the server starts its inference worker.
 void WarmUpInference(Connection& connection);
 
-// Sends the pictures (files of more than 3 MiB as blobs) and hands each answer over as it comes,
-// with the number of its picture. Answers may carry an `error`. What the server could not do for
-// now (UNAVAILABLE, a broken stream) is sent again until 30 s pass without any answer. Throws
-// RpcError when the stream as a whole is refused, Error{kUnavailable} when patience is over, and
+// Sends the pictures (files of more than 3 MiB as blobs) and passes each answer to the callback as
+// it arrives, with the index of its picture. Answers may carry an `error`. Pictures with transient
+// failures (UNAVAILABLE, a broken stream) are sent again until 30 s pass without an answer. Throws
+// RpcError if the stream as a whole is refused, Error{kUnavailable} if patience is exhausted, and
 // Error{kCancelled}.
 void ColorizeLive(Connection& connection,
                   const LiveSource& source,

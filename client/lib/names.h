@@ -1,4 +1,4 @@
-// Identifiers that the client makes or reads. Pure functions.
+// Identifiers and resource names. Pure functions.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ std::string NewUuid();
 // "jobs/3f" for "3f" and for "jobs/3f"; throws InvalidArgument for "scenes/3f" or an empty text.
 std::string ResourceName(const std::string& text, const std::string& collection);
 
-// ByteStream resources.
+// Resource names of ByteStream.
 std::string UploadResource(const std::string& uuid, const FileDigest& digest);
 std::string BlobResource(const FileDigest& digest);
 

@@ -23,7 +23,7 @@ TEST(Names, UuidsAreVersion4AndDiffer) {
   EXPECT_EQ(seen.size(), 100u);
 }
 
-TEST(Names, ResourcesMayBeShort) {
+TEST(Names, AcceptsShortResourceNames) {
   EXPECT_EQ(ResourceName("3f", "jobs"), "jobs/3f");
   EXPECT_EQ(ResourceName("jobs/3f", "jobs"), "jobs/3f");
   EXPECT_THROW(ResourceName("scenes/3f", "jobs"), Error);

@@ -8,7 +8,7 @@
 namespace color3d::client {
 namespace fs = std::filesystem;
 
-fs::path PlaceBelow(const fs::path& out, const std::string& name) {
+fs::path SafePathBelow(const fs::path& out, const std::string& name) {
   if (!IsSafeRelativePath(name)) {
     throw Error(ErrorCode::kDataLoss,
                 "the server names a file '{}', which is not safe to write; nothing was written",

@@ -1,6 +1,6 @@
-// Where files from the server go in a folder of the user's: nothing is written outside of it,
-// whatever the server's names are and whatever symbolic links lie in it. Pure functions of the file
-// system.
+// Paths of files from the server in a folder of the user: nothing is written outside of it,
+// whatever the server's names are and whatever symbolic links it contains. Pure functions of the
+// file system.
 #pragma once
 
 #include <filesystem>
@@ -8,14 +8,13 @@
 
 namespace color3d::client {
 
-// out/NAME, whose folder is there afterwards. `out` itself is the user's choice and may be a
-// symbolic link; what lies below it may not. Throws Error{kDataLoss} when the name is not a safe
-// relative path, kFailedPrecondition when a folder on the way is a symbolic link, is a file or
-// cannot be created.
-std::filesystem::path PlaceBelow(const std::filesystem::path& out, const std::string& name);
+// Returns out/NAME and creates its folder. `out` itself may be a symbolic link; folders below it
+// may not. Throws Error{kDataLoss} if the name is not a safe relative path, kFailedPrecondition if
+// a folder in the path is a symbolic link or a file, or cannot be created.
+std::filesystem::path SafePathBelow(const std::filesystem::path& out, const std::string& name);
 
-// Removes `path` unless it is a regular file with this one name, so that whoever opens it writes to
-// no other file.
+// Removes `path` unless it is a regular file with a single name, so that opening it for writing
+// changes no other file.
 void RemoveUnlessPlainFile(const std::filesystem::path& path);
 
 }  // namespace color3d::client

@@ -15,10 +15,10 @@ class OutFolderTest : public testing::Test {
     fs::create_directory(out_);
     fs::create_directory(elsewhere_);
   }
-  // What PlaceBelow throws for the name; empty when it throws nothing.
+  // What SafePathBelow throws for the name; empty when it throws nothing.
   std::string Refusal(const std::string& name) {
     try {
-      PlaceBelow(out_, name);
+      SafePathBelow(out_, name);
       return "";
     } catch (const Error& e) {
       return e.what();
@@ -29,20 +29,20 @@ class OutFolderTest : public testing::Test {
   const fs::path out_ = scratch_.path() / "out", elsewhere_ = scratch_.path() / "elsewhere";
 };
 
-TEST_F(OutFolderTest, FoldersOnTheWayAreMade) {
-  EXPECT_EQ(PlaceBelow(out_, "a/b/c.png"), out_ / "a/b/c.png");
+TEST_F(OutFolderTest, CreatesFolders) {
+  EXPECT_EQ(SafePathBelow(out_, "a/b/c.png"), out_ / "a/b/c.png");
   EXPECT_TRUE(fs::is_directory(out_ / "a/b"));
-  EXPECT_EQ(PlaceBelow(out_, "a/b/d.png"), out_ / "a/b/d.png");
+  EXPECT_EQ(SafePathBelow(out_, "a/b/d.png"), out_ / "a/b/d.png");
 }
 
-TEST_F(OutFolderTest, NamesThatLeadOutAreRefused) {
+TEST_F(OutFolderTest, RefusesNamesThatLeaveFolder) {
   for (const std::string name : {"../x", "/etc/x", "a/../../x", "", "a//b", "a\nb", "a/."}) {
     EXPECT_NE(Refusal(name).find("not safe"), std::string::npos) << name;
   }
   EXPECT_TRUE(fs::is_empty(out_));
 }
 
-TEST_F(OutFolderTest, ALinkOnTheWayIsRefusedAndNothingIsMadeBehindIt) {
+TEST_F(OutFolderTest, RefusesLinkBelowFolder) {
   fs::create_directory_symlink(elsewhere_, out_ / "renders");
   EXPECT_NE(Refusal("renders/deep/a.png").find("renders is a symbolic link"), std::string::npos);
   EXPECT_TRUE(fs::is_empty(elsewhere_));
@@ -52,13 +52,13 @@ TEST_F(OutFolderTest, ALinkOnTheWayIsRefusedAndNothingIsMadeBehindIt) {
   EXPECT_NE(Refusal("file/a.png").find("is a file where"), std::string::npos);
 }
 
-TEST_F(OutFolderTest, TheFolderItselfMayBeALink) {
+TEST_F(OutFolderTest, FolderItselfMayBeLink) {
   fs::create_directory_symlink(elsewhere_, scratch_.path() / "link");
-  EXPECT_EQ(PlaceBelow(scratch_.path() / "link", "a/b"), scratch_.path() / "link/a/b");
+  EXPECT_EQ(SafePathBelow(scratch_.path() / "link", "a/b"), scratch_.path() / "link/a/b");
   EXPECT_TRUE(fs::is_directory(elsewhere_ / "a"));
 }
 
-TEST_F(OutFolderTest, LinksAreRemovedAndPlainFilesStay) {
+TEST_F(OutFolderTest, RemovesLinksAndKeepsPlainFiles) {
   WriteFileAtomic(elsewhere_ / "precious", "mine");
   fs::create_symlink(elsewhere_ / "precious", out_ / "soft");
   fs::create_hard_link(elsewhere_ / "precious", out_ / "hard");

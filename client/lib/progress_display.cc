@@ -20,7 +20,7 @@ using std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kRedraw{100};
 constexpr std::chrono::seconds kPlainInterval{10};
-// Between two stages a worker needs a moment to take the next one.
+// Time in which a worker takes the next stage.
 constexpr std::chrono::seconds kIdle{5};
 
 }  // namespace
@@ -44,7 +44,7 @@ void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
   const v1::Job& job = event.job();
   if (IsFinished(job.state())) {
     bool& ended = ended_[job.name()];
-    // The last stage's failure only repeats the one that has been told.
+    // The failure of the last stage repeats one that was printed before.
     const bool failed = job.state() == v1::Job::STATE_FAILED;
     const bool repeated = failed && failure_told_ && job.kind() == kind::kColorizeScene;
     if (!ended && !repeated) Say(EndLine(job));
@@ -76,7 +76,7 @@ void ProgressDisplay::OnTick(const std::function<v1::Job()>& look) {
       } else if (job.queue_position() > 0) {
         waits_for_ = fmt::format("its turn, at place {} in the queue", job.queue_position());
       }
-    } catch (const Error&) {  // the watch says so when the server is gone
+    } catch (const Error&) {  // the watch reports an unreachable server
     }
   }
   Draw(fmt::format("waiting for {} ({} stages to go)", waits_for_, unfinished_.size()));

@@ -1,5 +1,5 @@
-// Progress on stderr: one redrawn line on a terminal, else a line at the end of every stage and at
-// most one in 10 s between. Not thread-safe.
+// Progress on stderr: on terminals one line that is redrawn, else a line at the end of each stage
+// and at most one every 10 s in between. Not thread-safe.
 #pragma once
 
 #include <chrono>
@@ -14,23 +14,24 @@ namespace color3d::client {
 
 class ProgressDisplay {
  public:
-  // A quiet one (--json) prints nothing.
+  // `quiet` (--json): prints nothing.
   explicit ProgressDisplay(bool quiet);
   ~ProgressDisplay();
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
   void OnEvent(const v1::JobEvent& event);
-  // Now and then while jobs are followed: says what they wait for when nothing runs for a while.
-  // `look` gets the followed job as it is now, or throws; called at most every 5 s.
+  // Call it regularly as jobs are followed: prints the reason for waiting if nothing runs for a
+  // while. `look` returns the current state of the followed job, or throws; called at most every 5
+  // s.
   void OnTick(const std::function<v1::Job()>& look);
-  // A transfer, in bytes.
+  // Progress of a transfer, bytes.
   void OnTransfer(const std::string& what, int64_t done_bytes, int64_t total_bytes);
-  // Another loop of ours, in things of that name.
+  // Progress of a loop in the client; `what`: plural noun of its items.
   void OnCount(const std::string& what, int64_t done, int64_t total);
-  // A line of its own.
+  // Prints a separate line.
   void Say(const std::string& line);
-  // Takes the redrawn line away.
+  // Erases the redrawn line.
   void Clear();
 
  private:

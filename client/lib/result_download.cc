@@ -14,7 +14,7 @@ void DownloadBelow(Connection& connection,
   for (const ResultFile& file : files) total += file.digest.size_bytes;
   for (size_t i = 0; i < files.size(); ++i) {
     const ResultFile& file = files[i];
-    const std::filesystem::path path = PlaceBelow(out, file.name);
+    const std::filesystem::path path = SafePathBelow(out, file.name);
     try {
       DownloadBlob(connection, file.digest, path, [&](int64_t received) {
         progress(before + received, total);

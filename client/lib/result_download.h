@@ -17,9 +17,9 @@ struct ResultFile {
 };
 
 // Writes them to out/NAME, in order, each whole or not at all; those that are there already are
-// kept. `go_on` completes "when the server is back, ...". Throws what PlaceBelow and DownloadBlob
-// throw; when the server is gone, Error{kUnavailable} that says how many files are there and how to
-// go on.
+// kept. `go_on` completes "when the server is back, ...". Throws what SafePathBelow and
+// DownloadBlob throw; when the server is gone, Error{kUnavailable} that says how many files are
+// there and how to go on.
 void DownloadBelow(Connection& connection,
                    const std::vector<ResultFile>& files,
                    const std::filesystem::path& out,

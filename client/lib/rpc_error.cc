@@ -72,7 +72,7 @@ bool RpcError::IsTransient() const {
 
 bool RpcError::IsTurnedAway() const {
   if (grpc_code_ != grpc::StatusCode::RESOURCE_EXHAUSTED || retry_delay_.count() <= 0) return false;
-  // What is stored grows less by nothing but its owner's doing.
+  // Only its owner can reduce the amount stored.
   const bool is_full = std::ranges::any_of(violations_, [](const auto& entry) {
     return entry.field.ends_with("stored_bytes") || entry.field.ends_with(" scenes");
   });

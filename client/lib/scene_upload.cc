@@ -36,7 +36,7 @@ constexpr std::chrono::seconds kCommitTimeLimit{600};
 
 void CheckSizes(const std::vector<LocalFile>& files, int64_t max_bytes) {
   for (const LocalFile& file : files) {
-    std::error_code unreadable;  // told when it is read
+    std::error_code unreadable;  // reported when the file is read
     const auto bytes = static_cast<int64_t>(std::filesystem::file_size(file.file, unreadable));
     if (unreadable || bytes <= max_bytes) continue;
     throw InvalidArgument(
@@ -47,7 +47,7 @@ void CheckSizes(const std::vector<LocalFile>& files, int64_t max_bytes) {
   }
 }
 
-// Named by content: the paths and digests of all files.
+// Derives the id from the paths and digests of all files.
 std::string SceneIdOf(const std::vector<SceneEntry>& entries) {
   Sha256 hash;
   for (const SceneEntry& entry : entries) {
@@ -137,7 +137,7 @@ v1::Scene UploadScene(Connection& connection,
     request.set_request_id(NewUuid());
     try {
       scene = connection.Call(&v1::SceneService::Stub::CreateScene, connection.scenes(), request);
-    } catch (const RpcError& e) {  // another client was faster with the same files
+    } catch (const RpcError& e) {  // another client created the same scene
       if (e.code() != ErrorCode::kAlreadyExists) throw;
       scene = FindScene(connection, "scenes/" + id);
       if (!scene) throw;

@@ -1,4 +1,4 @@
-// A local folder becomes a scene on the server: digests, uploads, CreateScene, CommitScene.
+// Uploads a local folder as a scene: digests, uploads, CreateScene, CommitScene.
 #pragma once
 
 #include <string>
@@ -16,19 +16,19 @@ struct SceneEntry {
   FileDigest digest;
 };
 
-// The largest file that the server takes, bytes. Throws RpcError.
+// Returns the maximum file size of the server, bytes. Throws RpcError.
 int64_t MaxFileBytes(Connection& connection);
 
-// Digests of all files. Before anything is sent (or a long film read), throws
-// Error{kInvalidArgument} for a file of more than `max_file_bytes`, and one that lists up to 10
-// photos that are not whole images.
+// Computes the digests of all files. Before it sends anything or reads a long film, throws
+// Error{kInvalidArgument} for a file larger than `max_file_bytes`, and one that lists up to 10
+// photos that are damaged or no images.
 std::vector<SceneEntry> BuildManifest(const PhotoFolder& folder,
                                       int64_t max_file_bytes,
                                       const CancellationToken& cancel);
 
-// Uploads what is missing, declares and commits the scene. Its id follows from its files, so the
-// same folder gives the same scene. Throws RpcError; one with violations names each file that the
-// server refuses.
+// Uploads missing files, creates and commits the scene. Its id is derived from its files, so the
+// same folder gives the same scene. Throws RpcError with a violation for each file that the server
+// refuses.
 v1::Scene UploadScene(Connection& connection,
                       const std::vector<SceneEntry>& entries,
                       const std::string& display_name,

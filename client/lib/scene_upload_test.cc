@@ -11,7 +11,7 @@
 namespace color3d::client {
 namespace {
 
-TEST(SceneUploadTest, AFilmThatTheServerDoesNotTakeIsNamedBeforeItIsRead) {
+TEST(SceneUploadTest, NamesTooLargeFilmBeforeReadingIt) {
   constexpr int64_t kMost = int64_t{8} << 30;
   const ScratchFolder folder;
   const std::filesystem::path film = folder.path() / "reel.mov";

@@ -20,14 +20,14 @@ std::string Padded(std::string text, size_t columns) {
   return text;
 }
 
-// Control characters of a message would spoil the line that is redrawn.
+// Control characters of a message would break the redrawn line.
 std::string OneLine(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return c < 32; }, ' ');
   return text;
 }
 
-// Never ends within a UTF-8 sequence.
+// Never splits a UTF-8 sequence.
 std::string Cut(std::string text, size_t bytes) {
   if (text.size() <= bytes) return text;
   while (bytes > 0 && (static_cast<unsigned char>(text[bytes]) & 0xc0u) == 0x80u) --bytes;
@@ -44,7 +44,7 @@ std::string Bar(const v1::Progress& progress) {
                      progress.total_steps());
 }
 
-// The server repeats the whole error in every stage that could not run because of it.
+// The server repeats the whole error in every stage that depends on the failed one.
 std::string ShortSkipReason(const std::string& reason) {
   const size_t failed = reason.find(" failed: ");
   const bool of_input = reason.starts_with("input jobs/") && failed != std::string::npos;

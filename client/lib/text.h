@@ -1,4 +1,4 @@
-// Numbers and jobs as people read them. Pure functions.
+// Formats numbers and jobs for display. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -19,20 +19,21 @@ std::string HumanTime(
 // "SUCCEEDED" for STATE_SUCCEEDED.
 std::string StateName(v1::Job::State state);
 
-// What a stage is called on the screen: the job's kind, but "report" for the last stage of a
+// Displayed name of a stage: the kind of the job, but "report" for the last stage of a
 // colorize_scene job.
 std::string StageName(const v1::Job& job);
 
-// A running stage in at most `width` columns: name, bar, step, message, error, time left.
+// Line for a running stage, at most `width` columns: name, bar, step, message, error, time left.
 std::string ProgressLine(const v1::Job& job, int width);
-// An ended stage: seconds and "(cached)", "left out: reason", "failed: reason" or "cancelled".
+// Line for a finished stage: seconds and "(cached)", "left out: reason", "failed: reason" or
+// "cancelled".
 std::string EndLine(const v1::Job& job);
 
-// A line that a POSIX shell reads as these arguments.
+// Returns a command line that a POSIX shell splits into these arguments.
 std::string ShellLine(const std::vector<std::string>& arguments);
 
-// Columns padded to the widest cell, two spaces between; the first row is the heading. A cell is
-// one line, whatever it holds (EscapeControls).
+// Aligns columns to the widest cell, with two spaces in between; the first row is the heading.
+// Control characters in cells are escaped (EscapeControls).
 std::string Table(std::vector<std::vector<std::string>> rows);
 
 }  // namespace color3d::client

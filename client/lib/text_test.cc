@@ -36,7 +36,7 @@ v1::Job Running() {
   return job;
 }
 
-TEST(Text, ProgressLineTellsAll) {
+TEST(Text, ProgressLineHasAllParts) {
   const std::string line = ProgressLine(Running(), 200);
   EXPECT_THAT(line, HasSubstr("personalize "));
   EXPECT_THAT(line, HasSubstr("[##########----------] 50/100"));
@@ -45,7 +45,7 @@ TEST(Text, ProgressLineTellsAll) {
   EXPECT_THAT(line, HasSubstr("training"));
 }
 
-TEST(Text, ProgressLineFitsTheTerminal) {
+TEST(Text, ProgressLineFitsTerminal) {
   v1::Job job = Running();
   job.mutable_progress()->set_message("two\nlines \xe2\x82\xac\xe2\x82\xac\xe2\x82\xac");
   for (int width = 10; width < 120; ++width) {
@@ -56,7 +56,7 @@ TEST(Text, ProgressLineFitsTheTerminal) {
   }
 }
 
-TEST(Text, StepsBeyondTheEndDoNotBreakTheBar) {
+TEST(Text, ClampsProgressBar) {
   v1::Job job = Running();
   job.mutable_progress()->set_step(500);
   EXPECT_THAT(ProgressLine(job, 200), HasSubstr("[####################] 500/100"));
@@ -81,7 +81,7 @@ TEST(Text, EndLines) {
   EXPECT_THAT(EndLine(job), HasSubstr("report "));
 }
 
-TEST(Text, ShellLineQuotesWhatNeedsIt) {
+TEST(Text, ShellLineQuotesIfNeeded) {
   EXPECT_EQ(ShellLine({"color3d", "colorize", "my photos", "-o", "it's"}),
             "color3d colorize 'my photos' -o 'it'\\''s'");
   EXPECT_EQ(ShellLine({""}), "''");

@@ -42,7 +42,7 @@ std::vector<UploadFile> Missing(Connection& connection, const std::vector<Upload
   return missing;
 }
 
-// One file on its way; survives broken connections.
+// Upload of one file, across broken connections.
 class Upload {
  public:
   Upload(Connection& connection, const UploadFile& file)

@@ -9,7 +9,7 @@ namespace {
 
 using UploadTest = BreakingServerTest;
 
-TEST_F(UploadTest, UploadGoesOnWhereTheConnectionBroke) {
+TEST_F(UploadTest, ResumesAfterBrokenConnection) {
   blobs_.drops = 2;
   blobs_.limit = 1'000'000;
   Upload(bytes_);
@@ -21,14 +21,14 @@ TEST_F(UploadTest, UploadGoesOnWhereTheConnectionBroke) {
   EXPECT_EQ(blobs_.writes, 3);
 }
 
-TEST_F(UploadTest, UploadWaitsWhileTheServerIsFull) {
+TEST_F(UploadTest, WaitsWhileServerIsBusy) {
   blobs_.turned_away = 2;
   Upload(bytes_);
   EXPECT_EQ(blobs_.blobs[name_], bytes_);
   EXPECT_EQ(blobs_.writes, 3);
 }
 
-TEST_F(UploadTest, EmptyFilesTravelToo) {
+TEST_F(UploadTest, UploadsEmptyFiles) {
   bytes_.clear();
   digest_ = {Sha256Hex(""), 0};
   name_ = "blobs/" + digest_.sha256 + "/0";
@@ -38,7 +38,7 @@ TEST_F(UploadTest, EmptyFilesTravelToo) {
   EXPECT_EQ(ReadFile(target_), "");
 }
 
-TEST_F(UploadTest, FileThatBecameShorterIsNamed) {
+TEST_F(UploadTest, NamesFileThatBecameShorter) {
   try {
     Upload(bytes_.substr(0, 1000));
     FAIL();
@@ -48,7 +48,7 @@ TEST_F(UploadTest, FileThatBecameShorterIsNamed) {
   }
 }
 
-TEST_F(UploadTest, CancelEndsAnUpload) {
+TEST_F(UploadTest, CancelEndsUpload) {
   cancel_.Cancel();
   EXPECT_THROW(Upload(bytes_), Error);
 }

@@ -16,8 +16,8 @@ namespace {
 
 using Point = PlanePoint;
 
-// Largest share by which the perspective map shrinks or stretches at the middle of an edge, and the
-// largest rotation that goes with it.
+// Maximum relative change of scale by the perspective map at the middle of an edge, and maximum
+// rotation.
 constexpr double kMaxForeshortening = 0.12;
 constexpr double kMaxTilt = 6.0 * std::numbers::pi / 180.0;
 
@@ -25,7 +25,7 @@ void Check(const Image& luminance, const Image& ab, const AugmentOptions& option
   if (luminance.channels != 1 || ab.channels != 2 || luminance.Empty() ||
       luminance.width != ab.width || luminance.height != ab.height) {
     throw InvalidArgument(
-        "augmentation takes L (1 channel) and ab (2 channels) of one size, got {}x{} and {}x{}",
+        "augmentation takes L (1 channel) and ab (2 channels) of one size, but got {}x{} and {}x{}",
         luminance.width,
         luminance.height,
         ab.width,
@@ -39,7 +39,7 @@ void Check(const Image& luminance, const Image& ab, const AugmentOptions& option
   }
 }
 
-// p -> R p / (1 + g . p) about the middle of the crop; the identity by default.
+// p -> R p / (1 + g . p) about the centre of the crop. Identity by default.
 struct Perspective {
   double cosine = 1.0;
   double sine = 0.0;
@@ -55,15 +55,15 @@ struct Perspective {
     map.gy = random.NextUniform(-kMaxForeshortening, kMaxForeshortening);
     return map;
   }
-  // `half` is half of the crop's side; the result is relative to the middle, too.
+  // `half`: half of the crop's side. The result is relative to the centre, too.
   Point Apply(double x, double y, double half) const {
     const double w = 1.0 + (gx * x + gy * y) / half;
     return {(cosine * x - sine * y) / w, (sine * x + cosine * y) / w};
   }
 };
 
-// One drawn augmentation: where each pixel of the crop is read in the source. The order, seen from
-// the source, is the paper's: turn and flip, shuffle, scale, elastic, perspective, crop.
+// A random augmentation: maps each pixel of the crop to its position in the source. The order, from
+// the source, is the paper's: rotation and flip, shuffle, scale, elastic, perspective, crop.
 class SamplingMap {
  public:
   SamplingMap(int width, int height, const AugmentOptions& options, Random& random)
@@ -88,8 +88,8 @@ class SamplingMap {
   }
 
   struct Source {
-    Point position;  // pixel centres at whole numbers
-    // Pixels that may take part in the interpolation, inclusive.
+    Point position;  // pixel centres at integers
+    // Range of pixels for interpolation, inclusive.
     int min_x = 0, max_x = 0, min_y = 0, max_y = 0;
     bool inside = false;
   };
@@ -116,7 +116,7 @@ class SamplingMap {
   }
 
  private:
-  // Whole crop inside the picture when it fits; in the middle when it does not.
+  // Places the crop inside the picture if it fits, else in its centre.
   double DrawCenter(int side, Random& random) const {
     const double half = 0.5 * crop_ * step_;
     const double u = random.NextUniform();
@@ -124,7 +124,7 @@ class SamplingMap {
   }
 
   void DrawShuffle(const AugmentOptions& options, Random& random) {
-    // Cells of one size, so that each fits the place of any other; the remainder stays in place.
+    // Cells of equal size, so that they are interchangeable. The remainder stays in place.
     grid_ = options.shuffle_grid;
     cell_width_ = width_ / grid_;
     cell_height_ = height_ / grid_;
@@ -151,12 +151,12 @@ class SamplingMap {
     source.max_y = top + cell_height_ - 1;
   }
 
-  // Undoes the quarter turns and the flip: coordinates of the turned picture -> of the source.
+  // Inverts rotation and flip: maps coordinates of the rotated picture to the source.
   void Unturn(Point& p, Source& source) const {
     int width = width_;
     int height = height_;
     for (int i = 0; i < quarter_turns_; ++i) {
-      // One quarter turn back; the sides swap.
+      // One quarter turn back, which swaps the sides.
       p = {p.y, width - p.x};
       const Source turned = source;
       source.min_x = turned.min_y;
@@ -180,7 +180,7 @@ class SamplingMap {
     return std::min(value, period - value);
   }
 
-  int width_;  // of the turned picture
+  int width_;  // of the rotated picture
   int height_;
   int crop_;
   bool flip_x_ = false;
@@ -188,7 +188,7 @@ class SamplingMap {
   int grid_ = 0;
   int cell_width_ = 0;
   int cell_height_ = 0;
-  std::vector<int> cells_;  // cells_[place] = cell of the turned picture that is shown there
+  std::vector<int> cells_;  // cells_[place] = cell of the rotated picture at that place
   double step_ = 1.0;       // source px per crop px
   Point center_;
   std::vector<ElasticField> elastic_;  // none or one
@@ -246,12 +246,11 @@ AugmentedSample Augment(const Image& luminance,
   Check(luminance, ab, options);
   if (!weight.Empty() && (weight.channels != 1 || weight.width != luminance.width ||
                           weight.height != luminance.height)) {
-    throw InvalidArgument(
-        "the weights of a picture to be augmented are {}x{} px, the picture {}x{}",
-        weight.width,
-        weight.height,
-        luminance.width,
-        luminance.height);
+    throw InvalidArgument("the weights of a picture to augment are {}x{} px, but the picture {}x{}",
+                          weight.width,
+                          weight.height,
+                          luminance.width,
+                          luminance.height);
   }
   const SamplingMap map(luminance.width, luminance.height, options, random);
   const float offset =
@@ -266,7 +265,7 @@ AugmentedSample Augment(const Image& luminance,
       const Tap tap_x = MakeTap(source.position.x, source.min_x, source.max_x);
       const Tap tap_y = MakeTap(source.position.y, source.min_y, source.max_y);
       const float l = Sample(luminance.Plane(0), luminance.width, tap_x, tap_y);
-      // No jitter must leave L bit for bit as it is.
+      // Without jitter, L must not change by a bit.
       sample.luminance.At(0, y, x) =
           options.luminance_jitter > 0.0
               ? std::clamp(50.0f + contrast * (l - 50.0f) + offset, 0.0f, 100.0f)

@@ -1,6 +1,6 @@
 // Geometric augmentations of the coloured key view (STILL.md "Stage 1c"). Luminance, colour and a
-// validity mask go through one and the same sampling map; chroma is never mixed across a hard
-// shuffle edge (nearest sampling there). Pure functions of the generator; thread-safe.
+// validity mask share one sampling map. Chroma is never mixed across a hard shuffle edge (nearest
+// sampling there). Pure functions of the generator; thread-safe.
 #pragma once
 
 #include "core/base/image.h"
@@ -18,7 +18,7 @@ struct AugmentOptions {
   double elastic_alpha_px = 15.0;
   double elastic_sigma_px = 50.0;
   double perspective_probability = 0.5;
-  double luminance_jitter = 2.0;  // +- L units offset, and the same share of contrast
+  double luminance_jitter = 2.0;  // maximum offset of L, and maximum change of contrast in %
   // The paper's additions: rotations by 90 degrees with flips, and an 8x8 grid shuffle.
   double rot90_probability = 0.0;
   double shuffle_probability = 0.0;
@@ -32,7 +32,7 @@ struct AugmentedSample {
   Image valid;      // 1 channel: 1 where the sample lies inside the source picture
 };
 
-// `weight` (1 channel, empty: 1 everywhere) goes through the same map; `valid` is multiplied by it.
+// `weight` (1 channel; empty: 1 everywhere) is sampled by the same map and multiplies `valid`.
 AugmentedSample Augment(const Image& luminance,
                         const Image& ab,
                         const Image& weight,

@@ -132,7 +132,7 @@ TEST(AugmentTest, QuarterTurnsAndFlipsGiveTheEightSymmetries) {
   EXPECT_EQ(seen.size(), 8u);
 }
 
-TEST(AugmentTest, OutsideOfThePictureIsInvalid) {
+TEST(AugmentTest, IsInvalidOutsideThePicture) {
   const Picture picture = MakePicture(40, 20);
   Random random(1);
   const AugmentedSample sample = Augment(picture.luminance, picture.ab, Identity(60), random);
@@ -155,7 +155,7 @@ TEST(AugmentTest, SameGeneratorSameSample) {
   EXPECT_EQ(first.state().state, second.state().state);
 }
 
-TEST(AugmentTest, OnePixelPictureIsFine) {
+TEST(AugmentTest, AcceptsOnePixelPicture) {
   AugmentOptions options = AugmentOptions::Paper();
   options.crop_px = 8;
   Random random(2);

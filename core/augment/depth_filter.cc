@@ -11,9 +11,9 @@ constexpr int kRadius = 2;
 constexpr int kWindow = (2 * kRadius + 1) * (2 * kRadius + 1);
 constexpr int kMedians = 2;
 constexpr int kMeans = 3;
-constexpr float kSameSurface = 0.06f;  // largest relative difference of depths
+constexpr float kSameSurface = 0.06f;  // maximum relative difference of depths
 
-// Known depths around a pixel, itself included; returns how many.
+// Collects known depths around a pixel, including its own. Returns their number.
 int Neighbours(const Image& depth, int x, int y, std::array<float, kWindow>* values) {
   int count = 0;
   for (int v = std::max(0, y - kRadius); v <= std::min(depth.height - 1, y + kRadius); ++v) {

@@ -12,15 +12,16 @@
 namespace color3d {
 namespace {
 
-// Neighbours whose depths differ by more than this share do not belong to one surface: a plane seen
-// at 80 degrees by 400 px of focal length changes by 1.4 % a pixel.
+// Maximum relative difference of depths of neighbours on one surface. A plane at 80 degrees changes
+// by 1.4 % per pixel at a focal length of 400 px.
 constexpr float kMaxDepthStep = 0.04f;
-constexpr double kMaxStretch = 2.5;      // target area of one source pixel, px
-constexpr double kMinDepthShare = 0.02;  // of the source depth: nothing may come closer
-constexpr float kHiddenShare = 1.15f;    // this much behind what the target sees: hidden
+constexpr double kMaxStretch = 2.5;      // maximum target area of a source pixel, px
+constexpr double kMinDepthShare = 0.02;  // minimum depth, relative to the source
+constexpr float kOccludedDepthRatio =
+    1.15f;  // relative depth behind the target's surface that counts as occluded
 
 struct Vertex {
-  double x = 0.0;  // target px, pixel centres at whole numbers
+  double x = 0.0;  // target px, pixel centres at integers
   double y = 0.0;
   double depth = 0.0;  // 0: none
 };
@@ -48,7 +49,7 @@ class ForwardWarp {
     }
   }
 
-  // Weight 0 where nothing was drawn, or where the target sees something nearer.
+  // Weight 0 where nothing was drawn or the target sees a nearer surface.
   GeneratedPicture Picture(const Image& target_depth) const {
     GeneratedPicture picture{Image(depth_.width, depth_.height, 3),
                              Image(depth_.width, depth_.height, 1)};
@@ -57,7 +58,7 @@ class ForwardWarp {
         const float depth = depth_.At(0, y, x);
         if (!std::isfinite(depth)) continue;
         const float seen = target_depth.Empty() ? 0.0f : target_depth.At(0, y, x);
-        if (seen > 0.0f && depth > kHiddenShare * seen) continue;
+        if (seen > 0.0f && depth > kOccludedDepthRatio * seen) continue;
         picture.weight.At(0, y, x) = 1.0f;
         for (int c = 0; c < 3; ++c) {
           picture.lab.At(c, y, x) =
@@ -107,7 +108,7 @@ class ForwardWarp {
     if (!OneSurface(corners)) return;
     const Vertex &a = *corners[0].vertex, &b = *corners[1].vertex, &c = *corners[2].vertex;
     const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    // Seen from behind, or from so flat an angle that it would be smeared.
+    // Back-facing, or at a grazing angle that would smear it.
     if (!(area > 0.0) || area > kMaxStretch) return;
     const int x0 = std::max(0, static_cast<int>(std::ceil(std::min({a.x, b.x, c.x}))));
     const int y0 = std::max(0, static_cast<int>(std::ceil(std::min({a.y, b.y, c.y}))));

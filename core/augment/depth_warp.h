@@ -1,5 +1,5 @@
-// The key view as another camera would see it, through its depth map (STILL.md "Stage 1c"): a
-// z-buffered forward warp of the surface that the key view sees. Pure functions, thread-safe.
+// Renders the key view from another camera by its depth map (STILL.md "Stage 1c"): a z-buffered
+// forward warp of the visible surface. Pure functions, thread-safe.
 #pragma once
 
 #include "core/augment/generated_picture.h"
@@ -9,21 +9,21 @@ namespace color3d {
 
 struct DepthView {
   Image lab;    // 3 channels, Lab units
-  Image depth;  // 1 channel, same size: camera depth, > 0; 0 where nothing is known
+  Image depth;  // 1 channel, same size: camera depth, > 0; 0 where unknown
   Camera camera;
   Pose cam_from_world;
 };
 
-// What the geometry alone shows from the new camera; fills what the key view does not see.
+// Rendering of the geometry from the new camera. Fills regions that the key view does not see.
 struct TargetGeometry {
   Image luminance;  // 1 channel, L
   Image depth;      // as in DepthView
 };
 
-// From a camera with the same intrinsics at `target_from_world`. The surface is cut where depth
-// jumps, so that nothing is stretched across an edge; what lies behind something that only the
-// target sees is left open. Open pixels have weight 0: their L is that of `geometry` where it has
-// some, the rest continues smoothly. `geometry` may have empty images: then all of it continues.
+// Renders from a camera with the same intrinsics at `target_from_world`. The surface is cut at
+// depth discontinuities, so that nothing is stretched across an edge. Pixels occluded by surfaces
+// that only the target sees stay open. Open pixels have weight 0; their L is that of `geometry`
+// where it is known, else filled smoothly. `geometry` may have empty images.
 GeneratedPicture WarpToView(const DepthView& key,
                             const Pose& target_from_world,
                             const TargetGeometry& geometry);

@@ -35,7 +35,7 @@ Pose MovedRight(double distance) {
   return pose;
 }
 
-TEST(DepthWarpTest, TheSameCameraSeesTheSamePicture) {
+TEST(DepthWarpTest, SameCameraGivesSamePicture) {
   const DepthView key = Wall(false);
   const GeneratedPicture out = WarpToView(key, Pose(), {});
   for (int y = 1; y + 1 < kHeight; ++y) {
@@ -46,7 +46,7 @@ TEST(DepthWarpTest, TheSameCameraSeesTheSamePicture) {
   }
 }
 
-TEST(DepthWarpTest, AWallShiftsByItsDisparity) {
+TEST(DepthWarpTest, ShiftsWallByDisparity) {
   const GeneratedPicture out = WarpToView(Wall(false), MovedRight(0.4), {});
   for (int y = 1; y + 1 < kHeight; ++y) {
     // 70 * 0.4 / 4 = 7 px to the left.
@@ -55,7 +55,7 @@ TEST(DepthWarpTest, AWallShiftsByItsDisparity) {
   }
 }
 
-TEST(DepthWarpTest, NothingIsStretchedOverADepthEdgeAndNearHidesFar) {
+TEST(DepthWarpTest, CutsDepthEdgesAndOccludesFarSurfaces) {
   // To the right: the board moves 14 px left, the wall 7: a gap opens between them.
   const GeneratedPicture apart = WarpToView(Wall(true), MovedRight(0.4), {});
   const int y = kHeight / 2;
@@ -70,7 +70,7 @@ TEST(DepthWarpTest, NothingIsStretchedOverADepthEdgeAndNearHidesFar) {
   }
 }
 
-TEST(DepthWarpTest, HolesShowTheGeometrysLuminanceWithoutWeight) {
+TEST(DepthWarpTest, FillsHolesFromGeometryWithZeroWeight) {
   TargetGeometry geometry{Image(kWidth, kHeight, 1, 66.0f), Image(kWidth, kHeight, 1, 4.0f)};
   const GeneratedPicture out = WarpToView(Wall(false), MovedRight(0.4), geometry);
   EXPECT_EQ(out.lab.At(0, 30, kWidth - 2), 66.0f);
@@ -84,7 +84,7 @@ TEST(DepthWarpTest, HolesShowTheGeometrysLuminanceWithoutWeight) {
   EXPECT_EQ(hidden.weight.At(0, 31, 10), 1.0f);
 }
 
-TEST(DepthFilterTest, NoiseGoesAndEdgesStay) {
+TEST(DepthFilterTest, RemovesNoiseAndKeepsEdges) {
   Image depth = Wall(true).depth;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) depth.At(0, y, x) *= 1.0f + 0.05f * ((x * 7 + y * 13) % 3 - 1);

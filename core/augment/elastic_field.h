@@ -1,4 +1,4 @@
-// A smooth random displacement of the picture plane. Immutable once drawn; thread-safe.
+// Smooth random displacement of the image plane. Immutable, thread-safe.
 #pragma once
 
 #include <algorithm>
@@ -14,11 +14,11 @@ struct PlanePoint {
   double y = 0.0;
 };
 
-// Smooth random displacement: cubic B-spline over nodes that are uniform in -alpha..alpha px and
-// lie sigma px apart, so that it never exceeds alpha.
+// Cubic B-spline over nodes that are uniform in -alpha..alpha px and sigma px apart, so that the
+// displacement never exceeds alpha.
 class ElasticField {
  public:
-  // For positions 0..size_px; `alpha_px`: bound of each component.
+  // Requires: positions in 0..size_px. `alpha_px`: bound of each component.
   ElasticField(int size_px, double alpha_px, double sigma_px, Random& random)
       : spacing_(sigma_px), nodes_(static_cast<int>(size_px / sigma_px) + 5) {
     offsets_.resize(static_cast<size_t>(nodes_) * nodes_);

@@ -13,8 +13,8 @@ namespace {
 constexpr double kMinZoom = 1.03;
 constexpr double kMaxZoom = 1.12;
 constexpr double kMaxTurn = 2.0 * std::numbers::pi / 180.0;
-constexpr double kFlowShare = 0.03;     // of the longer side: bound of the flow
-constexpr double kSpacingShare = 0.25;  // between the nodes that it is drawn at
+constexpr double kFlowShare = 0.03;     // bound of the flow, relative to the longer side
+constexpr double kSpacingShare = 0.25;  // spacing of its nodes, relative to the longer side
 
 double Mirrored(double value, double side) {
   const double period = 2.0 * side;

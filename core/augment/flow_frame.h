@@ -1,5 +1,5 @@
-// A frame of a film that starts at the key view, without knowing its geometry (STILL.md
-// "Stage 1c"): a slow zoom and turn, and a smooth flow. Pure function, thread-safe.
+// Synthetic frame of a film that starts at the key view, without geometry (STILL.md "Stage 1c"): a
+// slow zoom and rotation, and a smooth flow. Pure function, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -8,8 +8,8 @@
 
 namespace color3d {
 
-// `lab`: 3 channels, Lab units. Weight 1 inside the picture, 0 where the flow looks beyond its
-// border (there the border is mirrored).
+// `lab`: 3 channels, Lab units. The weight is 1 inside the picture and 0 where the flow leaves it,
+// where the picture is mirrored.
 GeneratedPicture FlowFrame(const Image& lab, uint64_t seed);
 
 }  // namespace color3d

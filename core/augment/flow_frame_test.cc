@@ -21,7 +21,7 @@ Image Ramp(int width, int height) {
   return lab;
 }
 
-TEST(FlowFrameTest, MovesALittleAndEverywhereSmoothly) {
+TEST(FlowFrameTest, FlowIsSmallAndSmooth) {
   const Image lab = Ramp(200, 150);
   const GeneratedPicture frame = FlowFrame(lab, 4);
   double moved = 0.0;
@@ -36,7 +36,7 @@ TEST(FlowFrameTest, MovesALittleAndEverywhereSmoothly) {
   EXPECT_GT(moved, 0.5);
 }
 
-TEST(FlowFrameTest, ColourFollowsItsLuminanceAndWeightTheBorder) {
+TEST(FlowFrameTest, ColorFollowsLuminance) {
   const GeneratedPicture frame = FlowFrame(Ramp(120, 90), 2);
   int inside = 0;
   for (size_t i = 0; i < frame.lab.PlaneSize(); ++i) {
@@ -47,14 +47,14 @@ TEST(FlowFrameTest, ColourFollowsItsLuminanceAndWeightTheBorder) {
   EXPECT_GT(inside, 120 * 90 * 8 / 10);
 }
 
-TEST(FlowFrameTest, TheSeedDecides) {
+TEST(FlowFrameTest, DependsOnSeed) {
   const Image lab = Ramp(64, 48);
   EXPECT_EQ(FlowFrame(lab, 1).lab.data, FlowFrame(lab, 1).lab.data);
   EXPECT_NE(FlowFrame(lab, 1).lab.data, FlowFrame(lab, 2).lab.data);
   EXPECT_EQ(FlowFrame(Image(1, 1, 3, 7.0f), 1).lab.data, (std::vector<float>{7, 7, 7}));
 }
 
-TEST(FillHolesTest, ContinuesWhatIsKnownAndTouchesNothingElse) {
+TEST(FillHolesTest, FillsOnlyUnknownPixels) {
   Image image(40, 30, 1, -1000.0f), known(40, 30, 1);
   for (int y = 0; y < 30; ++y) {
     for (int x = 0; x < 40; ++x) {

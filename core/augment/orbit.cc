@@ -14,10 +14,10 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kMinAngle = 3.0 * kDegree;
 constexpr double kMaxAngle = 12.0 * kDegree;
 constexpr double kDepthRange = 3.0;
-// Of the normal equations' eigenvalues: below it the axes are as good as parallel.
+// Minimum ratio of the eigenvalues of the normal equations; below, the axes count as parallel.
 constexpr double kMinConditioning = 1e-3;
 
-Eigen::Vector3d AxisOf(const Pose& pose) {
+Eigen::Vector3d OpticalAxis(const Pose& pose) {
   return pose.rotation.conjugate() * Eigen::Vector3d::UnitZ();
 }
 
@@ -25,13 +25,13 @@ Eigen::Vector3d AxisOf(const Pose& pose) {
 
 Eigen::Vector3d CenterOfAttention(const Scene& scene, int key, double key_depth) {
   const Pose& pose = scene.views.at(static_cast<size_t>(key)).cam_from_world;
-  const Eigen::Vector3d on_axis = pose.Center() + key_depth * AxisOf(pose);
+  const Eigen::Vector3d on_axis = pose.Center() + key_depth * OpticalAxis(pose);
   // Least squares: sum over the views of (I - d d^T) (x - c) = 0.
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   for (const int view : scene.TrainingViews()) {
     const Pose& other = scene.views[static_cast<size_t>(view)].cam_from_world;
-    const Eigen::Vector3d axis = AxisOf(other);
+    const Eigen::Vector3d axis = OpticalAxis(other);
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
     normal += across;
     right += across * other.Center();
@@ -66,7 +66,7 @@ Pose OrbitPose(const Pose& cam_from_world,
                const Eigen::Vector3d& center,
                double azimuth,
                double elevation) {
-  // In the camera's frame the scene turns the other way: x right, y down.
+  // In the camera's frame (x right, y down) the scene turns the other way.
   const Eigen::Quaterniond turn = Eigen::AngleAxisd(elevation, Eigen::Vector3d::UnitX()) *
                                   Eigen::AngleAxisd(azimuth, Eigen::Vector3d::UnitY());
   const Eigen::Vector3d pivot = cam_from_world.Apply(center);

@@ -27,7 +27,7 @@ Scene ArcScene(const Eigen::Vector3d& target) {
   return scene;
 }
 
-TEST(OrbitTest, TheCenterIsWhereTheCamerasLook) {
+TEST(OrbitTest, CenterIsWhereTheCamerasLook) {
   const Eigen::Vector3d target(1.0, -0.5, 3.0);
   const Scene scene = ArcScene(target);
   EXPECT_LT((CenterOfAttention(scene, 2, 4.0) - target).norm(), 1e-6);
@@ -35,7 +35,7 @@ TEST(OrbitTest, TheCenterIsWhereTheCamerasLook) {
       << "0.4 rad, kept within what a warp bears";
 }
 
-TEST(OrbitTest, ParallelCamerasTurnAboutTheKeyViewsOwnDepth) {
+TEST(OrbitTest, ParallelCamerasOrbitAtKeyDepth) {
   Scene scene;
   for (const double x : {-1.0, 0.0, 1.0}) scene.views.push_back(ViewAt({x, 0.0, 0.0}, 0.0));
   EXPECT_LT((CenterOfAttention(scene, 1, 7.0) - Eigen::Vector3d(0.0, 0.0, 7.0)).norm(), 1e-6);
@@ -45,7 +45,7 @@ TEST(OrbitTest, ParallelCamerasTurnAboutTheKeyViewsOwnDepth) {
             1e-6);
 }
 
-TEST(OrbitTest, TheCameraMovesRightAndUpAndKeepsLooking) {
+TEST(OrbitTest, CameraMovesRightAndUpFacingTheCenter) {
   const Eigen::Vector3d target(0.0, 0.0, 5.0);
   const Pose pose = ViewAt({0.0, 0.0, 0.0}, 0.0).cam_from_world;
   const Pose right = OrbitPose(pose, target, 0.2, 0.0);
@@ -56,7 +56,7 @@ TEST(OrbitTest, TheCameraMovesRightAndUpAndKeepsLooking) {
   EXPECT_LT((up.Apply(target) - target).norm(), 1e-9);
 }
 
-TEST(OrbitTest, OneViewAloneHasAnAngleToo) {
+TEST(OrbitTest, HasAngleForSingleView) {
   Scene scene;
   scene.views.push_back(ViewAt({0.0, 0.0, 0.0}, 0.0));
   EXPECT_GT(OrbitAngle(scene, 0, {0.0, 0.0, 2.0}), 0.0);

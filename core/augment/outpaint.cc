@@ -14,18 +14,18 @@
 namespace color3d {
 namespace {
 
-constexpr int kSearchSidePx = 160;     // the picture's longer side while patches are compared
+constexpr int kSearchSidePx = 160;     // longer side of the picture for comparison of patches
 constexpr double kPatchShare = 0.12;   // of the longer side
 constexpr double kOverlapShare = 0.3;  // of the patch
-// Patches whose overlap disagrees by at most this much more than the best one's take part in the
-// draw (Efros & Freeman: 0.1).
+// Maximum excess of the error of a patch's overlap over the best one's to be a candidate (Efros &
+// Freeman: 0.1).
 constexpr double kTolerance = 0.1;
-// The world is upright: what is taken from the other end of the picture's height costs this much,
-// Lab units squared per pixel; so does a patch that was used before.
+// Penalty, Lab units squared per pixel, of patches from the other end of the picture's height,
+// since the world is upright, and of patches that were used before.
 constexpr double kHeightCost = 1200.0;
 constexpr double kReuseCost = 12.0;
-// Steps across a seam up to this, Lab units, are smooth shading that is evened out; larger ones are
-// edges of things.
+// Maximum step across a seam, Lab units, that counts as shading and is smoothed. Larger ones are
+// edges.
 constexpr float kMaxStep = 12.0f;
 
 struct Position {
@@ -35,7 +35,7 @@ struct Position {
 
 struct Axis {
   std::vector<int> starts;    // of the patches
-  std::vector<int> overlaps;  // with what lies before each, px
+  std::vector<int> overlaps;  // overlap of each with the one before, px
 };
 
 // Patches that cover [begin + overlap, end), each `overlap` px or more over what is there.
@@ -77,7 +77,7 @@ Image Shrunk(const Image& image, int factor) {
   return out;
 }
 
-// For each of `length` places along a strip the depth from which the new patch is shown: the
+// Returns for each of `length` places along a strip the depth at which the new patch starts: the
 // cheapest connected path through `cost` (length x depth, row-major).
 std::vector<int> CheapestCut(const std::vector<float>& cost, int length, int depth) {
   std::vector<float> total = cost;
@@ -101,10 +101,10 @@ std::vector<int> CheapestCut(const std::vector<float>& cost, int length, int dep
   return cut;
 }
 
-// Extends the canvas to the right of and below its filled upper left corner.
+// Extends the canvas from its filled upper left corner to the right and downwards.
 class Quilter {
  public:
-  // `source`: mirrored such that its lower right quadrant is the one that becomes the corner.
+  // `source`: mirrored such that its lower right quadrant becomes the corner.
   Quilter(const Image& source, Random& random)
       : source_(source),
         random_(random),
@@ -144,7 +144,7 @@ class Quilter {
   }
 
  private:
-  // The patch's place on the canvas and how far others reach into it.
+  // Position of the patch on the canvas and overlap with earlier ones.
   struct Place {
     Position at;
     int left = 0;
@@ -162,8 +162,8 @@ class Quilter {
     }
   }
 
-  // Sum over the overlap of squared differences, stopped above `bound`. All in pixels of `source`
-  // and `canvas`, which are those of either scale.
+  // Sum of squared differences over the overlap, aborted above `bound`. In pixels of `source` and
+  // `canvas`, at either scale.
   static double Difference(const Image& source,
                            const Position& from,
                            const Image& patch,
@@ -196,7 +196,7 @@ class Quilter {
     return patch;
   }
 
-  // Where the canvas would lie in the source if that went on: its rows, clamped to the picture.
+  // Row of the source that continues at this row of the canvas, clamped to the picture.
   double HeightCost(const Place& place, int source_y) const {
     const int wanted =
         std::min(place.at.y + source_.height - known_height_, source_.height - patch_);
@@ -307,8 +307,8 @@ class Quilter {
     }
   }
 
-  // By how much the canvas differs from the patch along the cut, continued smoothly over the patch;
-  // where they show different things, 0.
+  // Difference between canvas and patch along the cut, continued smoothly over the patch; 0 at
+  // edges.
   Image StepAcrossSeam(const Place& place,
                        const Position& from,
                        const std::vector<int>& first_x,
@@ -342,7 +342,7 @@ class Quilter {
   int patch_ = 0;   // px, a multiple of the factor
   int overlap_ = 0;
   Image small_;
-  std::vector<float> reuse_;  // of each search position
+  std::vector<float> reuse_;  // penalty of each search position
 };
 
 }  // namespace
@@ -353,7 +353,8 @@ GeneratedPicture OutpaintQuadrant(const Image& lab,
                                   const CancellationToken& cancel) {
   if (lab.channels != 3 || std::min(lab.width, lab.height) < kMinGeneratedSidePx) {
     throw InvalidArgument(
-        "outpainting takes a Lab picture of at least {} px each way, got {}x{} with {} channels",
+        "outpainting needs a Lab picture with sides of at least {} px, but got {}x{} with {} "
+        "channels",
         kMinGeneratedSidePx,
         lab.width,
         lab.height,
@@ -361,7 +362,7 @@ GeneratedPicture OutpaintQuadrant(const Image& lab,
   }
   const bool flip_x = quadrant == Quadrant::kUpperLeft || quadrant == Quadrant::kLowerLeft;
   const bool flip_y = quadrant == Quadrant::kUpperLeft || quadrant == Quadrant::kUpperRight;
-  // Mirrored there and back, so that patches themselves stay upright.
+  // Mirrors twice, so that the patches stay upright.
   const Image source = Mirrored(lab, flip_x, flip_y);
   Random random(seed, /*stream=*/static_cast<uint64_t>(quadrant));
   const GeneratedPicture grown = Quilter(source, random).Run(cancel);

@@ -1,8 +1,8 @@
-// Patch-based outpainting (STILL.md "Stage 1c"): a quadrant of the key view is put into the
-// opposite corner of a canvas of the key view's size, and its two outer sides are extended by
-// quilting (Efros & Freeman 2001). Every pixel is a copy whose chroma travels with its own
-// luminance; only small steps of shading between neighbouring patches are evened out, in all three
-// channels alike. Nothing is averaged. Pure function of its arguments, thread-safe.
+// Patch-based outpainting (STILL.md "Stage 1c"): a quadrant of the key view is placed in the
+// opposite corner of a canvas of the same size, and its two open sides are extended by quilting
+// (Efros & Freeman 2001). Every pixel is a copy with both its luminance and its chroma. Only small
+// steps of shading between neighbouring patches are smoothed, equally in all three channels.
+// Nothing is averaged. Pure function, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,13 @@
 
 namespace color3d {
 
-// Smaller pictures, each way, hold too few patches; nothing is generated from or taken for them.
+// Minimum side of pictures for generation; smaller ones have too few patches.
 inline constexpr int kMinGeneratedSidePx = 32;
 
 enum class Quadrant { kUpperLeft, kUpperRight, kLowerLeft, kLowerRight };
 
-// `lab`: 3 channels, Lab units, at least kMinGeneratedSidePx each way. Weight 1 on the quadrant,
-// kRearrangedWeight on what was added. Throws Error{kInvalidArgument} on another picture.
+// `lab`: 3 channels, Lab units, sides of at least kMinGeneratedSidePx. Weight 1 on the quadrant,
+// kRearrangedWeight on added pixels. Throws Error{kInvalidArgument} for other pictures.
 GeneratedPicture OutpaintQuadrant(const Image& lab,
                                   Quadrant quadrant,
                                   uint64_t seed,

@@ -26,7 +26,7 @@ Image Labelled(int width, int height) {
 
 const CancellationToken kGoOn;
 
-TEST(OutpaintTest, EachQuadrantLiesInTheOppositeCornerAndItsOuterSidesAreExtended) {
+TEST(OutpaintTest, MovesQuadrantToOppositeCornerAndExtendsIt) {
   const Image lab = Labelled(81, 64);  // odd and even
   struct Expectation {
     Quadrant quadrant;
@@ -74,7 +74,7 @@ TEST(OutpaintTest, ChromaNeverLeavesItsLuminance) {
   }
 }
 
-TEST(OutpaintTest, StepsOfShadingAtSeamsAreEvenedOut) {
+TEST(OutpaintTest, EvensOutShadingAtSeams) {
   Image lab(160, 120, 3);
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) {
@@ -92,7 +92,7 @@ TEST(OutpaintTest, StepsOfShadingAtSeamsAreEvenedOut) {
   }
 }
 
-TEST(OutpaintTest, SeamsOfATextureAreNoRougherThanTheTexture) {
+TEST(OutpaintTest, SeamsAreAsSmoothAsTheTexture) {
   Image lab(160, 120, 3);
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) {
@@ -112,7 +112,7 @@ TEST(OutpaintTest, SeamsOfATextureAreNoRougherThanTheTexture) {
   EXPECT_LT(roughest(out), 2.0f * roughest(lab));
 }
 
-TEST(OutpaintTest, TheSeedDecidesAndNothingElse) {
+TEST(OutpaintTest, IsRepeatableForSameSeed) {
   Image lab = Labelled(96, 72);
   Random random(5);
   for (float& v : lab.data) v += static_cast<float>(random.NextNormal());
@@ -122,7 +122,7 @@ TEST(OutpaintTest, TheSeedDecidesAndNothingElse) {
   EXPECT_EQ(run(1), run(1));
 }
 
-TEST(OutpaintTest, OddShapesAreCoveredAndTinyOnesRefused) {
+TEST(OutpaintTest, CoversOddShapesAndRefusesTinyOnes) {
   for (const auto& [width, height] : {std::pair{32, 300}, {333, 33}, {32, 32}, {65, 47}}) {
     const GeneratedPicture picture =
         OutpaintQuadrant(Labelled(width, height), Quadrant::kUpperLeft, 1, kGoOn);
@@ -133,7 +133,7 @@ TEST(OutpaintTest, OddShapesAreCoveredAndTinyOnesRefused) {
   EXPECT_THROW(OutpaintQuadrant(Image(64, 64, 1), Quadrant::kUpperLeft, 1, kGoOn), Error);
 }
 
-TEST(OutpaintTest, EndsWhenItIsCancelled) {
+TEST(OutpaintTest, StopsWhenCancelled) {
   CancellationToken cancel;
   cancel.Cancel();
   EXPECT_THROW(OutpaintQuadrant(Labelled(64, 64), Quadrant::kUpperLeft, 1, cancel), Error);

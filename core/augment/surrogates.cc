@@ -15,9 +15,9 @@
 namespace color3d {
 namespace {
 
-constexpr float kMinOpacity = 0.6f;    // below it the rendered depth means nothing
-constexpr double kMinCoverage = 0.25;  // of a picture by the key view
-// The film frame's camera, in median depths.
+constexpr float kMinOpacity = 0.6f;    // minimum opacity for a valid depth
+constexpr double kMinCoverage = 0.25;  // minimum coverage of a picture by the key view
+// Camera motion of the film frame, in median depths.
 constexpr double kDriftAside = 0.05;
 constexpr double kDriftForward = 0.04;
 
@@ -71,7 +71,7 @@ std::string Surrogates::Obstacle(AugmentationKind kind) const {
   }
   if (kind != AugmentationKind::kNovelView || median_depth_ > 0.0) return "";
   return render_ ? "the geometry fills less than half of the key view"
-                 : "there is no luminance geometry among the inputs";
+                 : "no luminance geometry among the inputs";
 }
 
 std::optional<GeneratedPicture> Surrogates::Make(AugmentationKind kind, int index) const {

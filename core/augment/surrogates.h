@@ -1,6 +1,6 @@
-// Surrogates of what a generative model would make of the coloured key view, without any model: the
-// picture continued beyond its border, the next frame of a film, and views from cameras nearby
-// (STILL.md "Stage 1c"). Thread-safe as far as the renderer is.
+// Surrogates for a generative model's variations of the coloured key view, without a model: the
+// picture extended beyond its border, the next frame of a film, and views from nearby cameras
+// (STILL.md "Stage 1c"). Thread-safe if the renderer is.
 #pragma once
 
 #include <Eigen/Core>
@@ -25,7 +25,7 @@ struct KeyPicture {
   Pose cam_from_world;
 };
 
-// What a camera sees of the luminance geometry, 1 channel each.
+// Rendering of the luminance geometry from a camera, 1 channel each.
 struct RenderedGeometry {
   Image luminance;  // L
   Image depth;
@@ -36,7 +36,7 @@ using GeometryRenderer =
 
 class Surrogates {
  public:
-  // `render`: of the luminance geometry; empty: no novel views, and the film frame is a mere flow.
+  // `render`: renders the luminance geometry; empty: no novel views, and film frames by flow only.
   // The references must outlive the object.
   Surrogates(const KeyPicture& key,
              const Scene& scene,
@@ -45,10 +45,10 @@ class Surrogates {
              uint64_t seed,
              const CancellationToken& cancel);
 
-  // Why this kind cannot be made; empty when it can.
+  // Returns the reason why this kind cannot be made, or an empty string.
   std::string Obstacle(AugmentationKind kind) const;
-  // The picture number `index` (from 0) of its kind; nothing when the key view covers too little of
-  // what it would show. Throws Error{kCancelled}.
+  // Returns picture `index` (from 0) of its kind, or nothing if the key view covers too little of
+  // it. Throws Error{kCancelled}.
   std::optional<GeneratedPicture> Make(AugmentationKind kind, int index) const;
 
  private:
@@ -61,7 +61,7 @@ class Surrogates {
   const uint64_t seed_;
   const CancellationToken& cancel_;
   DepthView depth_view_;
-  double median_depth_ = 0.0;  // <= 0: nothing is known
+  double median_depth_ = 0.0;  // <= 0: unknown
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   double angle_ = 0.0;
 };

@@ -16,8 +16,8 @@ struct FileDigest {
   std::string sha256;  // 64 lower-case hexadecimal digits
   int64_t size_bytes = 0;
 };
-// Reads the file in pieces. Throws Error{kNotFound} when it is not there, kFailedPrecondition when
-// it may not be read, kDataLoss when the disk does not give it.
+// Reads the file in pieces. Throws Error{kNotFound} if it does not exist, kFailedPrecondition if it
+// may not be read, kDataLoss if reading fails.
 FileDigest DigestFile(const std::filesystem::path& path);
 
 // Incremental form. Not thread-safe.

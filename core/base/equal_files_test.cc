@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST(EqualFiles, BytesCountAndNothingElse) {
+TEST(EqualFiles, ComparesBytesOnly) {
   const ScratchFolder folder;
   const auto write = [&](const char* name, const std::string& bytes) {
     WriteFileAtomic(folder.path() / name, bytes);

@@ -17,24 +17,24 @@ enum class ErrorCode {
   kDeadlineExceeded,
   kNotFound,
   kAlreadyExists,
-  kFailedPrecondition,  // right input, wrong state: do something else first
+  kFailedPrecondition,  // right input, wrong state: another step must come first
   kResourceExhausted,   // disk, memory, quota
   kAborted,             // lost a race (a lease, an etag): start again
   kUnimplemented,
-  kInternal,     // our own bug
+  kInternal,     // a bug of this program
   kUnavailable,  // try again later
-  kDataLoss,     // stored bytes are not what was written
-  // Appended: the numbers of the codes above stand in stored jobs.
-  kOutOfRange,        // the position lies outside of what is kept
+  kDataLoss,     // stored bytes differ from those written
+  // Appended, because stored jobs contain the numbers of the codes above.
+  kOutOfRange,        // the position is outside the stored range
   kUnauthenticated,   // no valid credentials
   kPermissionDenied,  // valid credentials that do not allow the call
 };
 
-// `message` names the offending value and what to do about it, in one line.
+// `message` names the offending value and the remedy, in one line.
 class Error : public std::runtime_error {
  public:
   Error(ErrorCode code, const std::string& message) : std::runtime_error(message), code_(code) {}
-  // The message as fmt::format puts it together.
+  // The message as formatted by fmt::format.
   template <typename First, typename... Rest>
   Error(ErrorCode code, fmt::format_string<First, Rest...> message, First&& first, Rest&&... rest)
       : Error(code, fmt::format(message, std::forward<First>(first), std::forward<Rest>(rest)...)) {
@@ -84,7 +84,7 @@ inline const char* ErrorCodeName(ErrorCode code) {
 inline Error InvalidArgument(const std::string& message) {
   return Error(ErrorCode::kInvalidArgument, message);
 }
-// With the parts of the message put in as fmt does: numbers appear as people write them.
+// Formats the message with fmt.
 template <typename First, typename... Rest>
 Error InvalidArgument(fmt::format_string<First, Rest...> message, First&& first, Rest&&... rest) {
   return Error(ErrorCode::kInvalidArgument,

@@ -1,4 +1,4 @@
-// A few of many, evenly spaced. Pure.
+// Evenly spaced selection from a list. Pure.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace color3d {
 
-// At most so many of them, in their order, beginning with the first.
+// Returns at most the given number of elements, in their order, beginning with the first.
 template <class T>
 std::vector<T> EvenlyOf(std::vector<T> all, size_t most) {
   if (all.size() <= most) return all;

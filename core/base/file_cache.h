@@ -1,7 +1,7 @@
-// Small results that are worth keeping between runs, one file each, by the digest of what they were
-// computed from. What it returns is what was put in, or nothing: an entry that is torn, damaged or
-// of another key counts as absent. It never fails: without room or permission it keeps nothing.
-// Thread-safe; several processes may share the folder.
+// Cache of small results between runs: one file per entry, named by the digest of its inputs.
+// Returns the stored value or nothing: an entry that is torn, damaged or belongs to another key
+// counts as absent. Never fails: without disk space or permission it stores nothing. Thread-safe;
+// several processes may share the folder.
 #pragma once
 
 #include <cstdint>
@@ -14,15 +14,15 @@ namespace color3d {
 
 class FileCache {
  public:
-  // An empty folder name: a cache that keeps nothing. The folder is made when it is needed.
+  // An empty folder name gives a cache that stores nothing. The folder is created on first use.
   FileCache(std::filesystem::path folder, int64_t max_bytes)
       : folder_(std::move(folder)), max_bytes_(max_bytes) {}
 
   // `key`: 64 hexadecimal digits (Sha256Hex). A hit counts as use.
   std::optional<std::string> Get(const std::string& key) const;
-  // Not synced to disk: a torn entry is noticed by its digest.
+  // Not synced to disk: the digest reveals a torn entry.
   void Put(const std::string& key, std::string_view bytes) const;
-  // Removes the entries that were used longest ago until `max_bytes` hold the rest.
+  // Removes the least recently used entries until the rest holds at most `max_bytes`.
   void Trim() const;
 
  private:

@@ -24,7 +24,7 @@ class FileCacheTest : public ::testing::Test {
   FileCache cache_{Folder(), 1 << 20};
 };
 
-TEST_F(FileCacheTest, ReturnsWhatWasPutIn) {
+TEST_F(FileCacheTest, ReturnsStoredValue) {
   EXPECT_FALSE(cache_.Get(kKey));
   const std::string bytes("a\0b\n", 4);
   cache_.Put(kKey, bytes);
@@ -35,7 +35,7 @@ TEST_F(FileCacheTest, ReturnsWhatWasPutIn) {
   EXPECT_FALSE(cache_.Get("../etc/passwd"));
 }
 
-TEST_F(FileCacheTest, TornDamagedAndMisplacedEntriesAreAbsent) {
+TEST_F(FileCacheTest, DamagedAndMisplacedEntriesAreAbsent) {
   const std::string bytes(1000, 'x');
   const fs::path file = Folder() / kKey;
   cache_.Put(kKey, bytes);
@@ -55,7 +55,7 @@ TEST_F(FileCacheTest, TornDamagedAndMisplacedEntriesAreAbsent) {
   EXPECT_EQ(cache_.Get(kKey), bytes);
 }
 
-TEST_F(FileCacheTest, TrimRemovesWhatWasUsedLongestAgo) {
+TEST_F(FileCacheTest, TrimRemovesLeastRecentlyUsed) {
   const FileCache small(Folder(), 2500);
   std::vector<std::string> keys;
   for (int i = 0; i < 4; ++i) {
@@ -76,7 +76,7 @@ TEST_F(FileCacheTest, TrimRemovesWhatWasUsedLongestAgo) {
   EXPECT_FALSE(fs::exists(Folder() / ".put-1-1"));
 }
 
-TEST_F(FileCacheTest, WithoutAFolderOrPermissionItKeepsNothing) {
+TEST_F(FileCacheTest, KeepsNothingWithoutWritableFolder) {
   const FileCache none("", 100);
   none.Put(kKey, "x");
   none.Trim();
@@ -88,7 +88,7 @@ TEST_F(FileCacheTest, WithoutAFolderOrPermissionItKeepsNothing) {
   EXPECT_FALSE(blocked.Get(kKey));
 }
 
-TEST_F(FileCacheTest, ManyThreadsOnOneKeySeeWholeEntriesOnly) {
+TEST_F(FileCacheTest, ConcurrentReadersSeeWholeEntries) {
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {

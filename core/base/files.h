@@ -9,17 +9,17 @@
 
 namespace color3d {
 
-// Whole file as bytes. Throws Error{kNotFound} or Error{kDataLoss}; kResourceExhausted above
-// `max_bytes`.
+// Reads a whole file as bytes. Throws Error{kNotFound} or Error{kDataLoss}; kResourceExhausted
+// above `max_bytes`.
 std::string ReadFile(const std::filesystem::path& path, int64_t max_bytes = int64_t{1} << 34);
 
-// Replaces `path` atomically and durably; a file that is there keeps its rights, and its owner and
-// group where this process may give files away. Throws Error{kResourceExhausted} when the disk is
-// full, kFailedPrecondition when the folder cannot be written.
+// Replaces `path` atomically and durably. An existing file keeps its mode, and its owner and group
+// where this process may change them. Throws Error{kResourceExhausted} if the disk is full,
+// kFailedPrecondition if the folder cannot be written.
 void WriteFileAtomic(const std::filesystem::path& path, std::string_view bytes);
 
-// The only one of all processes that holds this on the folder: for changes that read a file and
-// write it anew. Waits for its turn. Throws Error when the folder cannot be opened or locked.
+// Exclusive lock on a folder among all processes, for changes that read a file and write it anew.
+// Blocks until the lock is free. Throws Error if the folder cannot be opened or locked.
 class FolderTurn {
  public:
   explicit FolderTurn(const std::filesystem::path& folder);
@@ -31,23 +31,23 @@ class FolderTurn {
   int fd_ = -1;
 };
 
-// Names that were made in the folder survive a power failure. Nothing happens where it cannot be
+// Makes names created in the folder survive a power failure. Does nothing if the folder cannot be
 // opened.
 void SyncFolder(const std::filesystem::path& folder);
 
 // Makes a finished temporary file durable under its final name (fsync, rename, fsync of folder).
 void PublishFile(const std::filesystem::path& temporary, const std::filesystem::path& final_path);
 
-// Regular files below `folder`, recursively, as sorted relative paths with '/' separators. Hidden
-// files are left out. Throws Error{kNotFound} when there is no such folder, kFailedPrecondition
-// naming one that cannot be read.
+// Regular files below `folder`, recursively, as sorted relative paths with '/' separators. Omits
+// hidden files. Throws Error{kNotFound} if the folder does not exist, kFailedPrecondition with the
+// name of a folder that cannot be read.
 std::vector<std::string> ListFiles(const std::filesystem::path& folder);
 
-// True when `path` is relative, not empty, and has no "..", ".", empty or NUL component, no
+// Returns true if `path` is relative, not empty, and has no "..", ".", empty or NUL component, no
 // backslash and no control character: safe to join to a folder of ours.
 bool IsSafeRelativePath(std::string_view path);
 
-// Creates a fresh folder under `parent` and removes it, with all in it, when destroyed.
+// Creates a new folder under `parent` and removes it with its contents on destruction.
 class ScratchFolder {
  public:
   explicit ScratchFolder(

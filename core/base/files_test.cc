@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST(Files, WriteIsAtomicAndReadable) {
+TEST(Files, WritesAtomically) {
   ScratchFolder scratch;
   const fs::path path = scratch.path() / "value.bin";
   WriteFileAtomic(path, "one");
@@ -26,7 +26,7 @@ TEST(Files, WriteIsAtomicAndReadable) {
   EXPECT_EQ(ListFiles(scratch.path()), std::vector<std::string>{"value.bin"});
 }
 
-TEST(Files, AFileThatIsReplacedKeepsItsRightsAndOwner) {
+TEST(Files, ReplacedFileKeepsModeAndOwner) {
   ScratchFolder scratch;
   const fs::path path = scratch.path() / "file";
   WriteFileAtomic(path, "one");
@@ -43,7 +43,7 @@ TEST(Files, AFileThatIsReplacedKeepsItsRightsAndOwner) {
   }
 }
 
-TEST(Files, ErrorsNameThePathAndLeaveNothing) {
+TEST(Files, ErrorsNamePathAndLeaveNoFile) {
   ScratchFolder scratch;
   try {
     WriteFileAtomic(scratch.path() / "missing" / "x", "y");
@@ -57,7 +57,7 @@ TEST(Files, ErrorsNameThePathAndLeaveNothing) {
   EXPECT_TRUE(ListFiles(scratch.path()).empty());
 }
 
-TEST(Files, UnsafePathsAreRecognised) {
+TEST(Files, RecognizesUnsafePaths) {
   for (const char* good : {"a.jpg", "images/a b.jpg", "x/..y/z"}) {
     EXPECT_TRUE(IsSafeRelativePath(good)) << good;
   }

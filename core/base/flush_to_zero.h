@@ -1,5 +1,5 @@
-// Denormal numbers are flushed to zero on this thread while the object lives: decaying Adam moments
-// would otherwise cost a microcode assist each.
+// Flushes denormal numbers to zero on this thread during the lifetime of the object: decaying Adam
+// moments would otherwise cost a microcode assist each.
 #pragma once
 
 #if defined(__SSE__)

@@ -1,5 +1,5 @@
-// Walks through folders. What cannot be read is told, and all else is visited: nobody may take a
-// folder that could not be read for an empty one.
+// Directory walks that report unreadable entries and visit all others, so that an unreadable folder
+// is never mistaken for an empty one.
 #pragma once
 
 #include <filesystem>
@@ -11,9 +11,10 @@ namespace color3d {
 
 enum class WalkDepth { kFolder, kBelow };
 
-// Calls `visit` for each entry of the folder, with kBelow also of those below it (a folder before
-// what it holds), until it returns false. Symbolic links are visited, not followed. Returns what
-// could not be read, "PATH: REASON", without repetition; a folder that is not there is that, too.
+// Calls `visit` for each entry of the folder, with kBelow also for entries of subfolders (a folder
+// before its contents), until it returns false. Visits symbolic links without following them.
+// Returns the entries that could not be read as "PATH: REASON", without repetition; a missing
+// folder is one of them.
 std::vector<std::string> WalkFolder(
     const std::filesystem::path& folder,
     WalkDepth depth,

@@ -29,7 +29,7 @@ class FolderWalkTest : private testing::Unprivileged, public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(FolderWalkTest, WhatCannotBeReadIsToldAndAllElseIsVisited) {
+TEST_F(FolderWalkTest, ReportsUnreadableEntriesAndVisitsOthers) {
   std::set<std::string> seen;
   const auto unreadable =
       WalkFolder(scratch_.path(), WalkDepth::kBelow, [&](const fs::directory_entry& entry) {
@@ -43,14 +43,14 @@ TEST_F(FolderWalkTest, WhatCannotBeReadIsToldAndAllElseIsVisited) {
       ElementsAre(HasSubstr("/none: No such file")));
 }
 
-TEST_F(FolderWalkTest, TheVisitEndsIt) {
+TEST_F(FolderWalkTest, VisitorEndsWalk) {
   int visits = 0;
   const auto unreadable = WalkFolder(
       scratch_.path(), WalkDepth::kBelow, [&](const fs::directory_entry&) { return ++visits < 2; });
   EXPECT_EQ(visits, 2);
 }
 
-TEST_F(FolderWalkTest, NobodyTakesAnUnreadableFolderForAnEmptyOne) {
+TEST_F(FolderWalkTest, UnreadableFolderIsNotEmpty) {
   try {
     ListFiles(scratch_.path());
     FAIL();

@@ -6,8 +6,8 @@
 
 namespace color3d {
 
-// Channel c, row y, column x lives at data[(c * height + y) * width + x]. What the numbers mean is
-// said where the image is made: sRGB in 0..1; Lab with L in 0..100 and a, b in Lab units; a mask.
+// Channel c, row y, column x is at data[(c * height + y) * width + x]. The creator of the image
+// defines the value range: sRGB in 0..1; Lab with L in 0..100 and a, b in Lab units; a mask.
 struct Image {
   int width = 0;
   int height = 0;

@@ -6,7 +6,7 @@
 
 namespace color3d {
 
-// Of one value or more; the mean of the middle two for an even count.
+// Requires at least one value. Returns the mean of the middle two for an even count.
 inline double Median(std::vector<double> values) {
   const size_t middle = values.size() / 2;
   std::nth_element(values.begin(), values.begin() + middle, values.end());

@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-TEST(AvailableMemory, IsTheMinimumOfWhatTheSystemAndTheGroupsLeave) {
+TEST(AvailableMemory, IsMinimumOfSystemAndGroups) {
   const ScratchFolder root;
   const auto put = [&](const std::string& file, const std::string& text) {
     fs::create_directories((root.path() / file).parent_path());
@@ -50,7 +50,7 @@ TEST(AvailableMemory, IsTheMinimumOfWhatTheSystemAndTheGroupsLeave) {
   EXPECT_GT(AvailableMemoryBytes(), 1 << 20);
 }
 
-TEST(MachineMemory, IsTheMinimumOfTheMachineAndTheGroupsLimits) {
+TEST(MachineMemory, IsMinimumOfMachineAndGroupLimits) {
   const ScratchFolder root;
   const auto put = [&](const std::string& file, const std::string& text) {
     fs::create_directories((root.path() / file).parent_path());
@@ -65,7 +65,7 @@ TEST(MachineMemory, IsTheMinimumOfTheMachineAndTheGroupsLimits) {
   EXPECT_EQ(MachineMemoryBytes(root.path()), 4000000);
 }
 
-TEST(IsOutOfMemory, KnowsWhatLibrariesSay) {
+TEST(IsOutOfMemory, KnowsMessagesOfLibraries) {
   EXPECT_TRUE(IsOutOfMemory(std::bad_alloc()));
   EXPECT_TRUE(IsOutOfMemory(std::system_error(EAGAIN, std::generic_category())));
   EXPECT_TRUE(IsOutOfMemory(std::runtime_error(
@@ -91,7 +91,7 @@ int InLimitedProcess(int64_t memory_bytes, const std::function<bool()>& check) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
-TEST(OwnMemory, IsLimitedAndSaysWhatIsLeft) {
+TEST(OwnMemory, ReportsRemainderOfLimit) {
   EXPECT_EQ(OwnMemoryLimitBytes(), INT64_MAX);
   EXPECT_EQ(OwnMemoryLeftBytes(), INT64_MAX);
   constexpr int64_t kLimit = int64_t{256} << 20, kBlock = int64_t{64} << 20;
@@ -116,7 +116,7 @@ TEST(OwnMemory, IsLimitedAndSaysWhatIsLeft) {
 #endif
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-TEST(ReleaseFreedMemory, WhatWasFreedGoesBackToTheSystem) {
+TEST(ReleaseFreedMemory, ReturnsFreedMemoryToSystem) {
   constexpr size_t kBlock = 16 << 10, kBlocks = 8192;  // too small to be mapped each by itself
   std::vector<std::unique_ptr<char[]>> blocks(kBlocks);
   for (auto& block : blocks) {
@@ -154,7 +154,7 @@ int ArenasOfEightThreads() {
 }
 
 // In processes of their own: the limit holds for all threads, forever.
-TEST(ShareMallocArenasDeathTest, ThreadsShareThem) {
+TEST(ShareMallocArenasDeathTest, ThreadsShareArenas) {
   testing::FLAGS_gtest_death_test_style = "threadsafe";
   EXPECT_EXIT(
       {

@@ -25,7 +25,7 @@ class COLOR3D_CAPABILITY("mutex") Mutex {
   std::mutex mutex_;
 };
 
-// Holds a mutex while it lives, except between Unlock() and Lock(). Not thread-safe.
+// Holds a mutex during its lifetime, except between Unlock() and Lock(). Not thread-safe.
 class COLOR3D_SCOPED_CAPABILITY MutexLock {
  public:
   explicit MutexLock(Mutex& mutex) COLOR3D_ACQUIRE(mutex) : mutex_(mutex) { mutex_.Lock(); }
@@ -49,8 +49,8 @@ class COLOR3D_SCOPED_CAPABILITY MutexLock {
   bool held_ = true;
 };
 
-// Waits unlock the mutex meanwhile. There are no predicates: a lambda is a function of its own, of
-// which the analysis does not know that the mutex is held. Wait in a loop.
+// Waiting releases the mutex. There are no predicates, because the analysis does not know that a
+// lambda is called with the mutex held. Wait in a loop.
 class CondVar {
  public:
   void Wait(Mutex& mutex) COLOR3D_REQUIRES(mutex) {

@@ -1,5 +1,5 @@
-// One contract for everything that takes time: trainers, solvers and child processes report what
-// they do here, and a stage turns it into events and error-against-time curves.
+// Progress of long computations: trainers, solvers and child processes report here, and a stage
+// turns the reports into events and error-against-time curves.
 #pragma once
 
 #include <cstdint>
@@ -17,7 +17,7 @@ class ProgressObserver {
   // One point of an error-against-time curve; the observer adds the seconds. `value` may be any
   // finite number; `error_name` says what it is, e.g. "train_l1" or "heldout_psnr_l_db".
   virtual void OnError(int64_t iteration, const std::string& error_name, double value) = 0;
-  // Something the user should read in the report; the work goes on.
+  // A warning for the report; the computation continues.
   virtual void OnWarning(const std::string& message) = 0;
 };
 
@@ -29,21 +29,21 @@ class NullObserver : public ProgressObserver {
   void OnWarning(const std::string&) override {}
 };
 
-// Where a trainer leaves its state so that another process can go on from it. Bytes are opaque.
+// Checkpoints of a trainer, from which another process can resume. The bytes are opaque.
 class CheckpointStore {
  public:
   virtual ~CheckpointStore() = default;
-  // The newest saved state, or nullopt when the work starts afresh.
+  // The newest saved state, or nullopt if there is none.
   virtual std::optional<std::string> Load() = 0;
   // True when enough time has passed since the last Save that saving again is worth its cost.
   virtual bool WantsSave() = 0;
   // Durable when it returns. Throws Error{kAborted} when this worker has lost its lease.
   virtual void Save(const std::string& state) = 0;
-  // The same for states too large to be held in memory. The newest one written to `file`; false
-  // when there is none ...
+  // The same for states too large for memory. Writes the newest state to `file`; returns false if
+  // there is none.
   virtual bool LoadTo(const std::filesystem::path& file);
-  // ... and one in a file of the work's scratch folder, which is moved. As they are, both go by
-  // Load and Save; a stage keeps to one pair or the other.
+  // Moves a file of the scratch folder into the store. By default LoadTo and SaveFile use Load
+  // and Save; a stage uses one pair only.
   virtual void SaveFile(const std::filesystem::path& file);
 };
 

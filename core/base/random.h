@@ -7,7 +7,7 @@
 
 namespace color3d {
 
-// Evenly spread bits (SplitMix64, Steele et al. 2014): neighbouring numbers give unrelated ones.
+// Well-mixed bits (SplitMix64, Steele et al. 2014): neighbouring inputs give unrelated outputs.
 inline uint64_t MixedBits(uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30u)) * 0xbf58476d1ce4e5b9ULL;
@@ -17,7 +17,7 @@ inline uint64_t MixedBits(uint64_t x) {
 
 class Random {
  public:
-  // The whole state, so that a checkpoint can carry it.
+  // The whole state, for checkpoints.
   struct State {
     uint64_t state = 0;
     uint64_t increment = 1;

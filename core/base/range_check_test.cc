@@ -32,7 +32,7 @@ TEST(RangeCheckTest, NamesFieldValueAndRange) {
             "test option sigma is 100001; it must be 0 to 100000");
 }
 
-TEST(RangeCheckTest, NoNumberIsInNoRange) {
+TEST(RangeCheckTest, RejectsNaN) {
   const double infinity = std::numeric_limits<double>::infinity();
   EXPECT_NE(RangeComplaint(std::nan(""), -infinity, infinity), "");
   EXPECT_NE(RangeComplaint(infinity, 0.0, 1.0), "");

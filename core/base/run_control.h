@@ -1,4 +1,4 @@
-// What a long computation is given besides its data and options. Whoever starts it owns all four;
+// Threads, cancellation, progress and checkpoints of a long computation. The caller owns all four;
 // the references must outlive the call.
 #pragma once
 
@@ -9,7 +9,7 @@
 namespace color3d {
 
 struct RunControl {
-  ThreadPool& pool;  // the threads to use, never more
+  ThreadPool& pool;  // at most these threads are used
   CheckpointStore& checkpoints;
   ProgressObserver& progress;
   const CancellationToken& cancel;

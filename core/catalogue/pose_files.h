@@ -1,5 +1,5 @@
-// Which of a scene's files tell poses: one list for the client that sends them, the server that
-// checks them and the import that reads them. Pure functions of names, thread-safe.
+// Files with poses in a scene: one list for the client, which sends them, the server, which checks
+// them, and import, which reads them. Pure functions of names, thread-safe.
 #pragma once
 
 #include <iterator>
@@ -16,15 +16,14 @@ struct ColmapPlace {
   bool whole = false;              // cameras, images and points3D of one kind are there
 };
 
-// The COLMAP models among a scene's files, which are paths relative to its folder: those that are
-// whole, in the places where programs put them (sparse, sparse/0, sparse/1, colmap/sparse/0, the
-// folder itself, ...); where there is none, whole ones in other folders; else what there is of
-// some. The most usual place comes first. In augment/, masks/ and frames/ there is none.
+// Returns the COLMAP models among a scene's files (paths relative to its folder): complete models
+// in the usual places (sparse, sparse/0, sparse/1, colmap/sparse/0, the folder itself, ...); if
+// there are none, complete models in other folders; else incomplete ones. The most usual place
+// comes first. Ignores augment/, masks/ and frames/.
 std::vector<ColmapPlace> ColmapPlaces(const std::vector<std::string>& files);
 
 inline constexpr std::string_view kTransformsFile = "transforms.json";
-// Of Blender, as NeRF's synthetic scenes and D-NeRF have it: read together, without a
-// transforms.json.
+// Blender's, as in NeRF's synthetic scenes and in D-NeRF: merged if there is no transforms.json.
 inline constexpr std::string_view kBlenderFiles[] = {
     "transforms_train.json", "transforms_val.json", "transforms_test.json"};
 inline constexpr std::string_view kPosesBoundsFile = "poses_bounds.npy";

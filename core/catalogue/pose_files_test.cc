@@ -26,7 +26,7 @@ Files operator+(Files x, const Files& y) {
   return x;
 }
 
-TEST(PoseFiles, AllWholeModelsInUsualPlacesAreFound) {
+TEST(PoseFiles, FindsCompleteModelsInUsualPlaces) {
   EXPECT_THAT(Folders({"a.jpg", "images/b.jpg"}), IsEmpty());
   EXPECT_THAT(Folders(Model("sparse/1")), ElementsAre("sparse/1"));
   EXPECT_THAT(Folders(Model("") + Model("colmap/sparse/0") + Model("sparse") + Model("sparse/1") +
@@ -35,13 +35,13 @@ TEST(PoseFiles, AllWholeModelsInUsualPlacesAreFound) {
   EXPECT_THAT(Folders(Model("dense/0/sparse")), ElementsAre("dense/0/sparse"));
 }
 
-TEST(PoseFiles, OtherFoldersCountWhereNoUsualOneHasAModel) {
+TEST(PoseFiles, FallsBackToOtherFolders) {
   EXPECT_THAT(Folders(Model("distorted/sparse/0") + Model("sparse/0")), ElementsAre("sparse/0"));
   EXPECT_THAT(Folders(Model("distorted/sparse/0")), ElementsAre("distorted/sparse/0"));
   EXPECT_THAT(Folders(Model("augment/sparse") + Model("masks/sparse")), IsEmpty());
 }
 
-TEST(PoseFiles, OneKindOfFilesIsEnough) {
+TEST(PoseFiles, UsesOneCompleteFormat) {
   const std::vector<ColmapPlace> both =
       ColmapPlaces(Model("sparse", ".txt") + Model("sparse", ".bin"));
   ASSERT_EQ(both.size(), 1u);
@@ -58,7 +58,7 @@ TEST(PoseFiles, OneKindOfFilesIsEnough) {
   EXPECT_THAT(Folders({"sparse/0/images.txt", "sparse/0/points3D.txt"}), ElementsAre("sparse/0"));
 }
 
-TEST(PoseFiles, TransformsHaveSeveralNames) {
+TEST(PoseFiles, RecognizesNamesOfTransforms) {
   EXPECT_TRUE(IsTransformsFile("transforms.json"));
   EXPECT_TRUE(IsTransformsFile("a/transforms_val.json"));
   EXPECT_FALSE(IsTransformsFile("my_transforms.json"));

@@ -1,4 +1,4 @@
-// What a scene's files are, by their names.
+// Kinds of a scene's files, by their names.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 namespace color3d {
 
-// True for the file name endings of splats that we read: .ply .sog .spz, any case.
+// True for supported splats: .ply .sog .spz, any case.
 inline bool HasSplatExtension(std::string_view path) {
   if (path.size() < 4) return false;
   const std::string ending = LowerCase(path.substr(path.size() - 4));
@@ -37,24 +37,24 @@ inline constexpr std::string_view kFilmEndings[] = {".mp4",
                                                     ".ogv",
                                                     ".wmv"};
 
-// True for the file name endings of films that we read, any case.
+// True for extensions of supported films, any case.
 inline bool HasFilmExtension(std::string_view path) {
   const std::string ending = LowerCase(path.substr(std::min(path.size(), path.find_last_of('.'))));
   return std::find(std::begin(kFilmEndings), std::end(kFilmEndings), ending) !=
          std::end(kFilmEndings);
 }
 
-// Pictures in colour that the user gives for the colorizer to learn from: no photos of the scene.
+// Colour pictures from the user for training the colorizer: no photos of the scene.
 inline bool IsAugmentFile(std::string_view path) { return path.starts_with("augment/"); }
 
-// Masks of photos: what of them counts.
+// Masks of photos: the pixels that are used.
 inline bool IsMaskFile(std::string_view path) { return path.starts_with("masks/"); }
 
-// Frames of a film lie there as pictures, in the order of their names.
+// Folder of the frames of a film as pictures, in the order of their names.
 inline constexpr std::string_view kFramesFolder = "frames/";
 inline bool IsFrameFile(std::string_view path) { return path.starts_with(kFramesFolder); }
 
-// In the scene's folder: when the photos of a COLMAP model were taken.
+// In the scene's folder: capture times of the photos of a COLMAP model.
 inline constexpr std::string_view kTimesFile = "times.txt";
 
 }  // namespace color3d

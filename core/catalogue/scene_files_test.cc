@@ -5,7 +5,7 @@
 namespace color3d {
 namespace {
 
-TEST(SceneFilesTest, FilmsAreKnownByTheEndingsOfTheirNames) {
+TEST(SceneFilesTest, RecognizesFilmsByExtension) {
   for (const char* film : {"walk.mp4",
                            "cams/left.MOV",
                            "00001.MTS",

@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-TEST(StageCatalogueTest, WhatAStageReadsIsMadeByOneBeforeIt) {
+TEST(StageCatalogueTest, EarlierStagesWriteEveryInput) {
   std::set<std::string_view> made;
   for (const Stage& stage : StageCatalogue()) {
     for (const auto* list : {&stage.needs, &stage.reads}) {
@@ -25,21 +25,21 @@ TEST(StageCatalogueTest, WhatAStageReadsIsMadeByOneBeforeIt) {
   }
 }
 
-TEST(StageCatalogueTest, EveryArtifactHasOneMaker) {
+TEST(StageCatalogueTest, EveryArtifactHasOneWriter) {
   std::set<std::string_view> made;
   for (const Stage& stage : StageCatalogue()) {
     for (const char* name : stage.leaves) EXPECT_TRUE(made.insert(name).second) << name;
   }
 }
 
-TEST(StageCatalogueTest, ResultsAreAmongWhatTheStageLeaves) {
+TEST(StageCatalogueTest, ResultsAreOutputsOfTheirStage) {
   for (const Stage& stage : StageCatalogue()) {
     const std::set<std::string_view> made(stage.leaves.begin(), stage.leaves.end());
     for (const char* name : stage.results) EXPECT_TRUE(made.contains(name)) << name;
   }
 }
 
-TEST(StageCatalogueTest, FindsMakersByNameAndByFolder) {
+TEST(StageCatalogueTest, FindsWriterByNameAndFolder) {
   EXPECT_STREQ(StageThatLeaves(artifact::kModel)->kind, kind::kSolveChroma);
   EXPECT_STREQ(StageThatLeaves(std::string(artifact::kViewsAb) + "0001.png")->kind,
                kind::kColorizeViews);
@@ -47,7 +47,7 @@ TEST(StageCatalogueTest, FindsMakersByNameAndByFolder) {
   EXPECT_EQ(StageThatLeaves("nothing.txt"), nullptr);
 }
 
-TEST(StageCatalogueTest, KindsAreFoundOrRefused) {
+TEST(StageCatalogueTest, FindsOrRefusesKinds) {
   EXPECT_STREQ(StageOf(kind::kPersonalize).kind, kind::kPersonalize);
   EXPECT_EQ(FindStage("colour"), nullptr);
   EXPECT_THROW(StageOf("colour"), Error);

@@ -63,7 +63,7 @@ TEST(DeltaE00, AgreesWithSharmasTable) {
   }
 }
 
-TEST(DeltaE00, IsZeroForEqualColorsAndFiniteAtTheEdges) {
+TEST(DeltaE00, IsZeroForEqualColorsAndFiniteAtLimits) {
   Random random(3);
   for (int i = 0; i < 1000; ++i) {
     const LabColor c{
@@ -75,7 +75,7 @@ TEST(DeltaE00, IsZeroForEqualColorsAndFiniteAtTheEdges) {
   EXPECT_TRUE(std::isfinite(DeltaE00({50, 1e6, 0}, {50, -1e6, 1e6})));
 }
 
-TEST(DeltaE00, MeanOverAnImage) {
+TEST(DeltaE00, AveragesOverImage) {
   Image x(2, 1, 3);
   Image y(2, 1, 3);
   for (int i = 0; i < 2; ++i) {

@@ -22,7 +22,7 @@ struct RgbColor {
 
 // float64 reference.
 LabColor LabFromSrgb(const RgbColor& srgb);
-// May leave 0..1: out-of-gamut values are returned as they are.
+// Out-of-gamut values are returned unclamped, outside 0..1.
 RgbColor SrgbFromLabUnclamped(const LabColor& lab);
 // In 0..1: chroma is reduced at constant L and hue until the colour fits, continuously in `lab`.
 // Channels are not clipped, but for up to 1.3 % of red at L 90..100: the gamut's bright yellow edge
@@ -40,7 +40,7 @@ Image LabFromSrgb(const Image& srgb);
 Image LuminanceFromSrgb(const Image& srgb_or_gray);
 // 3-channel Lab (or 1-channel L) -> 3-channel sRGB in 0..1, gamut-mapped as above.
 Image SrgbFromLab(const Image& lab);
-// L (1 channel) and ab (2 channels) of equal size -> Lab (3 channels).
+// Joins L (1 channel) and ab (2 channels) of equal size to Lab (3 channels).
 Image JoinLab(const Image& luminance, const Image& ab);
 
 // Normalised values for splats: L' = L/100, a' = (a+128)/255, b' = (b+128)/255. Neutral chroma is

@@ -1,4 +1,4 @@
-// The parts of a Lab picture; JoinLab (lab.h) puts them together again. Pure, thread-safe.
+// Splits a Lab picture into L and ab; JoinLab (lab.h) is the inverse. Pure, thread-safe.
 #pragma once
 
 #include "core/base/image.h"

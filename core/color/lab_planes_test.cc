@@ -8,7 +8,7 @@
 namespace color3d {
 namespace {
 
-TEST(LabPlanesTest, JoinLabPutsThePartsTogetherAgain) {
+TEST(LabPlanesTest, JoinLabInvertsSplit) {
   Image lab(3, 2, 3);
   for (size_t i = 0; i < lab.data.size(); ++i) lab.data[i] = static_cast<float>(i);
   EXPECT_EQ(LuminanceOfLab(lab).At(0, 1, 2), 5.0f);
@@ -16,7 +16,7 @@ TEST(LabPlanesTest, JoinLabPutsThePartsTogetherAgain) {
   EXPECT_EQ(JoinLab(LuminanceOfLab(lab), ChromaOfLab(lab)).data, lab.data);
 }
 
-TEST(LabPlanesTest, RefusesAnotherChannelCount) {
+TEST(LabPlanesTest, RejectsWrongChannelCount) {
   EXPECT_THROW(LuminanceOfLab(Image(2, 2, 1)), Error);
   EXPECT_THROW(ChromaOfLab(Image(2, 2, 2)), Error);
 }

@@ -17,7 +17,7 @@ double Worst(const LabColor& x, double l, double a, double b) {
   return std::max({std::abs(x.l - l), std::abs(x.a - a), std::abs(x.b - b)});
 }
 
-TEST(Lab, KnownColors) {
+TEST(Lab, MatchesKnownColors) {
   // Lindbloom's calculator, sRGB D65.
   const LabColor red = LabFromSrgb(RgbColor{1, 0, 0});
   EXPECT_LT(Worst(red, 53.2408, 80.0925, 67.2032), 2e-3);
@@ -40,7 +40,7 @@ TEST(Lab, GraysAreNeutralAndMonotone) {
   }
 }
 
-TEST(Lab, ImagePathAgreesWithFloat64OverTheCube) {
+TEST(Lab, ImagePathAgreesWithFloat64) {
   // 65^3 lattice plus random colours plus the dark corner, where the functions bend most.
   const int n = 65;
   Image srgb(n * n, n + 40, 3);
@@ -82,7 +82,7 @@ TEST(Lab, ImagePathAgreesWithFloat64OverTheCube) {
   RecordProperty("worst_lab_1e9", static_cast<int>(worst_lab * 1e9));
 }
 
-TEST(Lab, OutOfGamutSurvivesARoundTrip) {
+TEST(Lab, OutOfGamutColorsRoundTrip) {
   Random random(2);
   for (int i = 0; i < 2000; ++i) {
     const LabColor lab{
@@ -96,7 +96,7 @@ bool Fits(const RgbColor& c) {
   return std::min({c.r, c.g, c.b}) >= 0 && std::max({c.r, c.g, c.b}) <= 1;
 }
 
-TEST(Lab, GamutMappingKeepsLightnessAndHueAndNeverAddsChroma) {
+TEST(Lab, GamutMappingKeepsLightnessAndHue) {
   Random random(4);
   int mapped = 0, strict = 0;
   for (int i = 0; i < 20000; ++i) {
@@ -134,7 +134,7 @@ TEST(Lab, GamutMappingKeepsLightnessAndHueAndNeverAddsChroma) {
   EXPECT_GT(strict, 4000);
 }
 
-TEST(Lab, GamutMappingIsContinuousAtTheYellowEdge) {
+TEST(Lab, GamutMappingIsContinuousAtYellow) {
   // Just off the gamut's surface, everywhere: strict chroma reduction fails this by up to 30 units
   // at bright yellow, where the gamut is not star-shaped.
   Random random(7);
@@ -154,7 +154,7 @@ TEST(Lab, GamutMappingIsContinuousAtTheYellowEdge) {
   EXPECT_LT(worst, 1.2);
 }
 
-TEST(Lab, LightnessOutsideItsRangeIsBlackOrWhite) {
+TEST(Lab, ClampsLightnessToBlackAndWhite) {
   for (const LabColor& lab : {LabColor{-5, 30, 30}, LabColor{0, 50, -20}}) {
     const RgbColor c = SrgbFromLab(lab);
     EXPECT_LT(std::max({c.r, c.g, c.b}), 1e-6);
@@ -165,7 +165,7 @@ TEST(Lab, LightnessOutsideItsRangeIsBlackOrWhite) {
   }
 }
 
-TEST(Lab, ImageGamutMappingAgreesWithTheScalarOne) {
+TEST(Lab, ImageGamutMappingAgreesWithScalar) {
   Random random(5);
   Image lab(100, 100, 3);
   for (size_t i = 0; i < lab.PlaneSize(); ++i) {
@@ -196,7 +196,7 @@ TEST(Lab, OneChannelIsLuminance) {
   }
 }
 
-TEST(Lab, JoinLabAndWrongShapes) {
+TEST(Lab, JoinLabRejectsWrongShapes) {
   const Image lab = JoinLab(Image(2, 2, 1, 50.0f), Image(2, 2, 2, 7.0f));
   EXPECT_EQ(lab.channels, 3);
   EXPECT_EQ(lab.At(0, 1, 1), 50.0f);
@@ -208,7 +208,7 @@ TEST(Lab, JoinLabAndWrongShapes) {
   EXPECT_THROW(SrgbFromLab(Image(2, 2, 2)), Error);
 }
 
-TEST(Lab, AMegapixelTakesFarLessThanASecond) {
+TEST(Lab, ConvertsMegapixelWellBelowOneSecond) {
   Random random(6);
   Image lab(1000, 1000, 3);
   for (size_t i = 0; i < lab.PlaneSize(); ++i) {

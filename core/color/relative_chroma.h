@@ -20,8 +20,9 @@ struct RelativeChroma {
 Image ToRelative(const RelativeChroma& relative, const Image& luminance, Image ab);
 Image FromRelative(const RelativeChroma& relative, const Image& luminance, Image ab);
 
-// The power within small windows of one coloured picture, where most changes of L are of light:
-// slope of log chroma over log (L + 16), pulled to 0.5 where the picture tells little; 0..1.
+// Estimates the power within small windows of one coloured picture, where most changes of L are due
+// to light: slope of log chroma over log (L + 16), regularized to 0.5 where the picture has little
+// contrast; 0..1.
 RelativeChroma FitRelativeChroma(const Image& luminance, const Image& ab);
 
 }  // namespace color3d

@@ -26,20 +26,20 @@ struct Shaded {
   }
 };
 
-TEST(RelativeChromaTest, ThePowerOfAPictureIsFound) {
+TEST(RelativeChromaTest, FindsExponentOfPicture) {
   for (double power : {0.0, 0.3, 0.6, 1.0}) {
     const Shaded picture(power, /*noise=*/0.5);
     EXPECT_NEAR(FitRelativeChroma(picture.luminance, picture.ab).power, power, 0.03) << power;
   }
 }
 
-TEST(RelativeChromaTest, AGrayOrEvenPictureTellsNothing) {
+TEST(RelativeChromaTest, GrayOrFlatPictureHasNoEstimate) {
   EXPECT_NEAR(FitRelativeChroma(Image(40, 40, 1, 50.0f), Image(40, 40, 2, 20.0f)).power, 0.5, 1e-6);
   const Shaded picture(0.6);
   EXPECT_EQ(FitRelativeChroma(picture.luminance, Image(96, 64, 2)).power, 0.5);
 }
 
-TEST(RelativeChromaTest, ThereAndBackIsTheSame) {
+TEST(RelativeChromaTest, RoundTrips) {
   const Shaded picture(0.7, /*noise=*/3.0);
   const RelativeChroma relative{0.7};
   const Image there = ToRelative(relative, picture.luminance, picture.ab);
@@ -51,7 +51,7 @@ TEST(RelativeChromaTest, ThereAndBackIsTheSame) {
   EXPECT_EQ(ToRelative({0.0}, picture.luminance, picture.ab).data, picture.ab.data);
 }
 
-TEST(RelativeChromaTest, LuminanceBeyondItsRangeIsClipped) {
+TEST(RelativeChromaTest, ClampsLuminance) {
   const RelativeChroma relative{1.0};
   EXPECT_FLOAT_EQ(relative.Scale(50.0f), 1.0f);
   EXPECT_EQ(relative.Scale(-30.0f), relative.Scale(0.0f));

@@ -1,5 +1,5 @@
-// Adam (Kingma & Ba 2015) over named tensors, with its whole state open to checkpoints. Torch in
-// the interface; used inside core/colorizer only. Not thread-safe.
+// Adam (Kingma & Ba 2015) over named tensors, whose state can be checkpointed. Torch in the
+// interface; used inside core/colorizer only. Not thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -13,14 +13,14 @@ namespace color3d {
 
 class Adam {
  public:
-  // Changes the given tensors in place; they need gradients switched on.
+  // Updates the given tensors in place. Requires: they have gradients enabled.
   explicit Adam(const NamedTensors& parameters);
 
-  // One step from the gradients, which are cleared. The gradient is scaled down to `max_norm` when
-  // it is longer. Returns its length before; when that is not finite nothing changes.
+  // Takes one step and clears the gradients. A gradient with a norm above `max_norm` is scaled down
+  // to it. Returns the norm before scaling; if it is not finite, nothing changes.
   double Step(double learning_rate, double max_norm);
 
-  // First and second moments, named "m." and "v." plus the parameter. Storage is shared.
+  // First and second moments, named "m." and "v." plus the parameter's name. Shares storage.
   NamedTensors Moments() const;
   int64_t steps() const { return steps_; }
   void set_steps(int64_t steps) { steps_ = steps; }

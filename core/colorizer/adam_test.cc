@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST(AdamTest, AgreesWithTheFormulaInFloat64) {
+TEST(AdamTest, AgreesWithFormulaInFloat64) {
   torch::Tensor x = torch::tensor({3.0f, -2.0f}).requires_grad_(true);
   Adam adam({{"x", x}});
   double value[2] = {3.0, -2.0}, m[2] = {}, v[2] = {};
@@ -29,7 +29,7 @@ TEST(AdamTest, AgreesWithTheFormulaInFloat64) {
   }
 }
 
-TEST(AdamTest, ANonFiniteGradientChangesNothing) {
+TEST(AdamTest, IgnoresNonFiniteGradient) {
   torch::Tensor x = torch::tensor({3.0f}).requires_grad_(true);
   Adam adam({{"x", x}});
   (x * std::numeric_limits<float>::quiet_NaN()).sum().backward();

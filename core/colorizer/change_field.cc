@@ -12,13 +12,13 @@
 namespace color3d {
 namespace {
 
-constexpr double kUnknownApart = 0.8;  // of places in space from those whose position is not known
+constexpr double kUnknownApart = 0.8;  // distance of known positions from unknown ones
 constexpr double kLeastWeight = 0.05;
-constexpr double kSamePlace = 0.75;  // of the most that two places can be alike
+constexpr double kSamePlace = 0.75;  // share of the maximum covariance
 constexpr double kWorthInferring = 1e-5;
 
-// Places that are not known lie together, away from all others.
-torch::Tensor InSpace(const torch::Tensor& positions) {
+// Unknown positions coincide, away from all known ones.
+torch::Tensor EmbedPositions(const torch::Tensor& positions) {
   const torch::Tensor known = positions.slice(1, 3, 4);
   return torch::cat({positions.slice(1, 0, 3) * known, (1.0 - known) * kUnknownApart}, 1);
 }
@@ -30,14 +30,14 @@ FieldPlaces Rows(const FieldPlaces& places, const torch::Tensor& rows) {
           places.seen.index_select(0, rows)};
 }
 
-// The mean of the wanted colours, the most alike first.
-torch::Tensor WantedNear(const torch::Tensor& alike, const torch::Tensor& wanted) {
+// Mean of the wanted colours, weighted by similarity.
+torch::Tensor WeightedTarget(const torch::Tensor& alike, const torch::Tensor& wanted) {
   const torch::Tensor weights = alike.square();
   return torch::matmul(weights, wanted) / weights.sum(1, /*keepdim=*/true).clamp_min(1e-12);
 }
 
-// `change` as far as it leads towards `limit`, and not beyond; rows are pairs.
-torch::Tensor UpTo(const torch::Tensor& limit, const torch::Tensor& change) {
+// Returns the part of `change` that leads towards `limit`, at most up to it. Rows are (a, b).
+torch::Tensor LimitTo(const torch::Tensor& limit, const torch::Tensor& change) {
   const torch::Tensor length = change.square().sum(1, /*keepdim=*/true).clamp_min(1e-9);
   return change * ((limit * change).sum(1, /*keepdim=*/true) / length).clamp(0.0, 1.0);
 }
@@ -51,7 +51,7 @@ ChangeField::ChangeField(FieldPlaces places,
                          const ChangeFieldOptions& options)
     : options_(options), places_(std::move(places)), wanted_(std::move(wanted)) {
   if (wanted_.size(0) == 0) return;
-  torch::Tensor covariance = Alike(places_, places_);
+  torch::Tensor covariance = Covariance(places_, places_);
   const double most = options_.wide + options_.near;
   const torch::Tensor later = correction_of_row.unsqueeze(0) > correction_of_row.unsqueeze(1);
   const torch::Tensor repeated =
@@ -68,10 +68,10 @@ ChangeField::ChangeField(FieldPlaces places,
   inverse_ = inverse_.to(torch::kFloat32);
 }
 
-torch::Tensor ChangeField::Alike(const FieldPlaces& a, const FieldPlaces& b) const {
+torch::Tensor ChangeField::Covariance(const FieldPlaces& a, const FieldPlaces& b) const {
   const torch::Tensor looks = SquaredDistances(a.features, b.features);
   const torch::Tensor space =
-      SquaredDistances(InSpace(a.positions), InSpace(b.positions)).clamp_min_(0.0);
+      SquaredDistances(EmbedPositions(a.positions), EmbedPositions(b.positions)).clamp_min_(0.0);
   const torch::Tensor seen = (a.seen.unsqueeze(1) - b.seen.unsqueeze(0)).abs_();
   const torch::Tensor wide =
       (looks / -options_.wide_looks).exp_() / (1.0 + space.sqrt() / options_.wide_space);
@@ -83,9 +83,10 @@ torch::Tensor ChangeField::Alike(const FieldPlaces& a, const FieldPlaces& b) con
 ChangeField::Answer ChangeField::At(const FieldPlaces& places) const {
   const int64_t count = places.features.size(0);
   if (!inverse_.defined()) return {torch::zeros({count, 2}), torch::zeros({count})};
-  const torch::Tensor alike = Alike(places, places_);
+  const torch::Tensor alike = Covariance(places, places_);
   const torch::Tensor told = (torch::matmul(alike, inverse_) * alike).sum(1);
-  return {UpTo(WantedNear(alike, wanted_) - places.colors, torch::matmul(alike, inverse_x_change_)),
+  return {LimitTo(WeightedTarget(alike, wanted_) - places.colors,
+                  torch::matmul(alike, inverse_x_change_)),
           (told / (options_.wide + options_.near)).clamp_(0.0, 1.0)};
 }
 
@@ -93,10 +94,10 @@ std::vector<ChangeField::Proposal> ChangeField::Propose(const FieldPlaces& place
                                                         const torch::Tensor& deviation,
                                                         int count) const {
   const torch::Tensor scale = deviation.unsqueeze(1) * deviation.unsqueeze(0);
-  // What is known of each place from the others, after what was painted.
-  torch::Tensor covariance = Alike(places, places);
+  // Posterior covariance of the places, given the painted ones.
+  torch::Tensor covariance = Covariance(places, places);
   if (inverse_.defined()) {
-    const torch::Tensor alike = Alike(places, places_);
+    const torch::Tensor alike = Covariance(places, places_);
     covariance -= torch::matmul(torch::matmul(alike, inverse_), alike.t());
   }
   covariance *= scale;

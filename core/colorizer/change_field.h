@@ -1,4 +1,4 @@
-// Gaussian process regression of what the colours of places change by (STILL.md "Corrections";
+// Gaussian process regression of colour changes (STILL.md "Corrections";
 // kriging, Rasmussen & Williams 2006, ch. 2). Torch in the interface; used inside core/colorizer
 // only. Immutable after construction, thread-safe.
 #pragma once
@@ -11,31 +11,31 @@
 namespace color3d {
 
 struct FieldPlaces {
-  torch::Tensor features;   // [n,D] in the bank's space
-  torch::Tensor colors;     // [n,2], Lab units: as they are
-  torch::Tensor positions;  // [n,4], as CellBank's
-  torch::Tensor seen;       // [n], 0..1: share of the colour that a key view shows
+  torch::Tensor features;   // [n,D], in the space of the cell bank
+  torch::Tensor colors;     // [n,2], Lab units: current colours
+  torch::Tensor positions;  // [n,4], as in CellBank
+  torch::Tensor seen;       // [n], 0..1: share of the colour seen in a key view
 };
 
-// How alike the errors of two places' colours are, from 0 to wide + near. Measured on the true
-// colours of training views: errors are alike over wide surfaces of one look, and on one surface in
-// several views.
+// Covariance of the colour errors at two places, 0 to wide + near. Measured on the true colours of
+// training views: errors correlate over large areas with similar features, and on one surface
+// across views.
 struct ChangeFieldOptions {
   double wide = 0.5;
-  double wide_looks = 2.0;  // squared feature distance at which that has fallen to 1/e
-  double wide_space = 0.2;  // distance at which that has halved, in units of the scene's radius
+  double wide_looks = 2.0;  // squared feature distance at which `wide` falls to 1/e
+  double wide_space = 0.2;  // distance at which `wide` halves, in units of the scene's radius
   double near = 0.4;
   double near_looks = 4.0;
-  double near_space = 0.1;  // distance at which that has fallen to 1/e
-  double seen_reach = 0.5;  // what a key view shows is its own: difference of `seen` for 1/e
-  double noise = 0.1;       // variance of what the user paints over that of the errors
+  double near_space = 0.1;  // distance at which `near` falls to 1/e
+  double seen_reach = 0.5;  // difference of `seen` at which the covariance falls to 1/e
+  double noise = 0.1;       // variance of painted colours relative to that of the errors
 };
 
 class ChangeField {
  public:
-  // `wanted` [n,2], Lab units: the colours that `places` should have; `weights` [n], 0..1: how far
-  // each is painted; `correction_of_row` [n]: places that a later correction shows as well are left
-  // out. n may be 0.
+  // `wanted` [n,2], Lab units: target colours of `places`; `weights` [n], 0..1: opacity of the
+  // paint; `correction_of_row` [n]: index of the correction. Places that a later correction shows
+  // too are dropped. n may be 0.
   ChangeField(FieldPlaces places,
               torch::Tensor wanted,
               const torch::Tensor& weights,
@@ -43,30 +43,30 @@ class ChangeField {
               const ChangeFieldOptions& options = {});
 
   struct Answer {
-    // [q,2], Lab units; never beyond the wanted colours of what is most alike: a place that has
-    // them already is not wrong as the painted ones were.
+    // [q,2], Lab units. Never moves a colour past the target colour of the most similar places: a
+    // place that has the target colour already does not share the error of the painted ones.
     torch::Tensor change;
-    torch::Tensor share;  // [q], 0..1: the part of the errors' variance that is told
+    torch::Tensor share;  // [q], 0..1: explained share of the variance of the errors
   };
   Answer At(const FieldPlaces& places) const;
 
   struct Proposal {
     int64_t row;  // of `places`
-    double gain;  // part of the variance at all places that it tells, 0..1
+    double gain;  // share of the variance at all places that it explains, 0..1
   };
-  // The places whose change would tell most of all of them, at most `count`, each after those
-  // before it are known (greedy design of experiments). `deviation` [n]: how large errors are
-  // expected to be. None twice, and none that tells nothing.
+  // Returns at most `count` distinct places whose observation explains most of the variance at all
+  // places, each given those before it (greedy experimental design). `deviation` [n]: expected
+  // error. Places without gain are omitted.
   std::vector<Proposal> Propose(const FieldPlaces& places,
                                 const torch::Tensor& deviation,
                                 int count) const;
 
  private:
-  torch::Tensor Alike(const FieldPlaces& a, const FieldPlaces& b) const;  // [n_a, n_b]
+  torch::Tensor Covariance(const FieldPlaces& a, const FieldPlaces& b) const;  // [n_a, n_b]
 
   ChangeFieldOptions options_;
   FieldPlaces places_;
-  torch::Tensor inverse_;           // [n,n], of the covariance of what was painted
+  torch::Tensor inverse_;           // [n,n], inverse covariance of the painted places
   torch::Tensor wanted_;            // [n,2]
   torch::Tensor inverse_x_change_;  // [n,2]
 };

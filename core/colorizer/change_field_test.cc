@@ -41,7 +41,7 @@ double ChangeAt(const ChangeField& field, const FieldPlaces& places, int row = 0
   return field.At(places).change[row][0].item<double>();
 }
 
-TEST(ChangeField, OfOnePlaceIsTheFormula) {
+TEST(ChangeField, AgreesWithFormulaForOnePlace) {
   const ChangeField field = OneStroke(Places({0.0}), 20.0);
   // Of its own place: variance / (variance + noise).
   EXPECT_NEAR(ChangeAt(field, Places({0.0})), 20.0 * 0.9 / 1.0, 1e-4);
@@ -51,7 +51,7 @@ TEST(ChangeField, OfOnePlaceIsTheFormula) {
   EXPECT_NEAR(field.At(Places({0.2})).share[0].item<double>(), alike * alike / 0.9, 1e-5);
 }
 
-TEST(ChangeField, ReachesWhatIsAlikeAndNearAndNotWhatIsSeenInTheKeyView) {
+TEST(ChangeField, ReachesSimilarAndNearUnseenPlaces) {
   const ChangeField field = OneStroke(Places({0.0, 0.01, 0.02}), 20.0);
   EXPECT_GT(ChangeAt(field, Places({0.01})), 18.0);
   EXPECT_LT(ChangeAt(field, Places({0.01}, /*look=*/3.0)), 0.1);
@@ -59,7 +59,7 @@ TEST(ChangeField, ReachesWhatIsAlikeAndNearAndNotWhatIsSeenInTheKeyView) {
   EXPECT_LT(ChangeAt(field, Places({3.0})), 2.0);
 }
 
-TEST(ChangeField, LeavesWhatHasTheWantedColorAlready) {
+TEST(ChangeField, KeepsPlacesWithTargetColor) {
   const ChangeField field = OneStroke(Places({0.0}), 20.0);
   FieldPlaces right = Places({0.01, 0.01, 0.01});
   right.colors[0].fill_(20.0);  // as wanted
@@ -70,14 +70,14 @@ TEST(ChangeField, LeavesWhatHasTheWantedColorAlready) {
   EXPECT_NEAR(ChangeAt(field, right, 2), 0.0, 1e-4);
 }
 
-TEST(ChangeField, WithoutCorrectionsNothingChanges) {
+TEST(ChangeField, ChangesNothingWithoutCorrections) {
   const ChangeField field({}, torch::zeros({0, 2}), {}, {});
   const ChangeField::Answer answer = field.At(Places({0.0, 1.0}));
   EXPECT_EQ(answer.change.abs().max().item<double>(), 0.0);
   EXPECT_EQ(answer.share.max().item<double>(), 0.0);
 }
 
-TEST(ChangeField, WhereTwoStrokesContradictTheLaterOneCounts) {
+TEST(ChangeField, LaterOfContradictingStrokesCounts) {
   torch::Tensor changes = torch::zeros({2, 2});
   changes[0][0] = 30.0;
   changes[1][0] = -10.0;
@@ -86,7 +86,7 @@ TEST(ChangeField, WhereTwoStrokesContradictTheLaterOneCounts) {
   EXPECT_NEAR(ChangeAt(field, Places({0.0})), -9.0, 1e-4);
 }
 
-TEST(ChangeField, ManyPlacesWithoutAPositionStayFinite) {
+TEST(ChangeField, StaysFiniteWithoutPositions) {
   const int64_t count = 300;
   const ChangeField field = OneStroke(Unknown(count), 12.0);
   const ChangeField::Answer answer = field.At(Unknown(3));
@@ -96,7 +96,7 @@ TEST(ChangeField, ManyPlacesWithoutAPositionStayFinite) {
   EXPECT_LT(ChangeAt(field, Places({0.0})), 3.0);
 }
 
-TEST(ChangeField, ProposesTheUncertainCrowdFirstAndNothingTwice) {
+TEST(ChangeField, ProposesDistinctPlacesByGain) {
   // Five places together, one alone, one that is sure.
   FieldPlaces places = Places({0.0, 0.01, 0.02, 0.03, 0.04, 2.0, -2.0});
   const torch::Tensor deviation = torch::tensor({1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.01});

@@ -27,20 +27,20 @@ namespace color3d {
 namespace {
 
 constexpr float kMaxGivenAb = 256.0f;
-constexpr int kMaxAdapterStages = 8;  // more than any encoder has: all
+constexpr int kMaxAdapterStages = 8;  // more than any encoder has
 
 std::string SizeOf(const Image& image) { return fmt::format("{}x{}", image.width, image.height); }
 
 void CheckFinite(const Image& map, const std::string& name) {
   for (float value : map.data) {
-    if (!std::isfinite(value)) throw InvalidArgument("{} holds a value that is not finite", name);
+    if (!std::isfinite(value)) throw InvalidArgument("{} has a value that is not finite", name);
   }
 }
 
 void CheckPicture(const TrainingPicture& picture) {
   const std::string& name = picture.name;
   if (picture.luminance.channels != 1 || picture.ab.channels != 2 || picture.luminance.Empty()) {
-    throw InvalidArgument("{} needs L with 1 channel and ab with 2, got {} and {}",
+    throw InvalidArgument("{} needs L with 1 channel and ab with 2, but got {} and {} channels",
                           name,
                           picture.luminance.channels,
                           picture.ab.channels);
@@ -59,7 +59,7 @@ void CheckPicture(const TrainingPicture& picture) {
   }
   if (!picture.position.Empty()) {
     if (picture.position.channels != 4 || SizeOf(picture.position) != SizeOf(picture.luminance)) {
-      throw InvalidArgument("the positions of {} are {} px with {} channels, wanted {} with 4",
+      throw InvalidArgument("the positions of {} are {} px with {} channels, expected {} with 4",
                             name,
                             SizeOf(picture.position),
                             picture.position.channels,
@@ -68,7 +68,7 @@ void CheckPicture(const TrainingPicture& picture) {
     CheckFinite(picture.position, name);
   }
   for (float value : picture.ab.data) {
-    // Far beyond every colour; what is stored in half precision would overflow.
+    // Far beyond any colour. Values stored in half precision would overflow.
     if (std::abs(value) > kMaxGivenAb) {
       throw InvalidArgument(
           "{} holds the chroma {}; a and b are Lab units, at most {}", name, value, kMaxGivenAb);
@@ -76,16 +76,16 @@ void CheckPicture(const TrainingPicture& picture) {
   }
   for (float value : picture.weight.data) {
     if (value < 0.0f || value > 1.0f) {
-      throw InvalidArgument("the weights of {} hold {}, allowed are 0 to 1", name, value);
+      throw InvalidArgument("the weights of {} contain {}; allowed are 0 to 1", name, value);
     }
   }
   if (!(picture.share >= 0.0 && picture.share <= 1e6)) {
-    throw InvalidArgument("the share of {} is {}, allowed are 0 to 1e6", name, picture.share);
+    throw InvalidArgument("the share of {} is {}; allowed are 0 to 1e6", name, picture.share);
   }
 }
 
 void CheckPictures(const std::vector<TrainingPicture>& pictures) {
-  if (pictures.empty()) throw InvalidArgument("there is no picture to personalize on");
+  if (pictures.empty()) throw InvalidArgument("no picture to personalize on");
   double shares = 0.0;
   for (const TrainingPicture& picture : pictures) {
     CheckPicture(picture);
@@ -96,7 +96,7 @@ void CheckPictures(const std::vector<TrainingPicture>& pictures) {
   }
 }
 
-// Elsewhere bfloat16 is emulated, slower than float32.
+// On other processors bfloat16 is emulated, slower than float32.
 bool HasBfloat16Products() {
 #if defined(__x86_64__)
   return __builtin_cpu_supports("avx512bf16") != 0;
@@ -120,10 +120,9 @@ void FitWithin(int max_side_px, TrainingPicture* picture) {
 std::shared_ptr<const TapEncoder> RequireTaps(const std::shared_ptr<const Encoder>& encoder) {
   auto network = std::dynamic_pointer_cast<const TapEncoder>(encoder);
   if (!network) {
-    throw Error(
-        ErrorCode::kFailedPrecondition,
-        "the colorizer needs an encoder that shows its feature maps (a ConvNeXt); this one is {}",
-        encoder ? encoder->description() : "null");
+    throw Error(ErrorCode::kFailedPrecondition,
+                "the colorizer needs an encoder with feature maps (a ConvNeXt), but got {}",
+                encoder ? encoder->description() : "null");
   }
   return network;
 }
@@ -133,7 +132,7 @@ void CheckTaps(const ConvNextConfig& encoder) {
   const int last_stride = encoder.Stride(encoder.StageCount() - 1);
   if (kPadMultiple % last_stride == 0) return;
   throw Error(ErrorCode::kFailedPrecondition,
-              "the colorizer works on encoders with strides up to {}; this one goes up to {}",
+              "the colorizer supports encoders with strides up to {}, but this one has {}",
               kPadMultiple,
               last_stride);
 }
@@ -170,8 +169,8 @@ void ColorizerOptions::Validate() const {
 }
 
 TrainingRecipe RecipeFor(const ColorizerOptions& options) {
-  // Ours has no adapters: on random features they left the error where it was (fern 3.77 against
-  // 3.75) and made an iteration slower, because gradients then run through the encoder.
+  // kColor3d has no adapters: on random features they did not reduce the error (fern 3.77 against
+  // 3.75) and slowed iterations down, because gradients then pass through the encoder.
   TrainingRecipe recipe;
   if (options.recipe == ColorizerOptions::Recipe::kPaper) {
     recipe.model.instance_norm = true;
@@ -192,10 +191,10 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
 
 namespace {
 
-// Steps in a turn: seldom enough that handing over costs nothing.
+// Iterations per turn: enough to make the cost of handing over negligible.
 constexpr int kStepsPerTurn = 5;
 
-// What training starts from: neighbors and the model with the key view's statistics.
+// Start of training: neighbors, and the model with the key view's statistics.
 PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
                                  const std::vector<TrainingPicture>& pictures,
                                  const ColorizerOptions& options,
@@ -262,7 +261,7 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
     turn.reset();
     Train(session, control, membership);
     turn.emplace(membership, control.cancel);
-    session.Conclude(control.progress);
+    session.KeepBetterParameters(control.progress);
     parts.curve = session.curve();
     parts.threads = control.pool.thread_count();
     return std::make_shared<const PersonalColorizer>(std::move(parts));

@@ -91,7 +91,7 @@ TEST(ColorizerTest, LearnsTheKeyView) {
   EXPECT_LT(trained, 0.25 * gray);
 }
 
-TEST(ColorizerTest, FileGivesBackTheSameColorizer) {
+TEST(ColorizerTest, RestoresSameColorizerFromFile) {
   const Key key = MakeKey(96, 80);
   for (auto recipe : {ColorizerOptions::Recipe::kColor3d, ColorizerOptions::Recipe::kPaper}) {
     ColorizerOptions options = Quick(3);
@@ -104,7 +104,7 @@ TEST(ColorizerTest, FileGivesBackTheSameColorizer) {
   }
 }
 
-TEST(ColorizerTest, FileKeepsTheSizeOfTheNetwork) {
+TEST(ColorizerTest, FileKeepsNetworkSize) {
   const Key key = MakeKey(96, 80);
   ColorizerOptions options = Quick(3);
   options.adapter_stages = 1;
@@ -119,7 +119,7 @@ TEST(ColorizerTest, FileKeepsTheSizeOfTheNetwork) {
             trained->Colorize(key.luminance).data);
 }
 
-TEST(ColorizerTest, RefusesASizeOfTheNetworkThatIsOutOfRange) {
+TEST(ColorizerTest, RefusesNetworkSizeOutOfRange) {
   ColorizerOptions options;
   options.adapter_stages = 9;
   EXPECT_THROW(options.Validate(), Error);

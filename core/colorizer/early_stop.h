@@ -1,4 +1,4 @@
-// When the curve of the held-out error is flat. Plain value, no torch; not thread-safe.
+// Detects that the curve of the held-out error is flat. No torch. Not thread-safe.
 #pragma once
 
 #include <vector>
@@ -16,7 +16,7 @@ class EarlyStop {
  public:
   explicit EarlyStop(const EarlyStopOptions& options) : options_(options) {}
 
-  // The next point of the curve. True when there is no use in going on.
+  // Adds a point of the curve. Returns true if training should stop.
   bool Add(double error) {
     errors_.push_back(error);
     const int now = static_cast<int>(errors_.size());

@@ -15,8 +15,8 @@ namespace {
 
 constexpr char kPrefix[] = "neighbors.";
 
-// Of each picture but the first, the key view with the cells `key`, those whose colours are sure.
-// What the features of one place differ by from picture to picture goes to `view_noise`.
+// Cells of certain colour of all pictures but the first, the key view, whose cells are `key`. Adds
+// the variation of features of one place between pictures to `view_noise`.
 std::vector<KnownCells> FurtherCells(const TapEncoder& encoder,
                                      std::span<const TrainingPicture> pictures,
                                      const KnownCells& key,
@@ -32,7 +32,7 @@ std::vector<KnownCells> FurtherCells(const TapEncoder& encoder,
   KnownCells previous;
   for (const TrainingPicture& picture : pictures.subspan(1)) {
     cancel.ThrowIfCancelled();
-    KnownCells cells = CellsOf(encoder, picture, options.relative_chroma);
+    KnownCells cells = ComputeKnownCells(encoder, picture, options.relative_chroma);
     view_noise->Add(placed(key), placed(cells), random);
     if (!found.empty()) view_noise->Add(placed(previous), placed(cells), random);
     const torch::Tensor sure = (cells.weights > options.min_weight).nonzero().squeeze(1);
@@ -53,8 +53,8 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
                                    const CancellationToken& cancel)
     : FeatureNeighbors(encoder, options, Whitening(std::vector<Whitening::Projection>()), {}) {
   torch::NoGradGuard no_grad;
-  const KnownCells key = CellsOf(encoder, pictures.front(), options.relative_chroma);
-  // Cells without a colour would answer grey to what looks like them.
+  const KnownCells key = ComputeKnownCells(encoder, pictures.front(), options.relative_chroma);
+  // Cells without a colour would make similar places grey.
   torch::Tensor colored = (key.weights > 0.0).nonzero().squeeze(1);
   if (colored.size(0) == 0) colored = torch::arange(key.weights.size(0));
   const KnownCells of_key =
@@ -66,7 +66,7 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
   whitening_ = Whitening(
       key.blocks, encoder.config().stem_stride, options.whitening, view_noise.Covariances());
   const KnownCells all = Join(parts);
-  // Rounded to half precision here, so that a colorizer read from its file answers the same.
+  // Rounded to half precision here, so that a colorizer read from its file predicts the same.
   const auto stored = [](const torch::Tensor& exact) {
     return exact.to(torch::kHalf).to(torch::kFloat32).contiguous();
   };
@@ -106,7 +106,7 @@ std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& e
                                                              const FeatureNeighborsOptions& options,
                                                              const std::string& what,
                                                              TensorFile* file) {
-  // Shapes that follow from the encoder; only the number of bank entries is the file's own.
+  // All shapes follow from the encoder but the number of bank entries.
   std::vector<Whitening::Projection> projections;
   NamedTensors tensors;
   for (int i = 0; i <= encoder.config().StageCount(); ++i) {
@@ -120,7 +120,7 @@ std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& e
   Whitening whitening(std::move(projections));
   const auto colors = file->arrays.find(std::string(kPrefix) + "colors");
   if (colors == file->arrays.end() || colors->second.shape.empty() || colors->second.shape[0] < 1) {
-    throw InvalidArgument("{} lacks the colours of the feature neighbors", what);
+    throw InvalidArgument("{} has no colours of the feature neighbors", what);
   }
   const int64_t entries = colors->second.shape[0];
   CellBank bank{torch::empty({entries, whitening.Columns()}),
@@ -145,7 +145,7 @@ NeighborColors FeatureNeighbors::Lookup(const std::vector<torch::Tensor>& taps,
   const int64_t height = cells.rows, width = cells.columns;
   CellQueries queries{whitening_.Apply(cells.blocks), {}};
   if (!position.Empty()) {
-    queries.positions = PlacesOf(position, cells.Count());
+    queries.positions = CellPositions(position, cells.Count());
   }
   torch::Tensor rows;
   if (wanted.defined()) {

@@ -1,6 +1,6 @@
-// Colour by nearest neighbors in the frozen encoder's features (core/matching): no training, and
-// as good as some hundred decoder iterations. The bank holds features and ab of the key view. Torch
-// in the interface; used inside core/colorizer only. Immutable after construction, thread-safe.
+// Colour from nearest neighbors in the frozen encoder's features (core/matching). Needs no training
+// and is as accurate as some hundred iterations of the decoder. The bank holds features and ab of
+// the key view. Torch in the interface; used inside core/colorizer only. Immutable, thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -22,28 +22,28 @@
 
 namespace color3d {
 
-// Defaults measured on three scenes (true colours of held-out views); the error is flat around
-// them.
+// Defaults minimize the error on three scenes (true colours of held-out views); the minimum is
+// flat.
 struct FeatureNeighborsOptions {
-  int bank_size = 6000;          // cells of the key view, drawn at random
+  int bank_size = 6000;          // cells of the key view, sampled at random
   int further_bank_size = 3000;  // cells of all other pictures together
-  double min_weight = 0.25;      // cells of other pictures that are surer than this
+  double min_weight = 0.25;      // minimum weight of cells of other pictures
   WhiteningOptions whitening;
   VoteOptions vote{.median_steps = 5, .position_weight = 1.5};
-  RelativeChroma relative_chroma;  // that the bank's colours are kept relative to
+  RelativeChroma relative_chroma;  // luminance model that the bank's colours are relative to
 };
 
 struct NeighborColors {
-  torch::Tensor ab;        // [2,h,w], relative chroma, Lab units at L = 50, a value per cell
+  torch::Tensor ab;        // [2,h,w], relative chroma, Lab units at L = 50, one value per cell
   torch::Tensor distance;  // [h,w], mean squared distance per dimension of the best match
-  torch::Tensor variance;  // [h,w], of the matches' ab, Lab units squared: how far they disagree
+  torch::Tensor variance;  // [h,w], variance of the matches' ab, Lab units squared
 };
 
 class FeatureNeighbors {
  public:
-  // Pictures at training size, the key view first: the feature space is its, the others add cells
-  // whose colours are known (weight) and, where positions are known, what features differ by
-  // between views of one place.
+  // `pictures` at training size, the key view first. The key view defines the feature space. The
+  // others add cells with known colours (by weight) and, where positions are known, the variation
+  // of features between views of one place.
   FeatureNeighbors(const TapEncoder& encoder,
                    std::span<const TrainingPicture> pictures,
                    const FeatureNeighborsOptions& options,
@@ -51,8 +51,8 @@ class FeatureNeighbors {
                    const CancellationToken& cancel);
 
   // `taps` of a padded picture [1,*,*,*] and its L [1,1,H,W]; H, W multiples of kCellPx. `wanted`
-  // [h,w] (bool): cells that need an answer, the others get grey at distance 0; undefined: all.
-  // `position`: PictureFacts', of the size before padding.
+  // [h,w] (bool): cells to look up, undefined: all; the others get grey at distance 0. `position`:
+  // PictureFacts::position, of the size before padding.
   NeighborColors Lookup(const std::vector<torch::Tensor>& taps,
                         const torch::Tensor& luminance,
                         const torch::Tensor& wanted = {},
@@ -61,10 +61,10 @@ class FeatureNeighbors {
   const CellBank& bank() const { return bank_; }
   const Whitening& whitening() const { return whitening_; }
 
-  // Adds the arrays "neighbors.*"; the bank is rounded to half precision already, and stored so.
+  // Adds the arrays "neighbors.*". The bank is in half precision already.
   void PutInto(TensorFile* file) const;
-  // Takes the arrays "neighbors.*" out of the file. Throws Error{kInvalidArgument} starting with
-  // `what` when one is missing or does not fit.
+  // Moves the arrays "neighbors.*" out of the file. Throws Error{kInvalidArgument} starting with
+  // `what` if one is missing or does not fit.
   static std::unique_ptr<FeatureNeighbors> TakeFrom(const TapEncoder& encoder,
                                                     const FeatureNeighborsOptions& options,
                                                     const std::string& what,

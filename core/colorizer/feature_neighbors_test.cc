@@ -50,7 +50,7 @@ TEST_F(FeatureNeighborsTest, NeighborsAgreeWithTheDefinitionInFloat64) {
 }
 
 // A picture whose halves look alike and lie apart, red and blue.
-TEST_F(FeatureNeighborsTest, WhatLooksAlikeIsToldApartInSpace) {
+TEST_F(FeatureNeighborsTest, PositionsSeparateSimilarPlaces) {
   constexpr int kSide = 64;
   TrainingPicture picture{"the key view", Image(kSide, kSide, 1), Image(kSide, kSide, 2)};
   picture.position = Image(kSide, kSide, 4);

@@ -12,7 +12,7 @@ namespace color3d {
 namespace {
 
 constexpr double kWeightFloor = 1e-6;
-constexpr double kMostlyKnown = 0.5;  // share of a cell whose position is known
+constexpr double kMinKnownShare = 0.5;  // minimum share of a cell with known positions
 
 }  // namespace
 
@@ -20,31 +20,31 @@ torch::Tensor PaddedTensor(const Image& image) {
   return PadToMultiple(TensorFromImage(image), kPadMultiple);
 }
 
-torch::Tensor PlacesOf(const Image& position, int64_t count) {
+torch::Tensor CellPositions(const Image& position, int64_t count) {
   if (position.Empty()) return torch::zeros({count, 4});
   const torch::Tensor cells = CellMeans(PaddedTensor(position));
   const torch::Tensor share = cells.slice(1, 3, 4);
-  return torch::cat({cells.slice(1, 0, 3) / share.clamp_min(kMostlyKnown),
-                     (share > kMostlyKnown).to(torch::kFloat32)},
+  return torch::cat({cells.slice(1, 0, 3) / share.clamp_min(kMinKnownShare),
+                     (share > kMinKnownShare).to(torch::kFloat32)},
                     1);
 }
 
-KnownCells CellsOf(const TapEncoder& encoder,
-                   const TrainingPicture& picture,
-                   const RelativeChroma& relative) {
+KnownCells ComputeKnownCells(const TapEncoder& encoder,
+                             const TrainingPicture& picture,
+                             const RelativeChroma& relative) {
   const torch::Tensor l = PaddedTensor(picture.luminance);
   CellFeatures features = DescribeCells(encoder.config(), encoder.Taps(encoder.Input(l)), l);
   const int64_t count = features.Count();
   KnownCells cells;
   cells.blocks = std::move(features.blocks);
-  cells.positions = PlacesOf(picture.position, count);
+  cells.positions = CellPositions(picture.position, count);
   const Image color = ToRelative(relative, picture.luminance, picture.ab);
   if (picture.weight.Empty()) {
     cells.colors = CellMeans(PaddedTensor(color));
     cells.weights = torch::ones({count});
     return cells;
   }
-  // Each pixel counts by its weight.
+  // Weighted mean over the pixels.
   const torch::Tensor weight = PaddedTensor(picture.weight);
   const torch::Tensor mean_weight = CellMeans(weight);
   cells.colors = CellMeans(PaddedTensor(color) * weight) / mean_weight.clamp_min(kWeightFloor);

@@ -1,4 +1,4 @@
-// Places of pictures whose colours are known, before their features are projected. Torch in the
+// Cells of pictures with known colours, before projection of their features. Torch in the
 // interface; used inside core/colorizer only. Pure functions, thread-safe.
 #pragma once
 
@@ -13,23 +13,23 @@
 namespace color3d {
 
 struct KnownCells {
-  std::vector<torch::Tensor> blocks;  // as CellFeatures
+  std::vector<torch::Tensor> blocks;  // as in CellFeatures
   torch::Tensor colors;               // [n,2], Lab units, relative to luminance
   torch::Tensor weights;              // [n], 0..1
-  torch::Tensor positions;            // [n,4], as CellBank's
+  torch::Tensor positions;            // [n,4], as in CellBank
 };
 
-// [1,C,H,W], padded to kPadMultiple.
+// Returns [1,C,H,W], padded to kPadMultiple.
 torch::Tensor PaddedTensor(const Image& image);
 
-// [count,4] of a picture's cells, as CellBank's: means over what is known of each.
-torch::Tensor PlacesOf(const Image& position, int64_t count);
+// Returns [count,4], the mean known position of each cell, as in CellBank.
+torch::Tensor CellPositions(const Image& position, int64_t count);
 
-KnownCells CellsOf(const TapEncoder& encoder,
-                   const TrainingPicture& picture,
-                   const RelativeChroma& relative);
+KnownCells ComputeKnownCells(const TapEncoder& encoder,
+                             const TrainingPicture& picture,
+                             const RelativeChroma& relative);
 
-// Rows of all `parts`, in their order; at least one part.
+// Concatenates the rows of `parts`. Requires: at least one part.
 KnownCells Join(const std::vector<KnownCells>& parts);
 KnownCells Select(const KnownCells& cells, const torch::Tensor& rows);
 

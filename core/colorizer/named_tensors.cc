@@ -30,14 +30,14 @@ void TakeTensors(const NamedTensors& tensors,
   for (const auto& [name, tensor] : tensors) {
     const auto found = file->arrays.find(prefix + name);
     if (found == file->arrays.end()) {
-      throw InvalidArgument("{} lacks the array \"{}{}\"", what, prefix, name);
+      throw InvalidArgument("{} has no array \"{}{}\"", what, prefix, name);
     }
     std::vector<float>& values = found->second.values;
     if (found->second.shape != tensor.sizes().vec()) {
-      throw InvalidArgument("{} holds \"{}{}\" with another shape", what, prefix, name);
+      throw InvalidArgument("{} has array \"{}{}\" in another shape", what, prefix, name);
     }
     if (!std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); })) {
-      throw InvalidArgument("{} holds numbers that are not finite in \"{}{}\"", what, prefix, name);
+      throw InvalidArgument("{} has numbers that are not finite in \"{}{}\"", what, prefix, name);
     }
     torch::Tensor target = tensor;
     target.copy_(torch::from_blob(values.data(), found->second.shape, torch::kFloat32));

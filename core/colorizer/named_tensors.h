@@ -1,4 +1,4 @@
-// Tensors by name, in a fixed order, into files and back. Torch in the interface.
+// Named tensors in a fixed order, stored in and restored from files. Torch in the interface.
 #pragma once
 
 #include <torch/types.h>
@@ -18,9 +18,8 @@ void PutTensors(const NamedTensors& tensors,
                 const std::string& prefix,
                 StoredType type,
                 TensorFile* file);
-// Copies the arrays into the tensors, and takes them out of the file. Throws
-// Error{kInvalidArgument} naming `what` and the array that is missing, of another shape or not
-// finite.
+// Moves the arrays out of the file into the tensors. Throws Error{kInvalidArgument} naming `what`
+// and an array that is missing, misshapen or not finite.
 void TakeTensors(const NamedTensors& tensors,
                  const std::string& prefix,
                  const std::string& what,

@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-TEST(NamedTensorsTest, TensorsThatDoNotFitAreNamed) {
+TEST(NamedTensorsTest, NamesTensorsThatDoNotFit) {
   TensorFile file;
   PutTensors({{"x", torch::ones({2, 3})}}, "net.", StoredType::kFloat16, &file);
   EXPECT_TRUE(file.half.contains("net.x"));
@@ -29,7 +29,7 @@ TEST(NamedTensorsTest, TensorsThatDoNotFitAreNamed) {
     EXPECT_TRUE(copy.arrays.empty());
     return "";
   };
-  EXPECT_THAT(message_of({{"y", torch::ones({2, 3})}}), HasSubstr("lacks the array \"net.y\""));
+  EXPECT_THAT(message_of({{"y", torch::ones({2, 3})}}), HasSubstr("has no array \"net.y\""));
   EXPECT_THAT(message_of({{"x", torch::ones({3, 2})}}), HasSubstr("another shape"));
   torch::Tensor target = torch::zeros({2, 3});
   EXPECT_EQ(message_of({{"x", target}}), "");

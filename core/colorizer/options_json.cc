@@ -13,7 +13,7 @@ namespace {
 template <typename T>
 using Names = std::vector<std::pair<T, const char*>>;
 
-// The words of the colorizer file. They stay as they are, whatever the code calls these things.
+// Names in colorizer files. They must not change, even if the enumerators do.
 const Names<ColorizerOptions::Recipe> kRecipes = {{ColorizerOptions::Recipe::kColor3d, "color3d"},
                                                   {ColorizerOptions::Recipe::kPaper, "paper"}};
 const Names<ColorizerOptions::Precision> kPrecisions = {
@@ -34,7 +34,7 @@ T FromName(const Names<T>& names, const char* what, const std::string& text) {
   for (const auto& [known, name] : names) {
     if (text == name) return known;
   }
-  throw InvalidArgument("the colorizer file names the unknown {} \"{}\"", what, text);
+  throw InvalidArgument("the colorizer file has an unknown {}: \"{}\"", what, text);
 }
 
 }  // namespace

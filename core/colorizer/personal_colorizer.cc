@@ -23,7 +23,7 @@ namespace color3d {
 namespace {
 
 constexpr char kWhat[] = "the colorizer file";
-constexpr char kModel[] = "model.";  // before the names of the network's arrays
+constexpr char kModel[] = "model.";  // prefix of the network's arrays
 constexpr double kMaxAb = 128.0;     // Lab units; sRGB spans about -108..98
 
 Image FitTo(const Image& image, int width, int height) {
@@ -46,7 +46,7 @@ PersonalColorizer::PersonalColorizer(Parts parts)
   }
 }
 
-// Of the blend, [1,1,H/s,W/s]: large where the neighbors contradict each other.
+// Share of the decoder in the blend, [1,1,H/s,W/s]: large where the neighbors disagree.
 torch::Tensor PersonalColorizer::DecoderShare(const torch::Tensor& neighbor_variance,
                                               const torch::Tensor& decoded) const {
   const double doubt = recipe_.neighbor_doubt * recipe_.neighbor_doubt;
@@ -56,7 +56,7 @@ torch::Tensor PersonalColorizer::DecoderShare(const torch::Tensor& neighbor_vari
                                     /*align_corners=*/false);
 }
 
-// `taps`: with adapters the adapted ones.
+// `taps`: the adapted ones, if the model has adapters.
 PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> taps,
                                                    const torch::Tensor& luminance,
                                                    const torch::Tensor& wanted,
@@ -66,7 +66,7 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
   torch::Tensor decoded;
   if (decode) {
     decoded = model.Decode(taps, luminance) * kAbScale;
-    // A hardly trained decoder may answer anything where a picture has nothing of the key view's.
+    // A barely trained decoder is arbitrary where a picture resembles nothing in the key view.
     decoded = decoded.clamp(-kMaxAb, kMaxAb);
   }
   if (!parts_.neighbors) return {decoded, {}};
@@ -85,12 +85,12 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
 
 void PersonalColorizer::Check(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the colorizer takes a picture with 1 channel (L), this one has {}",
+    throw InvalidArgument("the colorizer takes a picture with 1 channel (L), but got {} channels",
                           luminance.channels);
   }
   for (float value : luminance.data) {
     if (!std::isfinite(value)) {
-      throw InvalidArgument("the luminance to be coloured holds a value that is not finite");
+      throw InvalidArgument("the luminance to colour has a value that is not finite");
     }
   }
 }
@@ -143,7 +143,7 @@ torch::Tensor PersonalColorizer::WantedCells(const Image& known, const Image& sm
   for (float& value : unknown.data) value = value > 0.999f ? 0.0f : 1.0f;
   const torch::Tensor cells =
       torch::max_pool2d(Padded(unknown), {kCellPx, kCellPx}, {kCellPx, kCellPx});
-  constexpr int kMarginCells = 1;  // as far as one cell reaches when answers are enlarged
+  constexpr int kMarginCells = 1;  // reach of a cell in upsampling
   return torch::max_pool2d(cells,
                            {2 * kMarginCells + 1, 2 * kMarginCells + 1},
                            {1, 1},
@@ -169,7 +169,7 @@ std::unique_ptr<const Corrector> PersonalColorizer::Correct(
   if (!parts_.neighbors) {
     throw Error(
         ErrorCode::kFailedPrecondition,
-        "a colorizer of the paper's recipe cannot be corrected; colour the scene with another "
+        "colorizers of the paper's recipe cannot be corrected; colour the scene with another "
         "preset");
   }
   for (const Correction& correction : corrections) Check(correction.picture.luminance);
@@ -208,7 +208,7 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
     const std::string trained_on = file.facts.at("encoder");
     if (trained_on != encoder->digest()) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  "the colorizer was trained on the encoder {}, this server has {}; train it again",
+                  "the colorizer was trained on encoder {}, but this server has {}; train it again",
                   trained_on,
                   encoder->digest());
     }
@@ -233,7 +233,7 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
   }
   if (!file.arrays.empty()) {
     throw InvalidArgument(
-        "{} holds the unknown array {}", kWhat, QuotedName(file.arrays.begin()->first));
+        "{} has an unknown array {}", kWhat, QuotedName(file.arrays.begin()->first));
   }
   return std::make_shared<const PersonalColorizer>(std::move(parts));
 }

@@ -26,9 +26,9 @@ class PersonalColorizer : public Colorizer {
     std::unique_ptr<FeatureNeighbors> neighbors;  // may be null
     RelativeChroma relative_chroma;
     std::vector<TrainingPoint> curve;
-    int threads = 0;  // that torch answers on; 0: what the machine has
+    int threads = 0;  // for prediction; 0: one per core
   };
-  // Rounds the model's parameters to half precision, as they are stored.
+  // Rounds the model's parameters to half precision, as in colorizer files.
   explicit PersonalColorizer(Parts parts);
 
   Image Colorize(const Image& luminance) const override;
@@ -37,8 +37,8 @@ class PersonalColorizer : public Colorizer {
   RelativeChroma relative_chroma() const override { return parts_.relative_chroma; }
   std::string Serialize() const override;
 
-  // The steps of Predict, for whoever runs the encoder over many pictures at once: frozen taps
-  // (UsesFrozenTaps) of Padded(AtTrainingSize(luminance)).
+  // Steps of Predict, for callers that run the encoder over several pictures at once. They pass the
+  // frozen taps (UsesFrozenTaps) of Padded(AtTrainingSize(luminance)).
   static void Check(const Image& luminance);
   static std::pair<int, int> PaddedSize(const Image& small);  // width, height
   static torch::Tensor Padded(const Image& small);
@@ -61,19 +61,19 @@ class PersonalColorizer : public Colorizer {
     torch::Tensor ab;        // [1,2,H/s,W/s], Lab units
     torch::Tensor distance;  // [h,w] on the neighbors' grid; undefined without neighbors
   };
-  // Of a padded L [1,1,H,W].
+  // `luminance`: padded L [1,1,H,W].
   Answer Blend(std::vector<torch::Tensor> taps,
                const torch::Tensor& luminance,
                const torch::Tensor& wanted,
                const Image& position) const;
   torch::Tensor DecoderShare(const torch::Tensor& neighbor_variance,
                              const torch::Tensor& decoded) const;
-  // Cells of the neighbors' grid that answers are wanted for, with a margin for interpolation.
+  // Cells of the neighbors' grid that need a prediction, with a margin for interpolation.
   torch::Tensor WantedCells(const Image& known, const Image& small) const;
 
   Parts parts_;
   TrainingRecipe recipe_;
-  double trust_ = 0.0;  // in the decoder, 0..1: the share that it has at most
+  double trust_ = 0.0;  // maximum share of the decoder in the blend, 0..1
 };
 
 }  // namespace color3d

@@ -21,12 +21,12 @@ namespace color3d {
 namespace {
 
 constexpr uint64_t kSeed = 1;
-constexpr int64_t kMostObserved = 800;  // cells of all corrections together
-constexpr int64_t kFewest = 8;          // of each
-constexpr double kTouched = 0.02;       // share of a cell that was painted, to count
-constexpr double kChanged = 3.0;        // Lab units: less is as it was
-// The expected error of a colour, squared, grows with the square of the distance to what was
-// learnt, up to so many times its median.
+constexpr int64_t kMaxObservedCells = 800;  // maximum number of cells over all corrections
+constexpr int64_t kMinCells = 8;            // minimum number of cells of each correction
+constexpr double kMinPaintedShare = 0.02;   // minimum painted share of a cell
+constexpr double kMinChange = 3.0;          // minimum change of colour, Lab units
+// The expected squared error of a colour grows with the squared distance to the training cells, up
+// to this multiple of its median.
 constexpr double kLeastVariance = 0.1;
 constexpr double kMostUnlike = 4.0;
 
@@ -41,19 +41,19 @@ PlacedPicture AtSide(const PlacedPicture& picture, int max_side_px) {
   return small;
 }
 
-torch::Tensor SeenOf(const Image& seen, int64_t count) {
+torch::Tensor CellSeenShares(const Image& seen, int64_t count) {
   return seen.Empty() ? torch::zeros({count})
                       : CellMeans(PaddedTensor(seen)).squeeze(1).contiguous();
 }
 
-// Rows to observe: half of them where something changes, so that what the user left as it was
-// counts as well but never outweighs it.
+// Rows to observe. Half of them lie where the colour changes, so that colours that the user kept
+// count too but do not outweigh the changes.
 torch::Tensor RowsToObserve(const torch::Tensor& change,
                             const torch::Tensor& weights,
                             int64_t most,
                             Random& random) {
-  const torch::Tensor touched = weights > kTouched;
-  const torch::Tensor changed = change.square().sum(1) > kChanged * kChanged;
+  const torch::Tensor touched = weights > kMinPaintedShare;
+  const torch::Tensor changed = change.square().sum(1) > kMinChange * kMinChange;
   const auto draw = [&](const torch::Tensor& wanted) {
     const torch::Tensor rows = wanted.nonzero().squeeze(1);
     return rows.index_select(0, SampleRows(rows.size(0), most / 2, random));
@@ -77,7 +77,7 @@ std::vector<float> Values(const torch::Tensor& tensor) {
   return {flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel()};
 }
 
-// The expected error of each place's colour.
+// Expected error of the colour of each place.
 torch::Tensor Deviation(const std::vector<float>& unlike) {
   std::vector<float> sorted = unlike;
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
@@ -107,27 +107,30 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
     const Correction& correction = corrections[number];
     const PlacedPicture small = AtSide(correction.picture, max_side_px_);
     const int width = small.luminance.width, height = small.luminance.height;
-    // What is there and what is wanted, where it was painted.
+    // Current and target colours of painted places.
     const auto cells_of = [&](const Image& ab) {
       TrainingPicture picture{"",
                               small.luminance,
                               ResizeWeighted(ab, correction.painted, width, height),
                               Resize(correction.painted, width, height)};
       picture.position = small.position;
-      return CellsOf(encoder_, picture, relative_chroma_);
+      return ComputeKnownCells(encoder_, picture, relative_chroma_);
     };
     const KnownCells cells = cells_of(correction.ab);
     const torch::Tensor before = cells_of(correction.picture.ab).colors;
-    const torch::Tensor rows = RowsToObserve(
-        cells.colors - before, cells.weights, std::max(2 * kFewest, kMostObserved / count), random);
+    const torch::Tensor rows = RowsToObserve(cells.colors - before,
+                                             cells.weights,
+                                             std::max(2 * kMinCells, kMaxObservedCells / count),
+                                             random);
     if (rows.size(0) == 0) {
-      throw InvalidArgument("correction {} of {} paints too little to be seen", number + 1, count);
+      throw InvalidArgument(
+          "correction {} of {} paints too small an area; paint a larger one", number + 1, count);
     }
     const KnownCells observed = Select(cells, rows);
     features.push_back(learnt_.whitening().Apply(observed.blocks));
     colors.push_back(before.index_select(0, rows));
     positions.push_back(observed.positions);
-    seen.push_back(SeenOf(small.seen, cells.weights.size(0)).index_select(0, rows));
+    seen.push_back(CellSeenShares(small.seen, cells.weights.size(0)).index_select(0, rows));
     wanted.push_back(observed.colors);
     weights.push_back(observed.weights);
     numbers.push_back(torch::full({rows.size(0)}, number, torch::kInt64));
@@ -155,8 +158,8 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
     const FieldPlaces places{
         learnt_.whitening().Apply(cells.blocks),
         CellMeans(PaddedTensor(ToRelative(relative_chroma_, small.luminance, small.ab))),
-        PlacesOf(small.position, cells.Count()),
-        SeenOf(small.seen, cells.Count())};
+        CellPositions(small.position, cells.Count()),
+        CellSeenShares(small.seen, cells.Count())};
     const ChangeField::Answer answer = field_->At(places);
     const Image coarse = ImageFromTensor(torch::cat({answer.change, answer.share.unsqueeze(1)}, 1)
                                              .t()
@@ -186,7 +189,7 @@ PlaceSample PersonalCorrector::Sample(const FieldPlaces& places,
                                       int wanted) const {
   const auto x = [&](int64_t cell) { return (cell % columns + 0.5) * kCellPx / luminance.width; };
   const auto y = [&](int64_t cell) { return (cell / columns + 0.5) * kCellPx / luminance.height; };
-  std::vector<int64_t> inside;  // not in the border that was added
+  std::vector<int64_t> inside;  // outside the padding
   for (int64_t cell = 0; cell < places.seen.size(0); ++cell) {
     if (x(cell) < 1.0 && y(cell) < 1.0) inside.push_back(cell);
   }

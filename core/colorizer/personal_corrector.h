@@ -16,8 +16,8 @@ namespace color3d {
 
 class PersonalCorrector : public Corrector {
  public:
-  // Refers to `encoder` and `learnt`. Pictures are looked at with their longer side at most
-  // `max_side_px`.
+  // `encoder` and `learnt` must outlive the object. Pictures are reduced to a longer side of at
+  // most `max_side_px`.
   PersonalCorrector(const TapEncoder& encoder,
                     const FeatureNeighbors& learnt,
                     RelativeChroma relative_chroma,
@@ -30,7 +30,7 @@ class PersonalCorrector : public Corrector {
                                      int count) const override;
 
  private:
-  // Up to `wanted` cells of a picture with this L, padded cells left out.
+  // Samples up to `wanted` cells of a picture with this L, outside the padding.
   PlaceSample Sample(const FieldPlaces& places,
                      int64_t columns,
                      const Image& luminance,

@@ -18,7 +18,7 @@ constexpr double kFlatChange = 0.03;  // variance over mean square; natural pict
 
 torch::Tensor LeakyRelu(const torch::Tensor& x) { return torch::leaky_relu(x, kLeak); }
 
-// He's deviation for a leaky rectifier.
+// Standard deviation of He's initialization for a leaky rectifier.
 double HeDeviation(int64_t fan_in) {
   return std::sqrt(2.0 / ((1.0 + kLeak * kLeak) * static_cast<double>(fan_in)));
 }
@@ -43,7 +43,7 @@ PersonalModel::PersonalModel(const TapEncoder& encoder,
   const std::vector<int>& dims = encoder.config().dims;
   const int count = static_cast<int>(dims.size());
   const auto width = [&](int level) {
-    constexpr double kMultiple = 8.0;  // what vector units like
+    constexpr double kMultiple = 8.0;  // width of vector units
     const double channels = config.decoder_width * DecoderWidth(encoder.config().Stride(level));
     return static_cast<int>(kMultiple * std::max(1.0, std::round(channels / kMultiple)));
   };
@@ -153,8 +153,8 @@ torch::Tensor PersonalModel::Normalise(const Norm& norm, const torch::Tensor& x)
     const torch::Tensor mean_square = flat.square().mean(1);
     const torch::Tensor variance = flat.var(1, /*unbiased=*/false);
     // A share of the mean square keeps a channel that is constant over the key view from being
-    // blown up where another view does change; where the whole layer is constant (a flat picture)
-    // the share is 1, or a dozen layers would multiply the least change by thousands.
+    // amplified where another view varies. If the whole layer is constant (a flat picture), the
+    // share is 1; else a dozen layers would amplify the smallest change by thousands.
     const double change =
         variance.mean().item<double>() / (mean_square.mean().item<double>() + kNormEpsilon);
     const double share = kMeanSquareShare + std::exp(-change / kFlatChange);
@@ -182,8 +182,8 @@ torch::Tensor PersonalModel::NormalisedConv(const torch::Tensor& x,
   if (config_.instance_norm || measuring_statistics_) {
     return Normalise(norm, Conv(x, weight, bias));
   }
-  // Frozen statistics make the norm linear: it goes into the weights, which are a hundred times
-  // smaller than the activations.
+  // Frozen statistics make the norm linear. It is folded into the weights, which are a hundred
+  // times smaller than the activations.
   const torch::Tensor scale = norm.weight * norm.inverse_deviation;
   return Conv(x, weight * scale.view({-1, 1, 1, 1}), norm.bias + (bias - norm.mean) * scale);
 }

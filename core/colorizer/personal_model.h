@@ -1,6 +1,6 @@
 // The trained part of a colorizer: per-scene decoder and Conv-Adapters around the shared frozen
 // encoder (STILL.md "Stage 1d"). Torch in the interface; used inside core/colorizer only.
-// Forward() is const: any number of threads may call it while nobody changes the parameters.
+// Forward() is const: concurrent calls are safe while the parameters do not change.
 #pragma once
 
 #include <torch/types.h>
@@ -16,25 +16,25 @@
 namespace color3d {
 
 struct PersonalModelConfig {
-  bool instance_norm = false;  // per picture (paper); otherwise statistics frozen from the key view
-  int adapter_stages = 0;      // the deepest ones that have Conv-Adapters in every block
+  bool instance_norm = false;  // per picture (paper); else statistics frozen from the key view
+  int adapter_stages = 0;      // number of deepest stages with Conv-Adapters in every block
   int adapter_kernel = 7;
   int adapter_reduction = 8;   // gamma
   double decoder_width = 1.0;  // factor on DecoderWidth()
   // Matrix products and convolutions in bfloat16 (parameters, sums and statistics stay float32):
-  // several times faster where the processor has instructions for it. For training only.
+  // several times faster on processors with instructions for it. For training only.
   bool half_products = false;
 
   bool HasAdapters() const { return adapter_stages > 0; }
 };
 
-// Decoder channels at a tap of this stride: 32 at 2 px, 64 at 4, 96 at 8, 128 from 16 on.
+// Decoder channels at a tap of `stride`: 32 at 2 px, 64 at 4, 96 at 8, 128 from 16 on.
 int DecoderWidth(int stride);
 
 class PersonalModel {
  public:
-  // Random start, the same for the same generator. `encoder` must outlive the model. The adapters
-  // start at zero and the head at (0, 0) plus `mean_ab` (Lab units / kAbScale).
+  // Initializes the parameters from `random`. `encoder` must outlive the model. The adapters start
+  // at zero and the head at `mean_ab` (Lab units / kAbScale).
   PersonalModel(const TapEncoder& encoder,
                 const PersonalModelConfig& config,
                 const std::array<float, 2>& mean_ab,
@@ -44,20 +44,20 @@ class PersonalModel {
   const std::string& EncoderDigest() const { return encoder_.digest(); }
   int OutputStride() const { return encoder_.config().stem_stride; }
 
-  // ab / kAbScale at the first tap's stride, [B,2,H/s,W/s], of L [B,1,H,W] (0..100); H and W are
-  // multiples of the last tap's stride.
+  // Returns ab / kAbScale at the first tap's stride, [B,2,H/s,W/s], for L [B,1,H,W] (0..100).
+  // Requires: H and W are multiples of the last tap's stride.
   torch::Tensor Forward(const torch::Tensor& luminance) const;
-  // The same from taps that are already there (without adapters).
+  // Forward from given taps. Requires: no adapters.
   torch::Tensor Decode(const std::vector<torch::Tensor>& taps,
                        const torch::Tensor& luminance) const;
   std::vector<torch::Tensor> Taps(const torch::Tensor& luminance) const;
 
-  // Takes mean and deviation of every normalised activation from this picture, layer after layer,
-  // and keeps them from now on. No effect with instance norm.
+  // Measures mean and deviation of every normalised activation on this picture, layer after layer,
+  // and freezes them. No effect with instance norm.
   void FreezeStatistics(const torch::Tensor& luminance);
 
-  // Everything that Forward depends on, in a fixed order: first what is trained, then the frozen
-  // statistics. The tensors share storage with the model.
+  // Trained parameters and frozen statistics, all that Forward depends on, each in a fixed order.
+  // The tensors share storage with the model.
   const NamedTensors& parameters() const { return parameters_; }
   const NamedTensors& statistics() const { return statistics_; }
   void RequireGradients(bool on);
@@ -115,7 +115,7 @@ class PersonalModel {
   NamedTensors statistics_;
 };
 
-// The network's output times this is ab in Lab units.
+// Scale from the network's output to ab in Lab units.
 inline constexpr float kAbScale = 110.0f;
 
 }  // namespace color3d

@@ -10,7 +10,7 @@ namespace {
 
 using PersonalModelTest = SmallColorizerTest;
 
-TEST_F(PersonalModelTest, AdaptersStartAsTheFrozenEncoderExactly) {
+TEST_F(PersonalModelTest, AdaptersStartAsIdentity) {
   recipe_.model.adapter_stages = 8;
   PersonalModel model = MakeModel();
   torch::NoGradGuard no_grad;
@@ -19,7 +19,7 @@ TEST_F(PersonalModelTest, AdaptersStartAsTheFrozenEncoderExactly) {
   for (size_t i = 0; i < frozen.size(); ++i) EXPECT_TRUE(torch::equal(adapted[i], frozen[i]));
 }
 
-TEST_F(PersonalModelTest, FrozenStatisticsAreTheKeyViews) {
+TEST_F(PersonalModelTest, FreezesStatisticsOfKeyView) {
   PersonalModel model = MakeModel();
   torch::NoGradGuard no_grad;
   // The prediction for a part of the picture does not depend on the rest of it: with instance norm

@@ -1,5 +1,5 @@
-// What a ColorizerOptions::Recipe means in numbers. Torch types come along with the model's sizes;
-// used inside core/colorizer only.
+// Parameters of each ColorizerOptions::Recipe. Torch in the interface; used inside core/colorizer
+// only.
 #pragma once
 
 #include "core/augment/augment.h"
@@ -18,8 +18,8 @@ struct TrainingRecipe {
   double max_gradient_norm = 1.0;
   bool neighbors = true;
   FeatureNeighborsOptions neighbor_options;
-  // Share of the neighbors in the blend with the decoder, by how well they agree on a colour:
-  // certainty = doubt^2 / (doubt^2 + variance of the matches' ab). A decoder trained for a few
+  // Share of the neighbors in the blend with the decoder, by their agreement on a colour:
+  // certainty = doubt^2 / (doubt^2 + variance of the matches' ab). A decoder trained for few
   // iterations is trusted less: share = 1 - (1 - certainty) (1 - exp(-iterations / trust)).
   double neighbor_doubt = 4.0;  // Lab units
   double trust_iterations = 100.0;

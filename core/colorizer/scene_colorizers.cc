@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-// Pictures in one encoder pass; more cost memory and are no faster.
+// Maximum number of pictures in an encoder pass. More cost memory and are no faster.
 constexpr size_t kMaxStack = 8;
 
 struct Job {
@@ -48,9 +48,8 @@ std::vector<Image> ColorizeRouted(std::span<const RoutedPicture> pictures,
     if (colorizers.contains(picture.scene)) continue;
     const auto colorizer = lookup(picture.scene);
     if (!colorizer) {
-      throw Error(ErrorCode::kNotFound,
-                  "there is no colorizer for the scene '{}'; personalize it first",
-                  picture.scene);
+      throw Error(
+          ErrorCode::kNotFound, "scene '{}' has no colorizer; personalize it first", picture.scene);
     }
     colorizers[picture.scene] = colorizer;
   }
@@ -64,7 +63,7 @@ std::vector<Image> ColorizeRouted(std::span<const RoutedPicture> pictures,
     if (personal != nullptr && personal->UsesFrozenTaps()) {
       jobs.push_back({personal, &luminance, &answers[i], personal->AtTrainingSize(luminance)});
     } else {
-      answers[i] = colorizer.Colorize(luminance);  // its adapters are inside the encoder
+      answers[i] = colorizer.Colorize(luminance);  // adapters run inside the encoder
     }
   }
   using Shape = std::tuple<std::string, int, int>;

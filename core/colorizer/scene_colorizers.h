@@ -1,6 +1,6 @@
-// Colouring pictures of many scenes at once: each picture names its scene, and is coloured by that
-// scene's colorizer only. Pictures whose colorizers share an encoder and need the same padded size
-// go through it in one pass. No torch in this interface. Thread-safe.
+// Colours pictures of several scenes, each by the colorizer of its scene. Pictures whose colorizers
+// share an encoder and need the same padded size go through the encoder in one pass. No torch in
+// this interface. Thread-safe.
 #pragma once
 
 #include <functional>
@@ -19,13 +19,13 @@ struct RoutedPicture {
   const Image* luminance = nullptr;  // 1 channel, L 0..100
 };
 
-// The colorizer of a scene; null when there is none. Must give the same one for the same scene
-// during a call.
+// Returns the colorizer of a scene, or null if there is none. Must return the same colorizer for a
+// scene throughout a call.
 using ColorizerLookup = std::function<std::shared_ptr<const Colorizer>(const std::string& scene)>;
 
-// Two channels (ab, Lab units) for each picture, in their order and of their size; each within 1e-4
-// of what its colorizer's Colorize gives. Throws Error{kNotFound} naming a scene without colorizer,
-// before anything is computed, and kInvalidArgument for pictures that Colorize refuses.
+// Returns ab (2 channels, Lab units) for each picture, in order and of its size, within 1e-4 of
+// Colorizer::Colorize. Throws Error{kNotFound} naming a scene without colorizer, before any
+// computation, and kInvalidArgument for pictures that Colorize refuses.
 std::vector<Image> ColorizeRouted(std::span<const RoutedPicture> pictures,
                                   const ColorizerLookup& lookup);
 

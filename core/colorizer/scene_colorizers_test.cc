@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-TEST(SceneColorizersTest, AnUnknownSceneIsNamedBeforeAnythingIsComputed) {
+TEST(SceneColorizersTest, NamesUnknownSceneBeforeComputing) {
   const Image luminance(96, 64, 1, 50.0f);
   const std::vector<RoutedPicture> pictures = {{"scenes/lost", &luminance}};
   try {

@@ -12,11 +12,11 @@ namespace color3d {
 namespace {
 
 constexpr size_t kDigestDigits = 64;
-constexpr size_t kLengthBytes = 8;  // of the header, before it
-// Quotes inside the metadata's texts are escaped, so this appears as a key only.
+constexpr size_t kLengthBytes = 8;  // length field before the header
+// Occurs as a key only, since quotes inside metadata texts are escaped.
 constexpr char kDigestKey[] = "\"sha256\":\"";
 
-// Where the digest's digits are; nothing when the bytes hold no such header.
+// Position of the digits of the digest, or nothing if the bytes have no such header.
 std::optional<size_t> FindDigest(std::string_view bytes) {
   if (bytes.size() < kLengthBytes) return std::nullopt;
   uint64_t length = 0;
@@ -60,9 +60,9 @@ TensorFile ReadTensorFile(std::string_view bytes,
         "{} was written by an earlier version of the program; {}", what, format.remedy);
   }
   const std::optional<size_t> digits = FindDigest(bytes);
-  if (!digits) throw InvalidArgument("{} is cut short or a file of another kind", what);
+  if (!digits) throw InvalidArgument("{} is truncated or a file of another kind", what);
   if (DigestOf(bytes, *digits) != bytes.substr(*digits, kDigestDigits)) {
-    throw InvalidArgument("{} is damaged or cut short (its checksum does not match)", what);
+    throw InvalidArgument("{} is damaged or truncated (its checksum does not match)", what);
   }
   TensorFile file;
   WeightMetadata metadata;
@@ -75,7 +75,7 @@ TensorFile ReadTensorFile(std::string_view bytes,
   }
   if (metadata["version"] != std::to_string(format.version)) {
     const std::string version = QuotedName(metadata["version"]);
-    throw InvalidArgument("{} has version {}, this program reads version {}; {}",
+    throw InvalidArgument("{} has version {}, but this program reads version {}; {}",
                           what,
                           version.substr(1, version.size() - 2),
                           format.version,

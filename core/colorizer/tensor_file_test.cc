@@ -64,7 +64,7 @@ TEST(TensorFileTest, RoundTrip) {
   }
 }
 
-TEST(TensorFileTest, AnySafetensorsReaderReadsIt) {
+TEST(TensorFileTest, IsReadableAsSafetensors) {
   const WeightMap weights = ParseSafetensors(WriteTensorFile(MakeFile(), kFormat));
   EXPECT_EQ(weights.at("two").values, MakeFile().arrays.at("two").values);
 }
@@ -86,7 +86,7 @@ TEST(TensorFileTest, EveryChangedByteIsRefused) {
   }
 }
 
-TEST(TensorFileTest, HostileBytesWithARightChecksumNeverCrash) {
+TEST(TensorFileTest, HostileBytesWithValidChecksumNeverCrash) {
   const std::string bytes = WriteTensorFile(MakeFile(), kFormat);
   Random random(1);
   int refused = 0;
@@ -108,7 +108,7 @@ TEST(TensorFileTest, HostileBytesWithARightChecksumNeverCrash) {
   EXPECT_GT(refused, 1000);
 }
 
-TEST(TensorFileTest, AnotherKindOrVersionIsNamed) {
+TEST(TensorFileTest, NamesOtherKindOrVersion) {
   TensorFormat other = kFormat;
   other.name = "color3d.other";
   EXPECT_THAT(MessageOf(WriteTensorFile(MakeFile(), other)), HasSubstr("another kind"));
@@ -120,7 +120,7 @@ TEST(TensorFileTest, AnotherKindOrVersionIsNamed) {
   EXPECT_THAT(MessageOf(WriteTensorFile(MakeFile(), other)), HasSubstr("make it anew"));
 }
 
-TEST(TensorFileTest, AFileFromBeforeSafetensorsIsRefusedWithTheRemedy) {
+TEST(TensorFileTest, RefusesOldFormatWithRemedy) {
   EXPECT_THAT(MessageOf("OLDFILE1 and more"), HasSubstr("earlier version"));
   EXPECT_THAT(MessageOf("OLDFILE1 and more"), HasSubstr("make it anew"));
 }

@@ -1,4 +1,4 @@
-// The error-against-time curve of a training. Plain values.
+// Training curve: error against time. Plain values.
 #pragma once
 
 #include <cstdint>
@@ -9,13 +9,13 @@ namespace color3d {
 
 struct TrainingPoint {
   int64_t iteration = 0;
-  double seconds = 0.0;               // of computing, not of waiting for a turn
+  double seconds = 0.0;               // computing time, without waiting for a turn
   double train_l1_ab = 0.0;           // Lab units, running mean
-  double validation_delta_e00 = 0.0;  // on augmentations that are never trained on
+  double validation_delta_e00 = 0.0;  // on held-out augmentations
 };
 
-// A list of lists of these four numbers, and back. Throws nlohmann::json::exception on anything
-// else.
+// Converts to and from a JSON list of lists of these four numbers. CurveFromJson throws
+// nlohmann::json::exception for other input.
 nlohmann::json JsonFromCurve(const std::vector<TrainingPoint>& curve);
 std::vector<TrainingPoint> CurveFromJson(const nlohmann::json& json);
 

@@ -19,7 +19,7 @@ int CropFor(const Image& picture, int wanted) {
   return std::max(kCropMultiple, side / kCropMultiple * kCropMultiple);
 }
 
-constexpr uint64_t kSeedStep = 0x9e3779b97f4a7c15ULL;  // SplitMix64's own
+constexpr uint64_t kSeedStep = 0x9e3779b97f4a7c15ULL;  // increment of SplitMix64
 
 std::string_view BytesOf(const Image& image) {
   return {reinterpret_cast<const char*>(image.data.data()), image.data.size() * sizeof(float)};

@@ -1,6 +1,6 @@
-// What a training session learns from: crops of the scene's pictures, a fresh one for each
-// iteration, each a function of the seed and of its number alone. Torch in the interface; used
-// inside core/colorizer only. Thread-safe.
+// Training samples: augmented crops of the scene's pictures, one per iteration, which depend on the
+// seed and the iteration alone. Torch in the interface; used inside core/colorizer only.
+// Thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -18,9 +18,9 @@ namespace color3d {
 
 struct TrainingSample {
   torch::Tensor luminance;          // [1,1,c,c]
-  torch::Tensor ab;                 // [1,2,c/s,c/s], / kAbScale
+  torch::Tensor ab;                 // [1,2,c/s,c/s], in units of kAbScale
   torch::Tensor weight;             // [1,1,c/s,c/s], 0 outside the picture
-  std::vector<torch::Tensor> taps;  // of the frozen encoder; empty with adapters
+  std::vector<torch::Tensor> taps;  // taps of the frozen encoder; empty with adapters
 };
 
 class TrainingSamples {
@@ -31,9 +31,9 @@ class TrainingSamples {
                   const ColorizerOptions& options,
                   const PersonalModel& model);
 
-  // Of iteration `number`.
+  // Returns the sample of iteration `number`.
   TrainingSample Draw(int64_t number) const;
-  // Crops of the key view that are never trained on.
+  // Held-out crops of the key view.
   const std::vector<TrainingSample>& held_out() const { return held_out_; }
   // SHA-256 over all pictures.
   std::string Digest() const;

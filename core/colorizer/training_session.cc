@@ -23,13 +23,14 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr char kWhat[] = "the checkpoint";
-constexpr int kReports = 20;  // validation points over the whole schedule
+constexpr int kReports = 20;  // number of validation points in the schedule
 constexpr int kMaxRollbacks = 16;
-constexpr double kExplosion = 8.0;  // of one loss, times the running loss
-constexpr double kDrift = 3.0;      // of the running loss, times its best
+constexpr double kExplosion = 8.0;  // ratio of a loss to the running loss
+constexpr double kDrift = 3.0;      // ratio of the running loss to its best
 constexpr double kDriftFloor = 3.0 / kAbScale;
 constexpr double kLossMemory = 0.95;
-constexpr double kMinWeightShare = 0.25;  // of a crop's area, in the loss's denominator
+constexpr double kMinWeightShare =
+    0.25;  // minimum share of a crop's area in the denominator of the loss
 constexpr char kAverage[] = "average.";
 
 }  // namespace
@@ -59,7 +60,7 @@ torch::Tensor TrainingSession::Predict(const TrainingSample& sample) const {
 
 torch::Tensor TrainingSession::Loss(const TrainingSample& sample) const {
   const torch::Tensor predicted = Predict(sample);
-  // A crop with little to learn from counts little, not as much as a full one.
+  // A crop with few valid pixels counts less than a full one.
   const double area = static_cast<double>(sample.weight.numel());
   const double total = 2.0 * std::max(sample.weight.sum().item<double>(), kMinWeightShare * area);
   torch::Tensor loss = ((predicted - sample.ab).abs() * sample.weight).sum() / total;
@@ -110,14 +111,14 @@ bool TrainingSession::TrainOn(const TrainingSample& sample) {
   return true;
 }
 
-// Divergence without any single step that explodes.
+// Detects divergence without a single exploding step.
 bool TrainingSession::HasDrifted() const {
   return course_.best_running_loss > 0.0 &&
          course_.running_loss > kDrift * course_.best_running_loss + kDriftFloor;
 }
 
-// Exponential mean of the parameters; younger at the beginning, so that the random start is soon
-// forgotten.
+// Exponential moving average of the parameters. The decay is smaller at the beginning, so that the
+// random start is soon forgotten.
 void TrainingSession::UpdateAverage() {
   if (average_.empty()) return;
   torch::NoGradGuard no_grad;
@@ -140,8 +141,8 @@ void TrainingSession::SwapWithAverage() {
   }
 }
 
-// In 16 bits, as it would otherwise be half of what a waiting scene keeps in memory: parameters
-// with the precision in which they are delivered, moments with float32's range.
+// Stored in 16 bits, since it would otherwise be half of the memory of a waiting scene: parameters
+// as float16, as in colorizer files; moments as bfloat16, for its range.
 void TrainingSession::KeepGoodState() {
   torch::NoGradGuard no_grad;
   good_.tensors.clear();
@@ -159,7 +160,7 @@ void TrainingSession::RollBack(ProgressObserver& progress) {
   if (++course_.rollbacks > kMaxRollbacks) {
     throw Error(
         ErrorCode::kInternal,
-        "personalization diverged {} times even with smaller steps; try another key view or "
+        "personalization diverged {} times in spite of smaller steps; try another key view or "
         "another seed",
         course_.rollbacks);
   }
@@ -211,7 +212,7 @@ void TrainingSession::Report(ProgressObserver& progress) {
   point.iteration = course_.iteration;
   point.seconds = course_.seconds;
   point.train_l1_ab = course_.running_loss * kAbScale;
-  // Of what would be delivered.
+  // Error of the parameters that would be returned now.
   if (!average_.empty()) SwapWithAverage();
   point.validation_delta_e00 = ValidationDeltaE00();
   if (!average_.empty()) SwapWithAverage();
@@ -241,14 +242,14 @@ void TrainingSession::Step(ProgressObserver& progress, ThreadPool* helpers) {
     part(0, 0);
   }
   if (!learned) RollBack(progress);
-  ++course_.iteration;  // also after a rollback: the sample is spent, the schedule goes on
+  ++course_.iteration;  // also after a rollback: sample and schedule advance
   course_.seconds += std::chrono::duration<double>(Clock::now() - start).count();
   progress.OnProgress(course_.iteration, options_.iterations, "personalizing the colorizer");
   if (course_.iteration % kGoodStateInterval == 0) KeepGoodState();
   if (Progress() * kReports >= static_cast<double>(course_.curve.size())) Report(progress);
 }
 
-void TrainingSession::Conclude(ProgressObserver& progress) {
+void TrainingSession::KeepBetterParameters(ProgressObserver& progress) {
   if (course_.stopped_early)
     progress.OnError(course_.iteration, "stopped_early_iteration", course_.iteration);
   if (average_.empty() || course_.iteration == 0) return;
@@ -263,7 +264,8 @@ void TrainingSession::Resume(const std::optional<std::string>& state, ProgressOb
     LoadState(*state);
     KeepGoodState();
   } catch (const Error& error) {
-    progress.OnWarning(fmt::format("personalization starts afresh: {}", error.what()));
+    progress.OnWarning(
+        fmt::format("personalization restarts from the beginning: {}", error.what()));
   }
 }
 
@@ -305,8 +307,8 @@ void TrainingSession::LoadState(const std::string& state) {
         facts.at("options") != JsonFromOptions(options_)) {
       throw InvalidArgument("{} belongs to other options or other pictures", kWhat);
     }
-    // TakeTensors checks each array before it copies; the digests have already told us that they
-    // belong to this model, so nothing is half restored.
+    // TakeTensors checks each array before it copies. The digests match, so the arrays belong to
+    // this model and no partial restore can occur.
     TakeTensors(model_.parameters(), "", kWhat, &file);
     TakeTensors(model_.statistics(), "", kWhat, &file);
     TakeTensors(adam_.Moments(), "", kWhat, &file);

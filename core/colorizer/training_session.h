@@ -1,7 +1,7 @@
-// The training of one personalized colorizer, stepped from outside, so that one scene's loop and
-// many scenes' loops are the same code. Torch in the interface; used inside core/colorizer only.
-// Not thread-safe. All arithmetic is single-threaded (the caller's torch threads are set to 1 while
-// a step runs), so that the result does not depend on who else computes beside it.
+// Training of a personalized colorizer, one iteration per call, so that the loops over one and over
+// several scenes share the code. Torch in the interface; used inside core/colorizer only. Not
+// thread-safe. All arithmetic is single-threaded (the caller's torch threads are set to 1 during a
+// step), so that the result does not depend on other computations.
 #pragma once
 
 #include <cstdint>
@@ -25,28 +25,29 @@ namespace color3d {
 
 class TrainingSession {
  public:
-  // `pictures` at training size, the key view first; they must outlive the session. `model` is
-  // changed in place.
+  // `pictures` at training size, the key view first. Trains `model` in place. `pictures` and
+  // `model` must outlive the session.
   TrainingSession(const std::vector<TrainingPicture>& pictures,
                   const ColorizerOptions& options,
                   const TrainingRecipe& recipe,
                   PersonalModel& model);
 
-  // Goes on from Checkpoint()'s bytes, to the same end as if it had not been interrupted. A state
-  // that is damaged or belongs to other work is reported as a warning and ignored.
+  // Continues from the bytes of Checkpoint(), with the same result as without an interruption.
+  // Warns about a state that is damaged or belongs to other options or pictures, and ignores it.
   void Resume(const std::optional<std::string>& state, ProgressObserver& progress);
 
   bool Finished() const { return course_.stopped_early || Progress() >= 1.0; }
-  // One iteration. `helpers`: null, or a pool whose second thread prepares the next sample
-  // meanwhile; the result is the same.
+  // Runs one iteration. `helpers`: null, or a pool whose second thread prepares the next sample
+  // meanwhile, without effect on the result.
   void Step(ProgressObserver& progress, ThreadPool* helpers);
-  // Checkpoint() may be called now.
+  // Whether Checkpoint() may be called.
   bool AtCheckpoint() const {
     return course_.iteration > 0 && course_.iteration % kGoodStateInterval == 0;
   }
   std::string Checkpoint() const;
-  // Leaves the better of the last and the averaged parameters in the model. Once, at the end.
-  void Conclude(ProgressObserver& progress);
+  // Sets the model to the better one of the last and the averaged parameters. Call once, at the
+  // end.
+  void KeepBetterParameters(ProgressObserver& progress);
 
   const std::vector<TrainingPoint>& curve() const { return course_.curve; }
   int rollbacks() const { return course_.rollbacks; }
@@ -56,38 +57,38 @@ class TrainingSession {
  private:
   static constexpr int kGoodStateInterval = 25;
 
-  // Where training stands, besides the tensors: all of it goes into checkpoints.
+  // State of training besides the tensors. Stored in checkpoints.
   struct Course {
     int64_t iteration = 0;
-    double seconds = 0.0;  // of computing
+    double seconds = 0.0;  // computing time
     double learning_rate_scale = 1.0;
-    double running_loss = 0.0;       // Lab units / kAbScale; 0: none yet
+    double running_loss = 0.0;       // in units of kAbScale; 0: none yet
     double best_running_loss = 0.0;  // since the last rollback; 0: none yet
     int rollbacks = 0;
     bool stopped_early = false;
     std::vector<TrainingPoint> curve;
   };
-  // What a rollback goes back to.
+  // State that a rollback restores.
   struct GoodState {
-    std::vector<torch::Tensor> tensors;  // 16 bits per value
+    std::vector<torch::Tensor> tensors;  // in half precision
     int64_t steps = 0;
     double running_loss = 0.0;
   };
 
   torch::Tensor Predict(const TrainingSample& sample) const;
   torch::Tensor Loss(const TrainingSample& sample) const;
-  // One iteration; false when the loss or the gradient is unusable and nothing was changed.
+  // Runs one iteration. Returns false, without changes, if loss or gradient are unusable.
   bool TrainOn(const TrainingSample& sample);
   bool HasDrifted() const;
   void UpdateAverage();
   void SwapWithAverage();
-  double Progress() const;  // 0..1, by iterations or by time, whichever is further
+  double Progress() const;  // 0..1, the larger one of the shares of iterations and of time
   double LearningRate() const;
   void KeepGoodState();
   void RollBack(ProgressObserver& progress);
   void Report(ProgressObserver& progress);
   double ValidationDeltaE00() const;
-  NamedTensors Average() const;  // by the parameters' names
+  NamedTensors Average() const;  // by name of the parameter
   void LoadState(const std::string& state);
 
   ColorizerOptions options_;
@@ -96,8 +97,8 @@ class TrainingSession {
   TrainingSamples samples_;
   Adam adam_;
   EarlyStop early_stop_;
-  std::optional<TrainingSample> next_;  // prepared ahead
-  std::vector<torch::Tensor> average_;  // of the parameters; empty: off
+  std::optional<TrainingSample> next_;  // prepared in advance
+  std::vector<torch::Tensor> average_;  // average of the parameters; empty: off
   Course course_;
   GoodState good_;
 };

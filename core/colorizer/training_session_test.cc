@@ -38,7 +38,7 @@ class TrainingTest : public SmallColorizerTest {
         checkpoints.Save(session.Checkpoint());
       }
     }
-    session.Conclude(progress);
+    session.KeepBetterParameters(progress);
     return {session.curve(), session.rollbacks(), session.iteration(), session.stopped_early()};
   }
   static void ExpectSameParameters(const PersonalModel& x, const PersonalModel& y) {
@@ -115,7 +115,7 @@ TrainingPicture Green(const TrainingPicture& key) {
   return green;
 }
 
-TEST_F(TrainingTest, PicturesOfShareOrWeightZeroTeachNothing) {
+TEST_F(TrainingTest, IgnoresPicturesOfZeroShareOrWeight) {
   NoCheckpoints checkpoints;
   Warnings alone, shared, weighted;
   options_.iterations = 150;
@@ -135,7 +135,7 @@ TEST_F(TrainingTest, PicturesOfShareOrWeightZeroTeachNothing) {
   EXPECT_LT(weighted.validation.back(), 0.6 * weighted.validation.front());
 }
 
-TEST_F(TrainingTest, PicturesAreDrawnByTheirShare) {
+TEST_F(TrainingTest, DrawsPicturesByShare) {
   NoCheckpoints checkpoints;
   Warnings progress;
   options_.iterations = 150;
@@ -161,7 +161,7 @@ TEST_F(TrainingTest, ConsistencyAndPaperRecipesTrain) {
   }
 }
 
-TEST_F(TrainingTest, ResumedTrainingEndsAsUninterruptedTraining) {
+TEST_F(TrainingTest, ResumesWithSameResult) {
   NullObserver progress;
   PersonalModel straight = MakeModel();
   NoCheckpoints none;
@@ -184,7 +184,7 @@ TEST_F(TrainingTest, ResumedTrainingEndsAsUninterruptedTraining) {
   }
 }
 
-TEST_F(TrainingTest, AHelpingThreadChangesNothing) {
+TEST_F(TrainingTest, HelperThreadDoesNotChangeResult) {
   options_.iterations = 30;
   NoCheckpoints none;
   NullObserver progress;
@@ -196,7 +196,7 @@ TEST_F(TrainingTest, AHelpingThreadChangesNothing) {
   ExpectSameParameters(alone, helped);
 }
 
-TEST_F(TrainingTest, StopsEarlyWhenTheCurveIsFlatAlsoAfterResuming) {
+TEST_F(TrainingTest, StopsEarlyAlsoAfterResuming) {
   options_.iterations = 400;
   options_.min_improvement = 0.5;
   OneCheckpoint checkpoints;
@@ -215,7 +215,7 @@ TEST_F(TrainingTest, StopsEarlyWhenTheCurveIsFlatAlsoAfterResuming) {
   ExpectSameParameters(model, resumed);
 }
 
-TEST_F(TrainingTest, TheAverageIsDeliveredWhenItIsBetter) {
+TEST_F(TrainingTest, KeepsAverageWhenItIsBetter) {
   NoCheckpoints none;
   Warnings averaged, plain;
   options_.iterations = 60;
@@ -243,7 +243,7 @@ TEST_F(TrainingTest, Bfloat16LearnsAsWell) {
   EXPECT_EQ(second.parameters()[0].second.scalar_type(), torch::kFloat32);
 }
 
-TEST_F(TrainingTest, AForeignOrDamagedCheckpointIsReportedAndIgnored) {
+TEST_F(TrainingTest, IgnoresForeignOrDamagedCheckpoint) {
   OneCheckpoint checkpoints;
   NullObserver quiet;
   options_.iterations = 25;
@@ -263,7 +263,7 @@ TEST_F(TrainingTest, AForeignOrDamagedCheckpointIsReportedAndIgnored) {
   }
 }
 
-TEST_F(TrainingTest, DivergenceRollsBackWarnsAndEndsFinite) {
+TEST_F(TrainingTest, RollsBackAfterDivergence) {
   recipe_.first_learning_rate = 1.0;
   recipe_.warmup_iterations = 0;
   options_.iterations = 80;

@@ -14,8 +14,7 @@
 namespace color3d {
 
 std::shared_ptr<const Encoder> Encoder::Embedded() {
-  // Built anew for each caller: unpacking 4 M weights takes some milliseconds, and nothing global
-  // outlives the caller.
+  // Not cached: unpacking 4 M weights takes milliseconds, and no global state outlives the caller.
   const ConvNextConfig config;
   return std::make_shared<const ConvNext>(
       config, EmbeddedWeights("encoder."), "embedded ConvNeXt, " + config.ToString());
@@ -25,7 +24,7 @@ std::shared_ptr<const Encoder> Encoder::FromWeightFile(const std::filesystem::pa
   WeightMap weights = ReadWeightFile(path);
   if (HoldsConvNext(weights)) {
     ConvNextWeights found = TakeConvNextWeights(weights);
-    weights.clear();  // a decoder, which is not needed here
+    weights.clear();  // decoder, not needed here
     return WithTorchErrors("encoder", [&] {
       return std::make_shared<const ConvNext>(
           found.config, std::move(found.weights), found.description);
@@ -36,7 +35,7 @@ std::shared_ptr<const Encoder> Encoder::FromWeightFile(const std::filesystem::pa
     return ClipModel::FromWeightFile(path);
   }
   throw InvalidArgument(
-      "{} holds no known encoder ({} arrays): known are DDColor, ConvNeXt with its authors' names, "
+      "{} has no known encoder ({} arrays); known are DDColor, ConvNeXt with its authors' names, "
       "and CLIP with a ViT",
       path.string(),
       weights.size());

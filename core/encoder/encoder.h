@@ -1,5 +1,5 @@
-// The frozen encoder that all scenes share: L picture in, feature maps out. Immutable after
-// construction, so any number of threads may call it. No torch in this interface.
+// Frozen encoder, shared by all scenes: maps an L picture to features. Immutable, thread-safe. No
+// torch in this interface.
 #pragma once
 
 #include <filesystem>
@@ -16,18 +16,18 @@ class Encoder {
   // The embedded encoder: a compact ConvNeXt, pre-trained by us (core/encoder/embedded/CARD.md).
   static std::shared_ptr<const Encoder> Embedded();
   // A published network: the ConvNeXt of a DDColor, a plain ConvNeXt (names as its authors'), or a
-  // CLIP ViT, which describes pictures but cannot be personalized. Throws Error{kInvalidArgument}
-  // listing the weights that are missing, unexpected or misshapen.
+  // CLIP ViT, which has descriptors but no feature maps for the colorizer. Throws
+  // Error{kInvalidArgument} listing weights that are missing, unexpected or misshapen.
   static std::shared_ptr<const Encoder> FromWeightFile(const std::filesystem::path& path);
   virtual ~Encoder() = default;
 
-  // SHA-256 over architecture and weights: names the encoder in colorizer files.
+  // SHA-256 over architecture and weights, which identifies the encoder in colorizer files.
   virtual const std::string& digest() const = 0;
   virtual const std::string& description() const = 0;  // one line for reports
 
-  // Pooled descriptor of a 1-channel L picture (0..100), for key view selection.
+  // Returns the pooled descriptor of a 1-channel L picture (0..100), for key view selection.
   virtual std::vector<double> Describe(const Image& luminance) const = 0;
-  // Deep features on a coarse grid (stride 16): `channels` planes, for coverage.
+  // Returns deep features on a coarse grid (stride 16), for coverage.
   virtual Image DeepFeatures(const Image& luminance) const = 0;
 };
 

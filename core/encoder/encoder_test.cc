@@ -84,14 +84,14 @@ TEST(EncoderTest, TakesAClip) {
   EXPECT_EQ(Encoder::FromWeightFile(path)->Describe(Image(100, 70, 1, 30.0f)).size(), 32u);
 }
 
-TEST(EncoderTest, SaysWhatItKnowsWhenTheFileIsAnother) {
+TEST(EncoderTest, ListsKnownEncodersForOtherFiles) {
   const ScratchFolder folder;
   const auto path = folder.path() / "other.safetensors";
   WriteFileAtomic(path, SerializeSafetensors({{"x", {{1}, {0.0f}}}}, false));
   EXPECT_THROW(Encoder::FromWeightFile(path), Error);
 }
 
-TEST(EncoderTest, AllFormatsAreTheSameEncoder) {
+TEST(EncoderTest, ReadsAllFormatsAsTheSameEncoder) {
   if (!std::filesystem::exists(Golden("ddcolor_mini.safetensors"))) GTEST_SKIP() << "no data";
   const auto expected = Encoder::FromWeightFile(Golden("ddcolor_mini.safetensors"))->digest();
   EXPECT_EQ(Encoder::FromWeightFile(Golden("ddcolor_mini_params.pth"))->digest(), expected);

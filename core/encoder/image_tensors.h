@@ -1,4 +1,4 @@
-// Pictures as torch's tensors and back, float32. Pure functions.
+// Conversion between images and torch tensors, float32. Pure functions.
 #pragma once
 
 #include <torch/types.h>
@@ -7,9 +7,9 @@
 
 namespace color3d {
 
-// [1,C,H,W], a copy.
+// Returns a copy as [1,C,H,W].
 torch::Tensor TensorFromImage(const Image& image);
-// Of [1,C,H,W] or [C,H,W], in any memory format.
+// Requires: [1,C,H,W] or [C,H,W], in any memory format.
 Image ImageFromTensor(const torch::Tensor& tensor);
 
 }  // namespace color3d

@@ -25,7 +25,7 @@ torch::jit::Module MakeLayer(const std::string& name, torch::ScalarType type) {
   return layer;
 }
 
-TEST(ScriptWeightsTest, ParametersAndBuffersOfAModuleAreReadByTheirPath) {
+TEST(ScriptWeightsTest, ReadsParametersAndBuffersByPath) {
   for (const torch::ScalarType type : {torch::kFloat32, torch::kHalf, torch::kBFloat16}) {
     torch::manual_seed(3);
     torch::jit::Module inner = MakeLayer("Inner", type);

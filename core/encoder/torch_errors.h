@@ -1,4 +1,4 @@
-// Turns torch's exceptions into ours, at the modules that call torch.
+// Converts exceptions of torch into Error, for modules that call torch.
 #pragma once
 
 #include <c10/util/Exception.h>
@@ -11,7 +11,7 @@
 
 namespace color3d {
 
-// Calls `body`; a c10::Error becomes Error{kInternal}, or kResourceExhausted when memory ran out.
+// Calls `body`; a c10::Error becomes Error{kInternal}, or kResourceExhausted if memory ran out.
 // `what` starts the message.
 template <typename Body>
 auto WithTorchErrors(const char* what, Body&& body) {

@@ -10,8 +10,8 @@
 namespace color3d {
 namespace {
 
-// OpenBLAS has threads of its own, which torch does not know: they spin while they wait, and
-// callers on several threads wait for each other. Null with another BLAS.
+// OpenBLAS has its own threads, unknown to torch: they spin while waiting, and concurrent callers
+// block each other. Null if another BLAS is loaded.
 using SetBlasThreads = void (*)(int);
 SetBlasThreads FindSetBlasThreads() {
   return reinterpret_cast<SetBlasThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));

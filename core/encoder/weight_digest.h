@@ -1,4 +1,4 @@
-// The name of a network: SHA-256 over what it is and its weights.
+// Digest of a network: SHA-256 over its architecture and weights.
 #pragma once
 
 #include <fmt/core.h>
@@ -11,7 +11,7 @@
 
 namespace color3d {
 
-// `architecture` holds everything that the weights do not say.
+// `architecture` describes all that the weights do not determine.
 inline std::string DigestOfWeights(std::string_view architecture, const WeightMap& weights) {
   Sha256 hash;
   hash.Update(architecture);

@@ -1,4 +1,4 @@
-// Arrays of a weight file as tensors, without a second copy.
+// Tensors from arrays of a weight file, without a copy.
 #pragma once
 
 #include <torch/types.h>
@@ -12,7 +12,7 @@
 
 namespace color3d {
 
-// float32 tensor that takes the array's memory over.
+// Returns a float32 tensor that takes over the memory of the array.
 inline torch::Tensor TensorFromWeights(WeightArray array) {
   auto values = std::make_shared<std::vector<float>>(std::move(array.values));
   float* data = values->data();
@@ -23,7 +23,7 @@ inline torch::Tensor TensorFromWeights(WeightArray array) {
       torch::kFloat32);
 }
 
-// WeightReader::Take as a tensor; channels-last when it has four dimensions.
+// WeightReader::Take as a tensor, channels-last if it has four dimensions.
 inline torch::Tensor TakeTensor(WeightReader& reader,
                                 const std::string& name,
                                 const std::vector<int64_t>& shape) {

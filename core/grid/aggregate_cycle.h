@@ -14,7 +14,7 @@ namespace color3d {
 
 // Damping of the Jacobi smoother: eigenvalues of D^-1 A reach 2.
 inline constexpr float kJacobiDamping = 0.7f;
-// What a Jacobi step multiplies a residual with. A node without an edge is solved exactly.
+// Factor on the residual in a Jacobi step. A node without an edge is solved exactly.
 float JacobiScale(float edge_sum, float data);
 
 // Approximate inverse of the Laplacian of a graph: damped Jacobi before and after, and on coarser
@@ -24,7 +24,7 @@ class AggregateCycle {
  public:
   AggregateCycle(AggregateGraph finest, ThreadPool& pool, const CancellationToken& cancel);
 
-  // Where the right-hand side goes before Run (it is used up), and the answer after it.
+  // Buffers of the right-hand side before Run (overwritten by it) and of the solution after it.
   std::vector<float>& right_side() { return levels_[0].f; }
   const std::vector<float>& answer() const { return levels_[0].u; }
   void Run() { Solve(0); }

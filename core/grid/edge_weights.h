@@ -1,5 +1,4 @@
-// How strongly the colours of neighbouring pixels hang together, by their luminances. Pure,
-// thread-safe.
+// Edge weights between neighbouring pixels from their luminance. Pure, thread-safe.
 #pragma once
 
 #include "core/base/image.h"

@@ -1,5 +1,5 @@
-// The loops over all pixels of the grid solver, for the instruction set in use
-// (core/simd/instruction_set.h). For this folder only.
+// Per-pixel loops of the grid solver for the instruction set in use (core/simd/instruction_set.h).
+// For this folder only.
 #pragma once
 
 #include <array>
@@ -9,8 +9,8 @@
 
 namespace color3d {
 
-// Pixels are handled in chunks of this many, whatever the number of threads, so that sums are the
-// same for all. A multiple of the widest register.
+// Pixels are processed in chunks of this size for every number of threads, so that sums do not
+// depend on it. A multiple of the widest register.
 inline constexpr int64_t kGridChunk = 1 << 16;
 // Margin of a GridPlane beyond a row and a pixel: one widest register.
 inline constexpr int64_t kGridMargin = 16;

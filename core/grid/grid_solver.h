@@ -1,8 +1,8 @@
 // Sparse symmetric positive definite systems on the pixels of a picture: a weighted graph Laplacian
 // over the 8-neighbourhood plus a diagonal. Flexible conjugate gradients, preconditioned by an
-// aggregation multigrid whose aggregates follow the strong edges (aggregate_graph.h), so that
-// neither the size of the picture nor the contrast of the weights moves the number of iterations
-// much. float32 arrays, float64 sums. Pure; the result does not depend on the number of threads.
+// aggregation multigrid whose aggregates follow the strong edges (aggregate_graph.h), so that the
+// number of iterations hardly depends on the size of the picture or the contrast of the weights.
+// float32 arrays, float64 sums. Pure; the result does not depend on the number of threads.
 #pragma once
 
 #include <cstdint>

@@ -98,7 +98,7 @@ Eigen::MatrixXd DenseSolve(const GridSystem& s, const std::vector<float>& target
   return a.partialPivLu().solve(b);
 }
 
-TEST_P(GridSolverTest, AgreesWithADenseSolve) {
+TEST_P(GridSolverTest, AgreesWithDenseSolve) {
   struct Case {
     int width, height;
     double decades;
@@ -124,7 +124,7 @@ TEST_P(GridSolverTest, AgreesWithADenseSolve) {
   }
 }
 
-TEST_P(GridSolverTest, ConstantTargetGivesAConstant) {
+TEST_P(GridSolverTest, ConstantTargetGivesConstant) {
   const GridSystem system = RandomSystem(60, 45, 5, 700, 3);
   const std::vector<float> target(2 * system.PixelCount(), 37.5f);
   for (float value : Solve(system, target, {1e-6, 1000}).u) ASSERT_NEAR(value, 37.5f, 1e-2);
@@ -164,7 +164,7 @@ TEST_P(GridSolverTest, PinnedPixelsAreExact) {
   }
 }
 
-TEST_P(GridSolverTest, WholeRowsOfPinnedPixelsCutThePictureInPieces) {
+TEST_P(GridSolverTest, PinnedRowsSplitPicture) {
   // Pockets that are connected to nothing but pinned pixels, and one without any connection.
   GridSystem system = RandomSystem(96, 96, 2, 96 * 96 - 1, 9);
   for (int y = 0; y < 96; ++y) {
@@ -178,7 +178,7 @@ TEST_P(GridSolverTest, WholeRowsOfPinnedPixelsCutThePictureInPieces) {
   EXPECT_EQ(Solve(system, target, {1e-6, 100}).u, target);
 }
 
-TEST_P(GridSolverTest, StarsOfManyLeavesShrink) {
+TEST_P(GridSolverTest, CoarsensStarGraphs) {
   // One huge, tightly bound region with 10^4 specks that touch nothing else.
   GridSystem system(300, 300);
   for (int64_t i = 0; i < system.PixelCount(); ++i) {
@@ -197,14 +197,14 @@ TEST_P(GridSolverTest, StarsOfManyLeavesShrink) {
   for (int64_t i = 0; i < system.PixelCount(); ++i) ASSERT_NEAR(solution.u[i], 50.0f, 0.5f);
 }
 
-TEST_P(GridSolverTest, TheNumberOfThreadsDoesNotChangeABit) {
+TEST_P(GridSolverTest, IsBitwiseIndependentOfThreads) {
   const GridSystem system = RandomSystem(700, 500, 3, 5003, 7);
   const std::vector<float> target = RandomTarget(system, 8);
   const GridSolution one = Solve(system, target, {1e-3, 200}, 1);
   EXPECT_EQ(one.u, Solve(system, target, {1e-3, 200}, 3).u);
 }
 
-TEST_P(GridSolverTest, AMegapixelConvergesInFewIterations) {
+TEST_P(GridSolverTest, MegapixelConvergesInFewIterations) {
   // Edge weights over six decades and one hint in 100 000 pixels.
   const GridSystem system = RandomSystem(1024, 1024, 6, 100003, 7);
   const std::vector<float> target = RandomTarget(system, 8);

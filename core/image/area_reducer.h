@@ -1,4 +1,4 @@
-// Area averaging of a picture that comes row by row: what it is reduced to is all that is held.
+// Area averaging of a picture that arrives row by row; only the reduced picture is kept in memory.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace color3d {
 
-// Used by one thread. Sizes in px, the reduced ones at least 1 and at most the given ones.
+// Not thread-safe. Sizes in px; the reduced ones are at least 1 and at most the given ones.
 class AreaReducer {
  public:
   AreaReducer(int width, int height, int channels, int reduced_width, int reduced_height)
@@ -20,11 +20,11 @@ class AreaReducer {
         line_(static_cast<size_t>(reduced_width) * channels),
         sum_(line_.size(), 0.0) {}
 
-  // The next row, `width` pixels of interleaved channels; all `height` rows have to come.
+  // Adds the next row, `width` pixels of interleaved channels; all `height` rows must be added.
   template <typename Sample>
   void AddRow(const Sample* row) {
     ReduceRow(row);
-    const double rows = static_cast<double>(height_) / reduced_.height;  // that one row is made of
+    const double rows = static_cast<double>(height_) / reduced_.height;  // that form one row
     double from = next_row_;
     const double to = ++next_row_;
     while (from < to && filled_ < reduced_.height) {
@@ -37,7 +37,7 @@ class AreaReducer {
     }
   }
 
-  // Channel c as plane c; what AddRow was given on average.
+  // Writes channel c as plane c: the averages of the added rows.
   Image Take() { return std::move(reduced_); }
 
  private:
@@ -77,10 +77,10 @@ class AreaReducer {
   const int width_, height_, channels_;
   Image reduced_;
   std::vector<double> line_;  // the row, reduced in width
-  std::vector<double> sum_;   // of lines, by the part of them that counts
-  double weight_ = 0.0;       // of what is in the sum
+  std::vector<double> sum_;   // weighted sum of rows
+  double weight_ = 0.0;       // total weight of sum_
   int next_row_ = 0;
-  int filled_ = 0;  // rows of the reduced picture
+  int filled_ = 0;  // completed rows of the reduced picture
 };
 
 }  // namespace color3d

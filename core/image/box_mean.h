@@ -5,7 +5,8 @@
 
 namespace color3d {
 
-// Of each channel, over windows of (2 radius + 1)^2 pixels, clipped at the borders. radius >= 0.
+// Mean of each channel over windows of (2 radius + 1)^2 pixels, clipped at the borders. radius >=
+// 0.
 Image BoxMean(const Image& image, int radius);
 
 }  // namespace color3d

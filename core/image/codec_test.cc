@@ -119,7 +119,7 @@ TEST(Codec, ColorsAreInTheRightOrder) {
   }
 }
 
-TEST(Codec, GreyStaysOneChannelAndValuesAreClamped) {
+TEST(Codec, GrayKeepsOneChannelAndClamps) {
   Image image(9, 7, 1, 0.25f);
   image.At(0, 0, 0) = -3.0f;
   image.At(0, 0, 1) = 7.0f;
@@ -238,7 +238,7 @@ TEST(Codec, OrientedJpegAgreesWithOpenCv) {
   }
 }
 
-TEST(Codec, MinIsWhiteAndBilevelTiffs) {
+TEST(Codec, ReadsMinIsWhiteAndBilevelTiffs) {
   for (int photometric : {0, 1}) {
     for (int bits : {1, 8, 16}) {
       const uint32_t top = bits == 1 ? 1 : bits == 8 ? 255 : 65535;
@@ -280,7 +280,7 @@ TEST(Codec, AbMapsRoundTrip) {
   EXPECT_THROW(DecodeAbPng(EncodePng8(Noise(4, 4, 3)), "x.png"), Error);
 }
 
-TEST(Codec, FilesAndErrors) {
+TEST(Codec, ReadsFilesAndNamesErrors) {
   const ScratchFolder folder;
   const Image image = Noise(12, 9, 3);
   WriteFileAtomic(folder.path() / "a.png", EncodePng8(image));
@@ -292,7 +292,7 @@ TEST(Codec, FilesAndErrors) {
   EXPECT_THROW(EncodeJpeg(image, 0), Error);
 }
 
-TEST(Codec, OddSizes) {
+TEST(Codec, RoundTripsOddSizes) {
   for (auto [width, height] : {std::pair{1, 1}, {1, 300}, {8000, 1}}) {
     const Image image = Noise(width, height, 1);
     EXPECT_LE(WorstDifference(DecodeImage(EncodePng16(image), "a.png"), image), 1e-5);

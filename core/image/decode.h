@@ -1,4 +1,4 @@
-// How pictures are decoded, for this folder only. Thread-safe.
+// Options of decoding pictures, for this folder only. Thread-safe.
 #pragma once
 
 #include <functional>
@@ -14,11 +14,10 @@ namespace color3d {
 struct DecodeRequest {
   bool keep_alpha = false;
   bool keep_stored_values = false;  // no conversion to sRGB
-  // 1, or 2, 4, 8 for JPEG files, whose sides are divided by it (rounded up).
+  // 1, or 2, 4, 8 for JPEG files: divides the sides (rounded up).
   int jpeg_reduction = 1;
-  // Told the picture's size as it is looked at, says the size that is wanted (Resize's result);
-  // empty: its own. Pictures that would take much memory as floats are reduced before they become
-  // floats.
+  // Receives the picture's size after orientation and returns the wanted size (Resize's result);
+  // empty: the original size. Large pictures are reduced before their conversion to floats.
   std::function<PictureSize(const PictureSize&)> wanted;
 };
 

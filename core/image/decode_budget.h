@@ -1,5 +1,4 @@
-// Pictures are decoded within the memory that the process may take, as many at once as fit.
-// Thread-safe.
+// Limits concurrent decoding of pictures to the memory available to the process. Thread-safe.
 #pragma once
 
 #include <condition_variable>
@@ -12,7 +11,7 @@
 
 namespace color3d {
 
-// A picture and the memory that a piece of work on it takes at its peak.
+// A picture and the peak memory of an operation on it.
 struct PictureNeed {
   std::string file_name;
   int width = 0;  // px
@@ -20,21 +19,21 @@ struct PictureNeed {
   int64_t bytes = 0;
 };
 
-// Throws Error{kResourceExhausted} when `need` is more than `granted_bytes`. The message names the
-// file, its size in px, what it takes and what is granted in MiB, and what to do. `what` completes
-// "takes N MiB ...", e.g. "while it is decoded".
+// Throws Error{kResourceExhausted} if `need` exceeds `granted_bytes`. The message names the file,
+// its size in px, the memory needed and granted in MiB, and the remedy. `what` completes "takes N
+// MiB ...", e.g. "while it is decoded".
 void RequirePictureMemory(const PictureNeed& need, int64_t granted_bytes, const std::string& what);
 
-// Memory that is promised to pictures.
+// Memory reserved for pictures.
 class DecodeBudget {
  public:
-  // `available`: bytes that may be taken at the moment; called with every large picture.
+  // `available`: returns the bytes available now; called for every large picture.
   explicit DecodeBudget(std::function<int64_t()> available) : available_(std::move(available)) {}
-  // Of AvailableMemoryBytes.
+  // Uses AvailableMemoryBytes.
   static DecodeBudget& OfProcess();
 
-  // Waits until `need` fits beside what other threads were promised. Throws as RequirePictureMemory
-  // when it does not fit alone.
+  // Waits until `need` fits beside the reservations of other threads. Throws as
+  // RequirePictureMemory if it does not fit alone.
   void Acquire(const PictureNeed& need);
   void Release(int64_t bytes);
 
@@ -47,9 +46,9 @@ class DecodeBudget {
   int64_t promised_ = 0;
 };
 
-// Holds a picture's memory from the budget while it lives. Small pictures are not counted. A thread
-// that holds one already is covered by it: work that decodes a picture and goes on with it at full
-// size takes one turn for the whole. Not to be handed to another thread.
+// Reserves a picture's memory during its lifetime. Small pictures are not counted. Nested
+// reservations of one thread are free: work that decodes a picture and continues at full size
+// reserves once for the whole. Must not be passed to another thread.
 class PictureTurn {
  public:
   // Throws as DecodeBudget::Acquire.
@@ -60,13 +59,13 @@ class PictureTurn {
 
  private:
   DecodeBudget& budget_;
-  const int64_t bytes_;  // 0: nothing is held
+  const int64_t bytes_;  // 0: no reservation
 };
 
-// Bytes of the floats that a codec's picture becomes when it has this size, all its channels.
+// Size in bytes of the float image of this size with all channels.
 int64_t FloatBytes(const ImageInfo& info, int width, int height);
-// Bytes of DecodeImage's picture and of all that decoding takes beside it, at the peak. `copies`:
-// channels are left out or the picture is turned, for which it is there twice.
+// Peak memory in bytes of decoding with DecodeImage, including its result. `copies`: channels are
+// dropped or the picture is rotated, which needs a second copy.
 int64_t DecodingBytes(const ImageInfo& info, bool copies);
 
 }  // namespace color3d

@@ -30,7 +30,7 @@ using ::testing::HasSubstr;
 
 constexpr int64_t kMiB = int64_t{1} << 20;
 
-TEST(DecodeBudget, RefusesWhatDoesNotFitAloneWithTheNumbers) {
+TEST(DecodeBudget, NamesSizesIfOnePictureDoesNotFit) {
   DecodeBudget budget([] { return 1000 * kMiB; });
   try {
     const PictureTurn turn({"wall.png", 14'000, 14'000, 2352 * kMiB}, budget);
@@ -45,7 +45,7 @@ TEST(DecodeBudget, RefusesWhatDoesNotFitAloneWithTheNumbers) {
   const PictureTurn fits({"wall.png", 8660, 8660, 899 * kMiB}, budget);
 }
 
-TEST(DecodeBudget, OnlyAsManyAtOnceAsFit) {
+TEST(DecodeBudget, LimitsConcurrentDecodes) {
   DecodeBudget budget([] { return 1000 * kMiB; });
   std::atomic<int> running{0}, most{0};
   ThreadPool pool(8);
@@ -63,13 +63,13 @@ TEST(DecodeBudget, OnlyAsManyAtOnceAsFit) {
   EXPECT_LE(most, 3);
 }
 
-TEST(DecodeBudget, AThreadsOwnTurnCoversWhatItDecodesMeanwhile) {
+TEST(DecodeBudget, NestedTurnsOfOneThreadDoNotWait) {
   DecodeBudget budget([] { return 1000 * kMiB; });
   const PictureTurn whole({"a.png", 10'000, 7'000, 800 * kMiB}, budget);
   const PictureTurn part({"a.png", 10'000, 7'000, 700 * kMiB}, budget);  // must not wait for itself
 }
 
-TEST(DecodingBytes, CountsWhatCodecsHold) {
+TEST(DecodingBytes, CountsCodecMemory) {
   ImageInfo info;
   info.format = ImageFormat::kPng;
   info.width = info.height = 1000;
@@ -83,7 +83,7 @@ TEST(DecodingBytes, CountsWhatCodecsHold) {
 }
 
 // What Resize makes of the whole picture.
-TEST(AreaReducer, AveragesAsResizeDoes) {
+TEST(AreaReducer, AveragesLikeResize) {
   Random random(3);
   for (const auto& [width, height] : {std::pair{31, 17}, {20, 40}, {64, 64}, {65, 3}}) {
     std::vector<uint8_t> samples(static_cast<size_t>(width) * height * 3);
@@ -103,7 +103,7 @@ TEST(AreaReducer, AveragesAsResizeDoes) {
 }
 
 // 5000 x 5000 px of RGB with an orientation: 300 MiB of floats, which are never held.
-TEST(ReadImageResized, ALargePictureIsReducedBeforeItBecomesFloats) {
+TEST(ReadImageResized, ReducesLargePictureBeforeFloats) {
   const ScratchFolder scratch;
   cv::Mat mat(5000, 5000, CV_8UC3, cv::Scalar(10, 20, 30));
   mat(cv::Rect(0, 0, 2500, 5000)).setTo(cv::Scalar(50, 60, 70));
@@ -127,7 +127,7 @@ TEST(ReadImageResized, ALargePictureIsReducedBeforeItBecomesFloats) {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 // 9000 x 9000 px of RGB: 243 MB as stored, 972 MB as floats. Four threads at once would take four
 // times as much; 512 MiB are enough for one after the other.
-TEST(ReadImageResized, LargePicturesOfManyThreadsStayWithinTheProcesssLimit) {
+TEST(ReadImageResized, ConcurrentReadsStayWithinMemoryLimit) {
   const ScratchFolder scratch;
   const std::string file = (scratch.path() / "flat.png").string();
   cv::imwrite(
@@ -156,7 +156,7 @@ TEST(ReadImageResized, LargePicturesOfManyThreadsStayWithinTheProcesssLimit) {
 }
 #endif
 
-TEST(ReadImageResized, WhatTheCallerThrowsForTheSizePassesBeforeDecoding) {
+TEST(ReadImageResized, SizeCheckThrowsBeforeDecoding) {
   const ScratchFolder scratch;
   Image image(8, 6, 1, 0.5f);
   WriteFileAtomic(scratch.path() / "a.png", EncodePng8(image));

@@ -13,7 +13,7 @@ double Ink(const Image& image) {
   return sum;
 }
 
-TEST(DrawTest, EverythingIsClippedToTheCanvas) {
+TEST(DrawTest, ClipsToCanvas) {
   Image canvas(40, 30, 3);
   DrawBox(-5, -5, 10, 10, {1.0f, 0.5f, 0.0f}, &canvas);
   EXPECT_EQ(canvas.At(0, 4, 4), 1.0f);
@@ -28,7 +28,7 @@ TEST(DrawTest, EverythingIsClippedToTheCanvas) {
   EXPECT_THROW(DrawPicture(Image(2, 2, 2), 0, 0, 1.0f, &canvas), Error);
 }
 
-TEST(DrawTest, TextLeavesInkWhereItSays) {
+TEST(DrawTest, TextStaysWithinReportedBounds) {
   Image canvas(200, 40, 3);
   DrawText("IMG_0042.jpg", 10, 10, 12, {1.0f, 1.0f, 1.0f}, &canvas);
   const int width = TextWidth("IMG_0042.jpg", 12);
@@ -43,14 +43,14 @@ TEST(DrawTest, TextLeavesInkWhereItSays) {
   }
 }
 
-TEST(DrawTest, OtherAlphabetsBecomeQuestionMarks) {
+TEST(DrawTest, NonAsciiTextBecomesQuestionMarks) {
   EXPECT_EQ(FittingText("caf\xc3\xa9 \xe5\xb1\xb1.png", 12, 1000), "caf? ?.png");
   Image canvas(20, 20, 3);
   DrawText("\xff\xfe\x80", 0, 0, 12, {1.0f, 1.0f, 1.0f}, &canvas);
   DrawText("", 0, 0, 12, {1.0f, 1.0f, 1.0f}, &canvas);
 }
 
-TEST(DrawTest, LongNamesAreShortenedInTheMiddle) {
+TEST(DrawTest, ShortensLongNamesInTheMiddle) {
   const std::string name = "a_very_long_name_of_a_photograph_0042.jpg";
   const std::string shorter = FittingText(name, 12, 150);
   EXPECT_LE(TextWidth(shorter, 12), 150);

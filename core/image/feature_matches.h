@@ -1,4 +1,4 @@
-// Which local features of two pictures are of one place. Pure function, thread-safe.
+// Matching of local features between two pictures. Pure function, thread-safe.
 #pragma once
 
 #include <utility>
@@ -8,8 +8,8 @@
 
 namespace color3d {
 
-// Features of a and b, by index, that are each other's nearest and clearly nearer than the second
-// (Lowe's ratio 0.8).
+// Index pairs of features of a and b that are mutual nearest neighbours and pass Lowe's ratio test
+// (0.8).
 std::vector<std::pair<int, int>> MutualMatches(const LocalFeatures& a, const LocalFeatures& b);
 
 }  // namespace color3d

@@ -1,12 +1,12 @@
-// Chroma predicted on a coarse grid, brought to full size along the edges of L.
+// Edge-aware upsampling of coarse chroma, guided by L.
 #pragma once
 
 #include "core/base/image.h"
 
 namespace color3d {
 
-// Chosen for the personalized colorizer, and what every caller takes that has no reason of its own:
-// windows of 5 x 5 cells; contrasts of L below about sqrt(20) = 4.5 units are no edges.
+// Defaults, chosen for the personalized colorizer: windows of 5 x 5 cells; contrasts of L below
+// about sqrt(20) = 4.5 units are not edges.
 inline constexpr int kGuideRadius = 2;               // cells
 inline constexpr float kGuideVarianceFloor = 20.0f;  // L units squared
 

@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST(GuidedUpsampleTest, AConstantStaysConstant) {
+TEST(GuidedUpsampleTest, KeepsConstant) {
   Image luminance(40, 30, 1);
   for (size_t i = 0; i < luminance.data.size(); ++i) luminance.data[i] = static_cast<float>(i % 97);
   const Image out = UpsampleGuided(Image(10, 8, 2, -17.0f), luminance, 2, 20.0f);
@@ -19,7 +19,7 @@ TEST(GuidedUpsampleTest, AConstantStaysConstant) {
   for (float value : out.data) ASSERT_NEAR(value, -17.0f, 1e-3f);
 }
 
-TEST(GuidedUpsampleTest, FollowsAnEdgeOfLThatTheCoarseGridBlurs) {
+TEST(GuidedUpsampleTest, FollowsLuminanceEdge) {
   // The edge lies in the middle of a coarse cell: plain interpolation is off by half the step
   // there.
   Image luminance(64, 64, 1, 20.0f);
@@ -54,7 +54,7 @@ TEST(GuidedUpsampleTest, EqualSizesChangeLittle) {
   for (size_t i = 0; i < ab.data.size(); ++i) ASSERT_NEAR(out.data[i], ab.data[i], 1e-3f);
 }
 
-TEST(GuidedUpsampleTest, OnePixel) {
+TEST(GuidedUpsampleTest, AcceptsOnePixel) {
   const Image out = UpsampleGuided(Image(1, 1, 2, 5.0f), Image(7, 3, 1, 40.0f), 2, 20.0f);
   for (float value : out.data) ASSERT_NEAR(value, 5.0f, 1e-4f);
 }

@@ -1,5 +1,5 @@
-// A few hundred local features of a picture, to tell which photos of a scene show the same things.
-// OpenCV inside, never in this interface. Pure function, thread-safe.
+// A few hundred local features of a picture, to find photos of a scene that overlap. OpenCV inside,
+// never in this interface. Pure function, thread-safe.
 #pragma once
 
 #include <vector>

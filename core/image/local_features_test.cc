@@ -19,7 +19,7 @@ Image Blobs(int width, int height, uint64_t seed) {
   return Resize(coarse, width, height);
 }
 
-TEST(LocalFeatures, UnitRowsStrongestFirstAndTheSameTwice) {
+TEST(LocalFeatures, ReturnsUnitRowsStrongestFirst) {
   const Image picture = Blobs(240, 180, 1);
   const LocalFeatures all = DetectLocalFeatures(picture, 10'000);
   const LocalFeatures some = DetectLocalFeatures(picture, 30);
@@ -35,7 +35,7 @@ TEST(LocalFeatures, UnitRowsStrongestFirstAndTheSameTwice) {
   EXPECT_EQ(DetectLocalFeatures(picture, 10'000).descriptors, all.descriptors);
 }
 
-TEST(LocalFeatures, NothingToSee) {
+TEST(LocalFeatures, FlatPictureHasNoFeatures) {
   EXPECT_EQ(DetectLocalFeatures(Image(64, 48, 1, 0.5f), 100).count(), 0);
   EXPECT_EQ(DetectLocalFeatures(Image(1, 1, 1, 0.5f), 100).count(), 0);
   EXPECT_THROW(DetectLocalFeatures(Image(), 100), Error);

@@ -1,4 +1,4 @@
-// Bilinear reading of a planar picture at any place.
+// Bilinear sampling of planar pictures.
 #pragma once
 
 #include <algorithm>
@@ -9,8 +9,8 @@
 
 namespace color3d {
 
-// The four pixels around a place of pictures of one size, which all their planes are read by.
-// Pixel centres at whole numbers; beyond the border the nearest pixel.
+// The four pixels around a position, for all planes of pictures of one size. Pixel centres are at
+// integers; positions outside use the nearest pixel.
 class BilinearPlace {
  public:
   BilinearPlace(int width, int height, float x, float y) {
@@ -40,7 +40,7 @@ inline float SampleBilinear(const Image& image, int channel, double x, double y)
       .Of(image.Plane(channel));
 }
 
-// `image` at the places `place`, 2 channels of the result's size: x and y in px.
+// Samples `image` at `place`, 2 channels of the result's size: x and y in px.
 inline Image SampledAt(const Image& image, const Image& place) {
   Image out(place.width, place.height, image.channels);
   for (size_t i = 0; i < place.PlaneSize(); ++i) {

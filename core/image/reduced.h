@@ -1,5 +1,4 @@
-// Reading photographs at another size than their own, in little memory. Pure functions,
-// thread-safe.
+// Memory-saving decoding of photographs at a reduced size. Pure functions, thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -15,17 +14,17 @@ namespace color3d {
 // ReadImage. Throws what ReadImage throws.
 Image ReadImageWithin(const std::filesystem::path& path, int max_side_px);
 
-// ReadImage's picture as Resize makes it of the size that `wanted` says when it is told the
-// picture's own. What `wanted` throws passes through. Of large pictures only the reduced one is
-// ever held as floats. Throws what ReadImage throws.
+// Decodes like ReadImage and resizes like Resize to the size that `wanted` returns for the
+// picture's own size. Exceptions of `wanted` pass through. Only the reduced copy of a large picture
+// is held as floats. Throws as ReadImage.
 Image ReadImageResized(const std::filesystem::path& path,
                        const std::function<PictureSize(const PictureSize& own)>& wanted);
 
-// ReadImageResized that never enlarges: the longer side is at most `max_side_px`, as FitWithin has
-// it. Slower than ReadImageWithin for JPEG files and exact.
+// ReadImageResized without enlargement: the longer side is at most `max_side_px`, as in FitWithin.
+// Slower than ReadImageWithin for JPEG files, but exact.
 Image ReadImageFitted(const std::filesystem::path& path, int max_side_px);
 
-// The size that FitWithin gives a picture of the size `own`.
+// The size that FitWithin returns for a picture of the size `own`.
 PictureSize SizeWithin(const PictureSize& own, int max_side_px);
 
 }  // namespace color3d

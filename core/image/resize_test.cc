@@ -23,7 +23,7 @@ TEST(Resize, HalvingAveragesFourPixels) {
   }
 }
 
-TEST(Resize, FractionalShrinkingWeighsByArea) {
+TEST(Resize, FractionalShrinkingWeightsByArea) {
   // 3 -> 2 px: the middle pixel is shared.
   Image image(3, 1, 1);
   image.data = {3.0f, 6.0f, 9.0f};
@@ -40,7 +40,7 @@ TEST(Resize, EnlargingIsLinearAndPixelCentred) {
   for (int x = 0; x < 4; ++x) EXPECT_NEAR(out.data[x], expected[x], 1e-6);
 }
 
-TEST(Resize, OneSideDownOtherUpKeepsTheMean) {
+TEST(Resize, MixedScalingKeepsMean) {
   Image image(8, 2, 1);
   for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = static_cast<float>(i % 5);
   const Image out = Resize(image, 2, 4);
@@ -53,7 +53,7 @@ TEST(Resize, OneSideDownOtherUpKeepsTheMean) {
 }
 
 // Confidences are checked against 0..1 by those who read them.
-TEST(Resize, NoValueLeavesTheRangeOfThePicture) {
+TEST(Resize, StaysWithinValueRange) {
   Random random(7);
   for (int trial = 0; trial < 400; ++trial) {
     Image image(1 + static_cast<int>(random.NextUniform(0, 90)),

@@ -1,13 +1,13 @@
-// Resizing of values of which some are surer than others. Pure, thread-safe.
+// Resizing weighted by confidence. Pure, thread-safe.
 #pragma once
 
 #include "core/base/image.h"
 
 namespace color3d {
 
-// `values` (any channels) resized so that each source pixel counts by its `weight` (1 channel of
-// the same size, >= 0): what is not known does not leak into what is. Where no weight reaches a
-// pixel it is resized plainly.
+// Resizes `values` (any channels) so that each source pixel counts by its `weight` (1 channel of
+// the same size, >= 0): unknown pixels do not leak into known ones. Pixels without any weight are
+// resized without weights.
 Image ResizeWeighted(const Image& values, const Image& weight, int width, int height);
 
 }  // namespace color3d

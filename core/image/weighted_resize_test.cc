@@ -26,7 +26,7 @@ struct HalfKnown {
   }
 };
 
-TEST(ResizeWeighted, WhatHasNoWeightDoesNotLeakIn) {
+TEST(ResizeWeighted, ZeroWeightDoesNotLeak) {
   const HalfKnown picture(0.0f);
   for (const auto& [width, height] : {std::pair{25, 19}, {17, 11}, {80, 61}}) {
     const Image out = ResizeWeighted(picture.values, picture.weight, width, height);
@@ -51,7 +51,7 @@ TEST(ResizeWeighted, EqualWeightsChangeNothing) {
   EXPECT_EQ(ResizeWeighted(values, Image(31, 22, 1), 13, 9).data, plain.data);
 }
 
-TEST(FillHoles, WhatIsUnknownContinuesWhatIsKnown) {
+TEST(FillHoles, UnknownPixelsContinueKnownOnes) {
   HalfKnown picture(-100.0f);
   const Image before = picture.values;
   FillHoles(picture.weight, &picture.values);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kPaintedAlpha = 0.5f;
 
-// 1 where the picture is opaque; empty when it is everywhere.
+// Returns 1 where the picture is opaque, or an empty image if it is opaque everywhere.
 Image OpaquePart(const Image& colored) {
   if (colored.channels < 4) return {};
   Image opaque(colored.width, colored.height, 1);
@@ -23,8 +23,7 @@ Image OpaquePart(const Image& colored) {
     opaque.data[i] = colored.Plane(3)[i] > kPaintedAlpha ? 1.0f : 0.0f;
     count += opaque.data[i] > 0.0f ? 1 : 0;
   }
-  if (count == 0)
-    throw InvalidArgument("the coloured picture is transparent all over; paint on it");
+  if (count == 0) throw InvalidArgument("the coloured picture is fully transparent; paint on it");
   return count < opaque.data.size() ? opaque : Image();
 }
 
@@ -38,12 +37,12 @@ Image WithoutAlpha(const Image& colored) {
 
 PaintedColor KeyColorFromImage(const Image& luminance, const Image& colored) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+    throw InvalidArgument("the key view's luminance must have 1 channel, but has {}",
                           luminance.channels);
   }
   if (colored.width != luminance.width || colored.height != luminance.height) {
     throw InvalidArgument(
-        "the coloured picture is {} px, the key view {}; save it at the key view's size",
+        "the coloured picture is {} px, but the key view {}; save it at the size of the key view",
         SizeText(colored),
         SizeText(luminance));
   }
@@ -53,19 +52,19 @@ PaintedColor KeyColorFromImage(const Image& luminance, const Image& colored) {
   }
   for (float value : colored.data) {
     if (!std::isfinite(value)) {
-      throw InvalidArgument("the coloured picture holds a value that is not finite");
+      throw InvalidArgument("the coloured picture has a value that is not finite");
     }
   }
   PaintedColor color;
   color.painted = OpaquePart(colored);
   Image lab = LabFromSrgb(WithoutAlpha(colored));
-  // What was not painted is the photo's, without colour.
+  // Unpainted pixels take the luminance of the photo, without colour.
   for (size_t i = 0; i < color.painted.data.size(); ++i) {
     if (color.painted.data[i] > 0.0f) continue;
     lab.Plane(0)[i] = luminance.data[i];
     lab.Plane(1)[i] = lab.Plane(2)[i] = 0.0f;
   }
-  // A part may well be meant to be grey.
+  // A painted part may be grey on purpose.
   if (color.painted.Empty()) ExpectColor(lab, "the coloured picture");
   ExpectSameSubject(luminance, lab, "the coloured picture");
   color.ab = ChromaOfLab(lab);

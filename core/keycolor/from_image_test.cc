@@ -50,21 +50,21 @@ TEST(KeyColorFromImageTest, ReturnsTheChroma) {
   }
 }
 
-TEST(KeyColorFromImageTest, AChangedToneCurveIsStillTheSamePicture) {
+TEST(KeyColorFromImageTest, AcceptsChangedToneCurve) {
   Image lab = MakeLab(60, 40);
   const Image luminance = LuminanceOfLab(lab);
   for (size_t i = 0; i < lab.PlaneSize(); ++i) lab.data[i] = 20.0f + 0.6f * lab.data[i];
   EXPECT_EQ(MessageOf(luminance, SrgbFromLab(lab)), "");
 }
 
-TEST(KeyColorFromImageTest, AnotherSizeIsRefusedWithBothSizes) {
+TEST(KeyColorFromImageTest, NamesBothSizesWhenTheyDiffer) {
   const Image lab = MakeLab(60, 40);
   const std::string message = MessageOf(Image(61, 40, 1), SrgbFromLab(lab));
   EXPECT_NE(message.find("60x40"), std::string::npos) << message;
   EXPECT_NE(message.find("61x40"), std::string::npos) << message;
 }
 
-TEST(KeyColorFromImageTest, AGrayPictureIsRefused) {
+TEST(KeyColorFromImageTest, RefusesGrayPicture) {
   Image lab = MakeLab(60, 40);
   const Image luminance = LuminanceOfLab(lab);
   for (int c = 1; c < 3; ++c) std::fill_n(lab.Plane(c), lab.PlaneSize(), 0.5f);
@@ -72,7 +72,7 @@ TEST(KeyColorFromImageTest, AGrayPictureIsRefused) {
   EXPECT_NE(MessageOf(luminance, Image(60, 40, 1, 0.5f)).find("has no colour"), std::string::npos);
 }
 
-TEST(KeyColorFromImageTest, ASmallColoredObjectIsColor) {
+TEST(KeyColorFromImageTest, AcceptsSmallColoredObject) {
   Image lab = MakeLab(60, 40);
   const Image luminance = LuminanceOfLab(lab);
   for (int c = 1; c < 3; ++c) std::fill_n(lab.Plane(c), lab.PlaneSize(), 0.0f);
@@ -82,12 +82,12 @@ TEST(KeyColorFromImageTest, ASmallColoredObjectIsColor) {
   EXPECT_EQ(MessageOf(luminance, SrgbFromLab(lab)), "");
 }
 
-TEST(KeyColorFromImageTest, AnotherPictureIsRefused) {
+TEST(KeyColorFromImageTest, RefusesUnrelatedPicture) {
   const Image lab = MakeLab(60, 40);
   Image other(60, 40, 1);
   Random random(1);
   for (float& value : other.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
-  EXPECT_NE(MessageOf(other, SrgbFromLab(lab)).find("does not look like the key view"),
+  EXPECT_NE(MessageOf(other, SrgbFromLab(lab)).find("does not resemble the key view"),
             std::string::npos);
   // A negative of the picture is another picture, too.
   Image negative = LuminanceOfLab(lab);
@@ -95,7 +95,7 @@ TEST(KeyColorFromImageTest, AnotherPictureIsRefused) {
   EXPECT_NE(MessageOf(negative, SrgbFromLab(lab)), "");
 }
 
-TEST(KeyColorFromImageTest, FlatPicturesHaveADefinedAnswer) {
+TEST(KeyColorFromImageTest, AcceptsFlatPictures) {
   Image colored(20, 20, 3, 0.4f);
   std::fill_n(colored.Plane(0), colored.PlaneSize(), 0.6f);
   EXPECT_EQ(MessageOf(Image(20, 20, 1, 50.0f), colored), "");
@@ -122,7 +122,7 @@ Image PaintedLeftOf(int columns, const Image& srgb) {
   return painted;
 }
 
-TEST(KeyColorFromImageTest, OnlyWhatIsPaintedCounts) {
+TEST(KeyColorFromImageTest, IgnoresUnpaintedPixels) {
   const Image lab = MakeLab(60, 40);
   const Image luminance = LuminanceOfLab(lab), srgb = SrgbFromLab(lab);
   const auto [ab, painted] = KeyColorFromImage(luminance, PaintedLeftOf(20, srgb));

@@ -14,7 +14,7 @@ namespace color3d {
 namespace {
 
 constexpr int kCompareSidePx = 256;
-constexpr double kFlatDeviation = 0.5;  // L units: below this a picture shows nothing
+constexpr double kFlatDeviation = 0.5;  // L units; deviation below which a picture is flat
 
 std::vector<float> SmallLuminance(const Image& picture) {
   Image luminance(picture.width, picture.height, 1);
@@ -66,7 +66,7 @@ void ExpectSameSubject(const Image& luminance, const Image& other, const char* w
   const LuminanceAgreement agreement = CompareLuminance(luminance, other);
   if (agreement.SameSubject()) return;
   throw InvalidArgument(
-      "{} does not look like the key view (correlation of luminances {:.3g}, needed > {}); colour "
+      "{} does not resemble the key view (correlation of luminances {:.3g}, required > {}); colour "
       "the "
       "photo that was chosen as key view",
       what,

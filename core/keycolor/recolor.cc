@@ -13,25 +13,26 @@
 namespace color3d {
 namespace {
 
-// Chroma (Lab units) below which a difference is no edit: twice what 8 bits per channel round to.
+// Difference of chroma (Lab units) that counts as an edit: twice the rounding of 8 bits per
+// channel.
 constexpr float kMinChange = 2.0f;
 constexpr int kFeatherPx = 2;
 
 void CheckPicture(const Image& picture, const char* what, const Image& original) {
   if (picture.width != original.width || picture.height != original.height) {
-    throw InvalidArgument("{} is {} px, the key view {}; save it at the key view's size",
+    throw InvalidArgument("{} is {} px, but the key view {}; save it at the size of the key view",
                           what,
                           SizeText(picture),
                           SizeText(original));
   }
   for (float value : picture.data) {
     if (!std::isfinite(value)) {
-      throw InvalidArgument("{} holds a value that is not finite", what);
+      throw InvalidArgument("{} has a value that is not finite", what);
     }
   }
 }
 
-// 1 where colour may change.
+// Returns 1 where colour may change.
 std::vector<uint8_t> Allowed(const Image* mask, const Image& original) {
   std::vector<uint8_t> allowed(original.PlaneSize(), 1);
   if (mask == nullptr) return allowed;
@@ -52,11 +53,11 @@ std::vector<uint8_t> Allowed(const Image* mask, const Image& original) {
   return allowed;
 }
 
-// The share of the edit: 0 outside, rising over the first pixels inside to 1. City-block steps from
-// the outside, so that the outermost pixels inside already take a part.
+// Returns the share of the edit: 0 outside, rising to 1 over the first pixels inside. Distances are
+// city-block steps from the outside, so that the outermost pixels inside have a share above 0.
 std::vector<float> Shares(const std::vector<uint8_t>& allowed, int width, int height) {
   std::vector<float> shares(allowed.begin(), allowed.end());
-  std::vector<uint8_t> left = allowed;  // not reached from the outside yet
+  std::vector<uint8_t> left = allowed;  // not yet reached from the outside
   for (int step = 1; step <= kFeatherPx; ++step) {
     std::vector<uint8_t> next = left;
     for (int y = 0; y < height; ++y) {
@@ -79,11 +80,11 @@ std::vector<float> Shares(const std::vector<uint8_t>& allowed, int width, int he
 
 Image KeyColorFromEdit(const Image& original_srgb, const Image& edited_srgb, const Image* mask) {
   if (original_srgb.channels != 3 || original_srgb.Empty()) {
-    throw InvalidArgument("recolouring needs a key photo in colour, it has {} channels",
+    throw InvalidArgument("recolouring needs a key photo in colour, but it has {} channels",
                           original_srgb.channels);
   }
   if (edited_srgb.channels != 3) {
-    throw InvalidArgument("the edited picture has {} channels, it must have 3 (RGB)",
+    throw InvalidArgument("the edited picture has {} channels, but must have 3 (RGB)",
                           edited_srgb.channels);
   }
   CheckPicture(edited_srgb, "the edited picture", original_srgb);

@@ -42,7 +42,7 @@ std::string MessageOf(const Image& original, const Image& edited, const Image* m
   return "";
 }
 
-TEST(RecolorTest, OnlyTheInsideOfTheMaskChanges) {
+TEST(RecolorTest, ChangesOnlyInsideTheMask) {
   const Image original = SrgbFromLab(MakeLab(10, 10));
   const Image edited = SrgbFromLab(MakeLab(-15, 5));
   const Image mask = WhiteFrom(20);
@@ -61,7 +61,7 @@ TEST(RecolorTest, OnlyTheInsideOfTheMaskChanges) {
   }
 }
 
-TEST(RecolorTest, WithoutAMaskAllIsTheEdit) {
+TEST(RecolorTest, AppliesEditEverywhereWithoutMask) {
   const Image edited = SrgbFromLab(MakeLab(-15, 5));
   const Image ab = KeyColorFromEdit(SrgbFromLab(MakeLab(10, 10)), edited, nullptr);
   for (size_t i = 0; i < ab.PlaneSize(); ++i) {
@@ -70,11 +70,11 @@ TEST(RecolorTest, WithoutAMaskAllIsTheEdit) {
   }
 }
 
-TEST(RecolorTest, AnEditMayTakeTheColorAway) {
+TEST(RecolorTest, AcceptsEditThatRemovesColor) {
   EXPECT_EQ(MessageOf(SrgbFromLab(MakeLab(10, 10)), SrgbFromLab(MakeLab(0, 0)), nullptr), "");
 }
 
-TEST(RecolorTest, AnEditThatChangesNothingIsRefused) {
+TEST(RecolorTest, RefusesEditWithoutChange) {
   const Image original = SrgbFromLab(MakeLab(10, 10));
   EXPECT_NE(MessageOf(original, original, nullptr).find("nothing would change"), std::string::npos);
   // It changes colour, but outside of the mask only.
@@ -85,7 +85,7 @@ TEST(RecolorTest, AnEditThatChangesNothingIsRefused) {
             std::string::npos);
 }
 
-TEST(RecolorTest, PicturesThatDoNotFitAreRefused) {
+TEST(RecolorTest, RefusesPicturesThatDoNotFit) {
   const Image original = SrgbFromLab(MakeLab(10, 10));
   const Image edited = SrgbFromLab(MakeLab(-15, 5));
   const Image black(40, 30, 1, 0.0f), wrong(41, 30, 1, 1.0f), noise(40, 30, 3, 0.2f);
@@ -95,7 +95,7 @@ TEST(RecolorTest, PicturesThatDoNotFitAreRefused) {
   EXPECT_NE(MessageOf(original, Image(41, 30, 3), nullptr).find("41x30"), std::string::npos);
   EXPECT_NE(MessageOf(original, Image(40, 30, 4), nullptr).find("4 channels"), std::string::npos);
   EXPECT_NE(MessageOf(Image(40, 30, 1), edited, nullptr).find("in colour"), std::string::npos);
-  EXPECT_NE(MessageOf(original, noise, nullptr).find("does not look like"), std::string::npos);
+  EXPECT_NE(MessageOf(original, noise, nullptr).find("does not resemble"), std::string::npos);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 constexpr int kFeatureSidePx = 384;
 constexpr int kThumbnailQuality = 85;
 constexpr int64_t kCacheBytes = int64_t{256} << 20;
-// Changes with everything that is computed here.
+// Version of the cache. Increase when the features change.
 constexpr char kRecipe[] = "view features 1";
 
 std::string Thumbnail(const Image& luminance) {
@@ -68,7 +68,7 @@ std::vector<ViewFeatures> CollectViewFeatures(const Encoder& describer,
   const FileCache cache(cache_folder, kCacheBytes);
   const int64_t count = static_cast<int64_t>(photos.size());
   std::vector<ViewFeatures> features(photos.size());
-  // In rounds, so that progress is told on the calling thread.
+  // In rounds, so that progress is reported on the calling thread.
   const int64_t round = 4 * run.pool.thread_count();
   for (int64_t begin = 0; begin < count; begin += round) {
     run.cancel.ThrowIfCancelled();

@@ -1,5 +1,4 @@
-// What key view selection wants to know of every candidate, computed on all threads or taken from
-// the cache.
+// Features of all candidates for the key view, computed on all threads or read from a cache.
 #pragma once
 
 #include <filesystem>
@@ -11,11 +10,11 @@
 
 namespace color3d {
 
-// One entry a photo, the same bytes whether cached or not. Features are those of the photo as
-// captured (its lens distortion hardly matters here), so that they stay valid when poses change: a
-// photo is computed once for each encoder. `describer` gives the descriptor (it may be a CLIP image
-// tower), `encoder` the deep features. `cache_folder`: kept between runs; empty: none. Throws Error
-// naming a photo that cannot be read.
+// Returns an entry per photo, with the same bytes whether cached or not. Features are those of the
+// photo as captured (lens distortion has little effect), so that they remain valid if poses change
+// and are computed once per photo and encoder. `describer` gives the descriptor (it may be the
+// image tower of CLIP), `encoder` the deep features. `cache_folder`: kept between runs; empty:
+// none. Throws Error naming a photo that cannot be read.
 std::vector<ViewFeatures> CollectViewFeatures(const Encoder& describer,
                                               const Encoder& encoder,
                                               const std::vector<std::filesystem::path>& photos,

@@ -12,19 +12,19 @@ namespace color3d {
 namespace {
 
 constexpr int kMaxComponents = 32;
-// Multiply-adds of all products together, and of the covariance.
+// Maximum number of multiply-adds, of all products and of the covariance.
 constexpr double kWorkBudget = 2e10;
 constexpr double kCovarianceBudget = 4e9;
-// Cells that all views together should be asked about: enough for the mean of any of them.
+// Total number of queries over all views: enough for the mean of each view.
 constexpr int kQueries = 8000;
 constexpr int kMinQueriesPerView = 3;
 constexpr int kMinBankCells = 48;
-// Queries of one matrix product: their distances stay in the cache.
+// Queries per matrix product, so that distances stay in the cache.
 constexpr int kBatch = 256;
 
 struct CellCounts {
-  int bank = 0;     // of the view that explains
-  int queries = 0;  // of each view that is explained
+  int bank = 0;     // cells per explaining view
+  int queries = 0;  // queries per explained view
 };
 
 CellCounts CountsFor(size_t views, int dims) {
@@ -36,7 +36,7 @@ CellCounts CountsFor(size_t views, int dims) {
           queries};
 }
 
-// One column for each of the first `count` cells.
+// One column per cell, for the first `count` cells.
 Eigen::MatrixXf Cells(const ViewFeatures& view, int count) {
   Eigen::MatrixXf cells(view.channels, std::min(count, view.Cells()));
   for (Eigen::Index i = 0; i < cells.size(); ++i) {
@@ -46,8 +46,8 @@ Eigen::MatrixXf Cells(const ViewFeatures& view, int count) {
   return cells;
 }
 
-// Standardises all views together and projects onto the leading principal components. Distances are
-// afterwards root mean squares per channel of the standardised features.
+// Standardises all views together and projects onto the leading principal components. Resulting
+// distances are root mean squares per channel of the standardised features.
 struct Projection {
   Eigen::MatrixXf matrix;
   Eigen::VectorXf offset;
@@ -76,7 +76,7 @@ Projection FitProjection(const std::vector<const ViewFeatures*>& views, int cell
     covariance.selfadjointView<Eigen::Lower>().rankUpdate(centred);
   }
   covariance = Eigen::MatrixXd(covariance.selfadjointView<Eigen::Lower>()) / count;
-  // A channel that never changes carries nothing and must not be blown up.
+  // A constant channel has no information and must not be amplified.
   const double floor = 1e-12 + 1e-9 * covariance.diagonal().maxCoeff();
   const Eigen::VectorXd scale = (covariance.diagonal().array() > floor)
                                     .select(covariance.diagonal().array().max(floor).rsqrt(), 0.0)
@@ -92,8 +92,7 @@ Projection FitProjection(const std::vector<const ViewFeatures*>& views, int cell
   return projection;
 }
 
-// The cells that are to be explained: `owner[q]` is the view of column q, and each view weighs the
-// same however many cells it has.
+// Query cells: `owner[q]` is the view of column q. Each view has the same total weight.
 struct Queries {
   Eigen::MatrixXf cells;
   Eigen::VectorXf squares;
@@ -118,7 +117,7 @@ Queries GatherQueries(const std::vector<Eigen::MatrixXf>& cells, int per_view) {
   return queries;
 }
 
-// From each query to the nearest column of `bank`.
+// Distance from each query to the nearest column of `bank`.
 std::vector<float> Nearest(const Eigen::MatrixXf& bank, const Queries& queries) {
   const Eigen::VectorXf bank_squares = bank.colwise().squaredNorm().transpose();
   const Eigen::MatrixXf minus_two_bank = -2.0f * bank.transpose();

@@ -1,5 +1,5 @@
-// How well one view's deep features explain the other views: the score of the coverage strategy
-// (STILL.md "Stage 1a"). Pure, thread-safe.
+// Score of the coverage strategy (STILL.md "Stage 1a"): how well the deep features of one view
+// explain the other views. Pure functions, thread-safe.
 #pragma once
 
 #include <vector>
@@ -9,29 +9,28 @@
 
 namespace color3d {
 
-// Entry i, for every kept view i: the mean over the other kept views' cells of the root mean
-// squared distance to the nearest cell of view i; 0 for the others and for a single view. Features
+// Returns for every kept view i the mean, over the cells of the other kept views, of the root mean
+// squared distance to the nearest cell of view i; 0 for other views and for a single view. Features
 // are standardised over all kept views and reduced to their leading principal components. Cells are
-// thinned out as views become more (first those that are explained, down to a few of each view), so
-// that 300 views take seconds and 2000 some ten seconds. The same numbers for any thread count.
-// Throws Error{kInvalidArgument} when no view is kept, a kept view has no cells, or channel counts
-// differ.
+// subsampled for many views (queries first, down to a few per view), so that 300 views take seconds
+// and 2000 about ten seconds. The result does not depend on the number of threads. Throws
+// Error{kInvalidArgument} if no view is kept, a kept view has no cells, or channel counts differ.
 std::vector<double> MeanFeatureDistances(const std::vector<ViewFeatures>& views,
                                          const std::vector<bool>& kept,
                                          const RunControl& run);
 
-// For key views that are chosen together: by view i and query q, the distance from the cell q to
-// the nearest cell of view i, as above.
+// Distance from each query cell q to the nearest cell of each view i, as above, for joint selection
+// of key views.
 struct NearestDistances {
-  std::vector<int> owner;                // view of each query; views that are not kept own none
-  std::vector<double> weight;            // of each query; those of one view sum to 1
-  std::vector<std::vector<float>> from;  // by view, by query; empty for views that are not kept
+  std::vector<int> owner;                // view of each query; only kept views have queries
+  std::vector<double> weight;            // weight of each query; sums to 1 per view
+  std::vector<std::vector<float>> from;  // by view and query; empty for views that are not kept
 };
 NearestDistances FindNearestDistances(const std::vector<ViewFeatures>& views,
                                       const std::vector<bool>& kept,
                                       const RunControl& run);
 
-// How many cells of each view MeanFeatureDistances looks at, at most.
+// Maximum number of cells per view that MeanFeatureDistances uses.
 int CellsForCoverage(size_t views, int channels);
 
 }  // namespace color3d

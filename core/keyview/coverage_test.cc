@@ -91,7 +91,7 @@ TEST(FeatureDistancesTest, AgreesWithTheDefinition) {
   for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(distances[i], direct[i], 2e-3);
 }
 
-TEST(FeatureDistancesTest, AViewThatContainsAnotherExplainsIt) {
+TEST(FeatureDistancesTest, ViewExplainsViewThatItContains) {
   const Image small = RandomGrid(4, 4, 5, 1);
   Image large(4, 8, 5);
   const Image extra = RandomGrid(4, 4, 5, 2);
@@ -107,7 +107,7 @@ TEST(FeatureDistancesTest, AViewThatContainsAnotherExplainsIt) {
   EXPECT_GT(distances[0], 0.1);
 }
 
-TEST(FeatureDistancesTest, ViewsThatAreSetAsideDoNotCount) {
+TEST(FeatureDistancesTest, IgnoresViewsThatAreNotKept) {
   std::vector<ViewFeatures> views =
       Packed({RandomGrid(5, 4, 6, 1), RandomGrid(3, 7, 6, 2), RandomGrid(4, 4, 6, 3)});
   const auto before = Distances(views);
@@ -117,7 +117,7 @@ TEST(FeatureDistancesTest, ViewsThatAreSetAsideDoNotCount) {
   EXPECT_EQ(after[3], 0.0);
 }
 
-TEST(FeatureDistancesTest, ConstantAndNonFiniteFeaturesHaveAnAnswer) {
+TEST(FeatureDistancesTest, AcceptsConstantAndNonFiniteFeatures) {
   std::vector<Image> views{Image(3, 3, 4, 1.0f), Image(3, 3, 4, 1.0f)};
   views[1].data[5] = std::numeric_limits<float>::quiet_NaN();
   for (double value : Distances(Packed(views))) EXPECT_TRUE(std::isfinite(value));
@@ -135,7 +135,7 @@ TEST(FeatureDistancesTest, RefusesBadShapesAndStopsWhenCancelled) {
 }
 
 // Fewer cells of each view, yet the same view must win: view 7 holds a piece of every other one.
-TEST(FeatureDistancesTest, ThinningDoesNotChangeTheWinner) {
+TEST(FeatureDistancesTest, ThinningKeepsTheWinner) {
   for (int count : {20, 400}) {
     std::vector<Image> grids;
     for (int i = 0; i < count; ++i) {
@@ -153,7 +153,7 @@ TEST(FeatureDistancesTest, ThinningDoesNotChangeTheWinner) {
   }
 }
 
-TEST(FeatureDistancesTest, TwoThousandViewsTakeSecondsAndTheSameNumbersTwice) {
+TEST(FeatureDistancesTest, IsRepeatableFor2000Views) {
   std::vector<ViewFeatures> views;
   for (int i = 0; i < 2000; ++i) {
     views.push_back(Packed(RandomGrid(8, 8, 48, i)));
@@ -164,7 +164,7 @@ TEST(FeatureDistancesTest, TwoThousandViewsTakeSecondsAndTheSameNumbersTwice) {
   EXPECT_EQ(Distances(views), distances);
 }
 
-TEST(ViewFeaturesTest, RoundTripAndRefusalOfTornBytes) {
+TEST(ViewFeaturesTest, RoundTripsAndRefusesTruncatedBytes) {
   ViewFeatures view =
       PackViewFeatures({0.5, -2.0}, {10.0, 3.0, 0.8, 0.9}, RandomGrid(30, 20, 5, 3), 11);
   view.thumbnail = "picture";
@@ -183,7 +183,7 @@ TEST(ViewFeaturesTest, RoundTripAndRefusalOfTornBytes) {
 }
 
 // Every beginning of the cells is spread over the picture.
-TEST(ViewFeaturesTest, AFewCellsAreSpreadEvenly) {
+TEST(ViewFeaturesTest, SpreadsFewCellsEvenly) {
   Image grid(24, 18, 2);
   for (int y = 0; y < 18; ++y) {
     for (int x = 0; x < 24; ++x) {

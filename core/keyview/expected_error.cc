@@ -9,16 +9,15 @@
 namespace color3d {
 namespace {
 
-constexpr double kMaxTable = 5e7;  // entries of SeenSamples
-// What is inferred for a cell of the views' median strangeness has kErrorInferred, one that looks
-// just like a cell of a key view this.
+constexpr double kMaxTable = 5e7;  // maximum number of entries of SeenSamples
+// Error of a cell identical to one of a key view. A cell at the median distance has kErrorInferred.
 constexpr double kErrorAlike = 4.0;
 
 bool Contains(const std::vector<int>& keys, int view) {
   return std::find(keys.begin(), keys.end(), view) != keys.end();
 }
 
-// The expected error of a set of key views.
+// Expected error of a set of key views.
 class Expectation {
  public:
   Expectation(const SeenSamples& seen, const NearestDistances& distances)
@@ -75,7 +74,7 @@ class Expectation {
   double median_;
 };
 
-// The best view in place of keys[place]; keys may grow by one.
+// Best view in place of keys[place]. `keys` may grow by one.
 void PutBest(const Expectation& expectation,
              const std::vector<bool>& allowed,
              size_t place,
@@ -126,7 +125,7 @@ ChosenKeyViews ChooseKeyViews(const SeenSamples& seen,
   while (static_cast<int>(keys.size()) < count) {
     PutBest(expectation, allowed, keys.size(), &keys);
   }
-  // Large scenes are not worth the exchange's time.
+  // Exchanges take too long for large scenes.
   constexpr int kMaxForExchange = 100;
   constexpr int kRounds = 3;
   for (int round = 0; round < kRounds && seen.views() <= kMaxForExchange && count > 1; ++round) {

@@ -1,6 +1,6 @@
-// Which views to colour, judged by the error that is expected of the colours of all views
-// (STILL.md "Stage 1a"): small where a key view shows the same place, larger where colours have to
-// be inferred, the more so the stranger a place is to the key views. Pure, thread-safe.
+// Selects views to colour by the expected error of the colours of all views (STILL.md "Stage 1a"):
+// small where a key view shows the same place, larger where colours are inferred, and increasing
+// with the feature distance to the key views. Pure functions, thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -12,12 +12,12 @@
 
 namespace color3d {
 
-// CIEDE2000, as scenes that nobody tuned on measure: where a pixel's colour comes from.
+// CIEDE2000 by provenance of the colour, measured on scenes without tuning.
 inline constexpr double kErrorSeen = 2.5;
 inline constexpr double kErrorInferred = 7.0;
 inline constexpr double kErrorGuessed = 10.0;
 
-// What views see of each other: `samples` places in each view, and who else shows them.
+// Visibility between views: `samples` places in each view, and the other views that show them.
 class SeenSamples {
  public:
   SeenSamples(int views, int samples)
@@ -26,7 +26,7 @@ class SeenSamples {
   int samples() const { return samples_; }  // per view
   bool IsSeen(int by, int view, int sample) const { return seen_[Index(by, view, sample)] != 0; }
   void SetSeen(int by, int view, int sample) { seen_[Index(by, view, sample)] = 1; }
-  // So many samples that the table stays small.
+  // Number of samples that bounds the size of the table.
   static int SamplesFor(int views, int wanted);
 
  private:
@@ -40,31 +40,31 @@ class SeenSamples {
 
 struct ChosenKeyViews {
   std::vector<int> views;     // best first
-  std::vector<double> error;  // expected over all views with the first, the first two, ...
+  std::vector<double> error;  // expected error over all views, with the first 1, 2, ... key views
 };
 
-// `count` of the views that may be chosen; `first` >= 0 is the first whatever it costs. Greedy,
-// then each but a given first one is exchanged while that helps. `seen` and `distances` are of the
-// same views; either may tell nothing (no samples, no queries). Throws Error{kInvalidArgument} when
-// fewer views may be chosen.
+// Chooses `count` of the allowed views; `first` >= 0 fixes the first one. Greedy, then exchanges
+// each view but a fixed first one while the error decreases. Requires: `seen` and `distances` are
+// of the same views; either may be empty (no samples, no queries). Throws Error{kInvalidArgument}
+// if fewer views are allowed.
 ChosenKeyViews ChooseKeyViews(const SeenSamples& seen,
                               const NearestDistances& distances,
                               const std::vector<bool>& allowed,
                               int count,
                               int first = -1);
 
-// The error that ChooseKeyViews expects of a set.
+// Expected error of a set of key views, as in ChooseKeyViews.
 double ExpectedError(const SeenSamples& seen,
                      const NearestDistances& distances,
                      const std::vector<int>& keys);
 
 struct NextKeyViewAdvice {
   int view = 0;
-  double error_now = 0.0;   // expected with the key views that there are
-  double error_with = 0.0;  // ... with this view coloured, too
+  double error_now = 0.0;   // expected error with the current key views
+  double error_with = 0.0;  // expected error with this view as additional key view
 };
 
-// The view to colour after `keys`. Nothing when none saves anything worth telling.
+// Returns the best view to add to `keys`, or nothing if no view reduces the error notably.
 std::optional<NextKeyViewAdvice> NextKeyView(const SeenSamples& seen,
                                              const NearestDistances& distances,
                                              const std::vector<int>& keys);

@@ -27,7 +27,7 @@ SeenSamples Ring() {
   return seen;
 }
 
-TEST(KeyViews, SeveralCoverARingTogether) {
+TEST(KeyViews, SpreadOverARingOfCameras) {
   const ChosenKeyViews two = ChooseKeyViews(Ring(), {}, kAll, 2);
   EXPECT_THAT(two.views, ElementsAre(0, testing::AnyOf(2, 3, 4)));
   EXPECT_LT(two.error[1], two.error[0]);
@@ -39,7 +39,7 @@ TEST(KeyViews, SeveralCoverARingTogether) {
   EXPECT_NEAR(three.error[2], kErrorSeen, 1e-9);
 }
 
-TEST(KeyViews, StrangeViewsAreWorthMoreThanPlaces) {
+TEST(KeyViews, PreferViewsWithUnusualContent) {
   // Nothing is known of places; view 5 looks like nothing else.
   NearestDistances distances;
   for (int view = 0; view < 6; ++view) {
@@ -55,7 +55,7 @@ TEST(KeyViews, StrangeViewsAreWorthMoreThanPlaces) {
   EXPECT_THAT(chosen.views, testing::UnorderedElementsAre(5, testing::Lt(5)));
 }
 
-TEST(KeyViews, WhatMayNotBeChosenIsNotAndTooManyAreRefused) {
+TEST(KeyViews, RespectAllowedViewsAndRefuseTooMany) {
   std::vector<bool> allowed = kAll;
   allowed[0] = allowed[3] = false;
   const ChosenKeyViews four = ChooseKeyViews(Ring(), {}, allowed, 4);
@@ -68,7 +68,7 @@ TEST(KeyViews, WhatMayNotBeChosenIsNotAndTooManyAreRefused) {
   }
 }
 
-TEST(KeyViews, EachFurtherOneIsExpectedToSaveSomething) {
+TEST(KeyViews, EachOneLowersTheExpectedError) {
   Random random(5);
   SeenSamples seen(12, 16);
   for (int by = 0; by < 12; ++by) {
@@ -82,7 +82,7 @@ TEST(KeyViews, EachFurtherOneIsExpectedToSaveSomething) {
   for (size_t i = 1; i < chosen.error.size(); ++i) EXPECT_LT(chosen.error[i], chosen.error[i - 1]);
 }
 
-TEST(NextKeyView, SavesMostAndIsNoKeyViewItself) {
+TEST(NextKeyView, IsBestViewThatIsNoKeyView) {
   const auto next = NextKeyView(Ring(), {}, {0});
   ASSERT_TRUE(next.has_value());
   EXPECT_THAT(next->view, testing::AnyOf(2, 3, 4)) << "not a neighbour";

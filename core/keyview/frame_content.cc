@@ -11,15 +11,15 @@ namespace color3d {
 namespace {
 
 constexpr int kBlockPx = 8;
-// Of a block: sensor noise and JPEG ringing in a black or white area stay below.
+// Deviation of a block, above that of sensor noise and JPEG ringing in black or white areas.
 constexpr double kFlatDeviation = 0.8;
-// Of a whole frame that shows nothing.
+// Deviation of a blank frame.
 constexpr double kBlankDeviation = 1.5;
 // Shares of the scene's median. A sharp view of a plain corner keeps half; a blur of 1 % of the
 // picture's width leaves a quarter of the detail; a frame half covered has half of the structure.
 constexpr double kMinDetail = 0.33;
 constexpr double kMinStructure = 0.66;
-// Photographs reduced to some hundred px have 0.8 and more.
+// Photographs reduced to a few hundred px have at least 0.8.
 constexpr double kNoiseCorrelation = 0.4;
 
 struct Moments {
@@ -27,7 +27,7 @@ struct Moments {
   double variance = 0.0;
 };
 
-Moments MomentsOf(const Image& image, int x0, int y0, int width, int height) {
+Moments ComputeMoments(const Image& image, int x0, int y0, int width, int height) {
   double sum = 0.0;
   double squares = 0.0;
   for (int y = y0; y < y0 + height; ++y) {
@@ -48,7 +48,7 @@ double StructuredShare(const Image& image) {
   for (int y = 0; y + kBlockPx <= image.height; y += kBlockPx) {
     for (int x = 0; x + kBlockPx <= image.width; x += kBlockPx) {
       ++blocks;
-      const double variance = MomentsOf(image, x, y, kBlockPx, kBlockPx).variance;
+      const double variance = ComputeMoments(image, x, y, kBlockPx, kBlockPx).variance;
       if (variance > kFlatDeviation * kFlatDeviation) ++structured;
     }
   }
@@ -88,12 +88,12 @@ double MedianOf(const std::vector<FrameContent>& frames, Field field) {
   return Median(std::move(values));
 }
 
-// The medians of some frames.
-struct Usual {
+// Medians over frames.
+struct MedianContent {
   double detail = 0.0;
   double structure = 0.0;
 };
-Usual UsualOf(const std::vector<FrameContent>& frames) {
+MedianContent Medians(const std::vector<FrameContent>& frames) {
   return {MedianOf(frames, &FrameContent::detail), MedianOf(frames, &FrameContent::structure)};
 }
 
@@ -106,7 +106,7 @@ FrameContent MeasureFrameContent(const Image& luminance) {
   }
   Image finite = luminance;
   for (float& value : finite.data) value = std::isfinite(value) ? value : 0.0f;
-  const Moments whole = MomentsOf(finite, 0, 0, finite.width, finite.height);
+  const Moments whole = ComputeMoments(finite, 0, 0, finite.width, finite.height);
   return {std::sqrt(whole.variance),
           MeanLaplacian(finite),
           StructuredShare(finite),
@@ -120,10 +120,10 @@ std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames,
   std::map<int, std::vector<FrameContent>> of_group;
   const auto group_of = [&](size_t i) { return groups.empty() ? 0 : groups[i]; };
   for (size_t i = 0; i < frames.size(); ++i) of_group[group_of(i)].push_back(frames[i]);
-  std::map<int, Usual> usual;
-  const Usual all = UsualOf(frames);
+  std::map<int, MedianContent> usual;
+  const MedianContent all = Medians(frames);
   for (const auto& [group, members] : of_group) {
-    Usual& own = usual[group] = UsualOf(members);
+    MedianContent& own = usual[group] = Medians(members);
     own.structure = std::max(own.structure, 0.5 * all.structure);
     own.detail = std::max(own.detail, 0.5 * all.detail);
   }
@@ -131,7 +131,7 @@ std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames,
   size_t unfit = 0;
   for (size_t i = 0; i < frames.size(); ++i) {
     const FrameContent& frame = frames[i];
-    const Usual& own = usual.at(group_of(i));
+    const MedianContent& own = usual.at(group_of(i));
     if (frame.deviation < kBlankDeviation) {
       reasons[i] = "blank";
     } else if (frame.correlation < kNoiseCorrelation && correlation > 1.5 * kNoiseCorrelation) {

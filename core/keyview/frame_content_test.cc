@@ -73,7 +73,7 @@ std::string ReasonFor(const Image& image, int others) {
   return UnfitFrames(frames).back();
 }
 
-TEST(UnfitFramesTest, EachDefectIsNamedEvenBesideTwoGoodViews) {
+TEST(UnfitFramesTest, NamesEachDefectBesideTwoGoodViews) {
   Image half = Scenery(3);
   for (int y = 0; y < half.height; ++y) {
     for (int x = 0; x < half.width / 2; ++x) half.At(0, y, x) = 0.0f;
@@ -90,7 +90,7 @@ TEST(UnfitFramesTest, EachDefectIsNamedEvenBesideTwoGoodViews) {
   }
 }
 
-TEST(UnfitFramesTest, AShotIsComparedWithItself) {
+TEST(UnfitFramesTest, ComparesFramesWithinShot) {
   const FrameContent rich{20.0, 4.0, 0.8, 0.95}, plain{12.0, 2.5, 0.45, 0.97};
   const FrameContent blurred{12.0, 0.7, 0.45, 0.99}, title{25.0, 1.5, 0.15, 0.9};
   const FrameContent blank{0.5, 0.1, 0.0, 0.99};
@@ -106,7 +106,7 @@ TEST(UnfitFramesTest, AShotIsComparedWithItself) {
   EXPECT_EQ(UnfitFrames(frames)[9], "much of it is empty") << "beside the others of one shot";
 }
 
-TEST(UnfitFramesTest, AllAlikeBadIsNoReason) {
+TEST(UnfitFramesTest, KeepsAllFramesWhenAllAreUnfit) {
   const FrameContent blank = MeasureFrameContent(Image(40, 30, 1));
   EXPECT_EQ(UnfitFrames({blank, blank, blank}), std::vector<std::string>(3));
   const FrameContent noise = MeasureFrameContent(Noise(50.0f, 15.0f, 2));
@@ -114,7 +114,7 @@ TEST(UnfitFramesTest, AllAlikeBadIsNoReason) {
   EXPECT_TRUE(UnfitFrames({}).empty());
 }
 
-TEST(FrameContentTest, TinyAndNonFinitePicturesHaveAnAnswer) {
+TEST(FrameContentTest, AcceptsTinyAndNonFinitePictures) {
   for (int size : {1, 2, 7}) {
     const FrameContent content = MeasureFrameContent(Image(size, 1, 1, 5.0f));
     EXPECT_TRUE(std::isfinite(content.detail + content.structure + content.correlation));

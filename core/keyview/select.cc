@@ -21,7 +21,7 @@ namespace {
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 constexpr double kGuardDeviations = 2.0;  // STILL.md "Stage 1a": median - 2 MAD
-// Rounding is no deviation: near-identical views have a MAD of almost nothing.
+// Minimum deviation: near-identical views have a MAD of almost 0, due to rounding.
 constexpr double kGuardSlack = 1e-6;
 constexpr int kGuardMinViews = 5;
 constexpr Eigen::Index kTile = 64;
@@ -45,7 +45,7 @@ void CheckLengths(const std::vector<std::vector<double>>& descriptors) {
   }
 }
 
-// One row of unit length for each index.
+// One row of unit length per index.
 Matrix UnitRows(const std::vector<std::vector<double>>& descriptors,
                 const std::vector<int>& indices) {
   Matrix rows(indices.size(), descriptors[0].size());
@@ -53,7 +53,7 @@ Matrix UnitRows(const std::vector<std::vector<double>>& descriptors,
     const std::vector<double>& values = descriptors[indices[i]];
     auto row = rows.row(static_cast<Eigen::Index>(i));
     row = Eigen::Map<const Eigen::RowVectorXd>(values.data(), row.size());
-    // Divided by the largest value first, so that squares neither overflow nor vanish.
+    // Divides by the largest value first, so that squares neither overflow nor underflow.
     row /= row.cwiseAbs().maxCoeff();
     row /= row.norm();
   }
@@ -68,7 +68,8 @@ std::vector<int> IndicesOf(const std::vector<bool>& kept) {
   return indices;
 }
 
-// rows rows^T, its lower triangle in tiles: each entry is one product, whatever the thread count.
+// Computes rows rows^T, the lower triangle in tiles. Each entry is one product, for any thread
+// count.
 Matrix Cosines(const Matrix& rows, ThreadPool& pool) {
   const Eigen::Index n = rows.rows();
   const Eigen::Index tiles = (n + kTile - 1) / kTile;
@@ -95,7 +96,7 @@ Matrix Cosines(const Matrix& rows, ThreadPool& pool) {
 }
 
 // H_i = -sum_j P_ij log P_ij, P = softmax(S_i / temperature), written as log Z - <S> / temperature
-// with the largest similarity taken out: exact for any temperature.
+// with the largest similarity subtracted: exact for any temperature.
 double RowEntropy(const Eigen::Ref<const Eigen::RowVectorXd>& row,
                   Eigen::Index self,
                   const KeyViewOptions& options) {
@@ -135,8 +136,8 @@ void SetAsideUnusable(const std::vector<std::vector<double>>& descriptors, Guard
       count > 8 ? ", ..." : ""));
 }
 
-// A frame of a group whose mean similarity to the others lies far below the rest's is equally
-// unlike all others, which the entropy formula takes for variety.
+// A frame with a mean similarity far below that of its group is equally dissimilar to all others,
+// which the entropy formula takes for variety.
 void SetAsideOutliers(const std::vector<int>& group, GuardedViews* guarded) {
   std::vector<double> means;
   for (const int i : group) {
@@ -155,7 +156,7 @@ void SetAsideOutliers(const std::vector<int>& group, GuardedViews* guarded) {
   }
 }
 
-// Mean cosine to the other kept views of the group; of kept views and of all others alike.
+// Mean cosine to the other kept views of the group, for all views.
 void FillMeanSimilarities(const std::vector<std::vector<double>>& descriptors,
                           const std::vector<int>& group,
                           GuardedViews* guarded) {
@@ -176,7 +177,7 @@ void FillMeanSimilarities(const std::vector<std::vector<double>>& descriptors,
   }
 }
 
-// The indices of each group.
+// Indices of each group.
 std::vector<std::vector<int>> Members(const std::vector<int>& groups, size_t count) {
   std::map<int, std::vector<int>> members;
   for (size_t i = 0; i < count; ++i) {

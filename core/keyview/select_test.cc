@@ -92,7 +92,7 @@ TEST(SelectKeyViewTest, EntropyAgreesWithTheDirectFormula) {
   }
 }
 
-TEST(SelectKeyViewTest, ScaleOfADescriptorDoesNotMatter) {
+TEST(SelectKeyViewTest, IgnoresScaleOfDescriptors) {
   Matrix features = RandomFeatures(9, 5, 3);
   const KeyViewSelection before = SelectByEntropy(features, Entropy());
   for (double& value : features[4]) value *= 1e200;  // squares would overflow
@@ -124,7 +124,7 @@ TEST(SelectKeyViewTest, DuplicatesTieToTheLowestIndex) {
   }
 }
 
-TEST(SelectKeyViewTest, OneViewIsTheKeyView) {
+TEST(SelectKeyViewTest, ChoosesTheOnlyView) {
   for (bool exclude_self : {false, true}) {
     KeyViewOptions options = Entropy();
     options.exclude_self = exclude_self;
@@ -134,7 +134,7 @@ TEST(SelectKeyViewTest, OneViewIsTheKeyView) {
   }
 }
 
-TEST(SelectKeyViewTest, UnusableDescriptorsAreSetAsideWithAWarning) {
+TEST(SelectKeyViewTest, ExcludesUnusableDescriptorsWithWarning) {
   Matrix features = RandomFeatures(6, 4, 1);
   features[0].assign(4, 0.0);
   features[2][1] = std::numeric_limits<double>::quiet_NaN();
@@ -146,7 +146,7 @@ TEST(SelectKeyViewTest, UnusableDescriptorsAreSetAsideWithAWarning) {
   for (int i = 3; i < 6; ++i) EXPECT_FALSE(selection.ranking[i].set_aside.empty());
 }
 
-TEST(SelectKeyViewTest, NoUsableDescriptorIsAnError) {
+TEST(SelectKeyViewTest, RefusesUnusableDescriptors) {
   EXPECT_THROW(SelectByEntropy({}, {}), Error);
   EXPECT_THROW(SelectByEntropy({{0.0, 0.0}, {0.0, 0.0}}, {}), Error);
   EXPECT_THROW(SelectByEntropy({{1.0, 0.0}, {0.0}}, {}), Error);
@@ -170,7 +170,7 @@ Matrix ChainWithOutlier(int views, int outlier) {
   return features;
 }
 
-TEST(SelectKeyViewTest, OutlierGuardSetsTheOutlierAside) {
+TEST(SelectKeyViewTest, OutlierGuardExcludesOutlier) {
   const Matrix features = ChainWithOutlier(100, 37);
   const KeyViewSelection unguarded = SelectByEntropy(features, Entropy());
   EXPECT_EQ(unguarded.index, 37) << "the formula's weakness that the guard is for";
@@ -187,7 +187,7 @@ TEST(SelectKeyViewTest, OutlierGuardSetsTheOutlierAside) {
 }
 
 // The frame must neither win nor change what the others score.
-TEST(SelectKeyViewTest, AViewThatIsSetAsideDoesNotMoveTheOthersScores) {
+TEST(SelectKeyViewTest, ExcludedViewDoesNotChangeOtherScores) {
   Matrix features = RandomFeatures(12, 5, 4);
   const KeyViewSelection before = SelectByEntropy(features, {});
   features.push_back(RandomFeatures(1, 5, 99)[0]);
@@ -205,13 +205,13 @@ TEST(SelectKeyViewTest, AViewThatIsSetAsideDoesNotMoveTheOthersScores) {
   }
 }
 
-TEST(SelectKeyViewTest, WhenEveryFrameIsUnfitNoneIsSetAside) {
+TEST(SelectKeyViewTest, KeepsAllFramesWhenEveryOneIsUnfit) {
   const Matrix features = RandomFeatures(3, 4, 8);
   const GuardedViews guarded = GuardViews(features, {"blank", "blank", "blank"}, {});
   EXPECT_EQ(guarded.Kept(), std::vector<bool>(3, true));
 }
 
-TEST(SelectKeyViewTest, ViewsAreComparedWithThoseOfTheirGroup) {
+TEST(SelectKeyViewTest, ComparesViewsWithinGroup) {
   Matrix features;  // of two shots, the second with a frame that is unlike its others
   for (int i = 0; i < 12; ++i) features.push_back({1.0, 0.01 * (i % 3), 0.0});
   for (int i = 0; i < 5; ++i) features.push_back({0.0, 1.0, 0.01 * (i % 2)});
@@ -226,7 +226,7 @@ TEST(SelectKeyViewTest, ViewsAreComparedWithThoseOfTheirGroup) {
   EXPECT_THROW(GuardViews(features, {}, {}, {1, 2}), Error);
 }
 
-TEST(SelectKeyViewTest, MarginSaysHowClearlyTheWinnerStandsOut) {
+TEST(SelectKeyViewTest, MarginIsRelativeToTheMedian) {
   GuardedViews guarded = GuardViews(RandomFeatures(5, 4, 8), {}, {.outlier_guard = false});
   const KeyViewSelection selection = RankViews(guarded, {1.0, 9.0, 7.0, 3.0, 5.0});
   EXPECT_EQ(selection.index, 1);

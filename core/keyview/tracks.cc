@@ -10,9 +10,9 @@
 namespace color3d {
 namespace {
 
-// Additions to the counts of shared points; beyond, every second, third, ... point is taken.
+// Maximum number of additions to the counts of shared points; above, points are subsampled.
 constexpr double kWorkBudget = 5e8;
-// A view with fewer points is compared by chance.
+// Minimum number of points of a view for a reliable comparison.
 constexpr int kFewPoints = 20;
 
 int64_t StrideFor(const std::vector<std::vector<int>>& tracks) {
@@ -33,7 +33,7 @@ void CheckTrack(const std::vector<int>& track, size_t views) {
 std::vector<double> TrackCoverage(const std::vector<std::vector<int>>& tracks,
                                   const std::vector<bool>& kept) {
   const size_t n = kept.size();
-  // shared[i * n + j]: points that i and j see both; the diagonal holds each view's own.
+  // shared[i * n + j]: number of points that both i and j see; on the diagonal, those of each view.
   std::vector<uint32_t> shared(n * n, 0);
   const int64_t stride = StrideFor(tracks);
   for (size_t p = 0; p < tracks.size(); p += static_cast<size_t>(stride)) {

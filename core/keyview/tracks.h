@@ -1,5 +1,5 @@
-// How much of what the other views show a view sees too, from the tracks of structure-from-motion:
-// the score of the `tracks` strategy (STILL.md "Stage 1a"). Pure, thread-safe.
+// Score of the `tracks` strategy (STILL.md "Stage 1a"): overlap of a view with the other views,
+// from tracks of structure-from-motion. Pure functions, thread-safe.
 #pragma once
 
 #include <string>
@@ -7,15 +7,16 @@
 
 namespace color3d {
 
-// tracks[p]: the views (indices, ascending) that see point p. Entry i, for every kept view i: the
-// mean over the other kept views j of sqrt(share of j's points that i sees too). The root makes a
-// view that shares something with all others (a central one) beat one that shares everything with
-// its neighbours only. 0 for the others. Tracks of unkept views do not count. Throws
-// Error{kInvalidArgument} for an index that is no view.
+// tracks[p]: views (indices, ascending) that see point p. Returns for every kept view i the mean
+// over the other kept views j of sqrt(share of j's points that i sees too), and 0 for other views.
+// The root favours a central view, which shares some points with all others, over one that shares
+// all points with its neighbours only. Views that are not kept do not count. Throws
+// Error{kInvalidArgument} for an index that is not a view.
 std::vector<double> TrackCoverage(const std::vector<std::vector<int>>& tracks,
                                   const std::vector<bool>& kept);
 
-// Why these tracks cannot tell views apart, empty when they can: too few points in too many views.
+// Returns the reason why tracks are unusable (too few points in too many views), or an empty
+// string.
 std::string WhyTracksAreNoUse(const std::vector<std::vector<int>>& tracks,
                               const std::vector<bool>& kept);
 

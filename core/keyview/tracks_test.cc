@@ -21,7 +21,7 @@ TEST(TrackCoverageTest, AgreesWithTheDefinition) {
   EXPECT_DOUBLE_EQ(scores[2], 0.5 * std::sqrt(1.0 / 4.0));
 }
 
-TEST(TrackCoverageTest, ViewsThatAreSetAsideNeitherScoreNorCount) {
+TEST(TrackCoverageTest, IgnoresExcludedViews) {
   const Tracks tracks{{0, 1}, {0, 2}, {1, 2}, {1, 2}};
   const std::vector<double> scores = TrackCoverage(tracks, {true, false, true});
   EXPECT_DOUBLE_EQ(scores[0], std::sqrt(1.0 / 3.0));
@@ -29,7 +29,7 @@ TEST(TrackCoverageTest, ViewsThatAreSetAsideNeitherScoreNorCount) {
 }
 
 // Along a path, each point seen from a window of views, the middle shares with the most.
-TEST(TrackCoverageTest, TheMiddleOfAPathIsCentral) {
+TEST(TrackCoverageTest, PrefersMiddleOfAPath) {
   Tracks tracks;
   for (int start = -4; start < 31; ++start) {
     for (int copy = 0; copy < 30; ++copy) {
@@ -44,7 +44,7 @@ TEST(TrackCoverageTest, TheMiddleOfAPathIsCentral) {
   EXPECT_GT(scores[15], scores[30]);
 }
 
-TEST(TrackCoverageTest, SaysWhyTracksAreNoUse) {
+TEST(TrackCoverageTest, ReportsUnusableTracks) {
   const std::vector<bool> kept(4, true);
   EXPECT_NE(WhyTracksAreNoUse({}, kept), "");
   EXPECT_EQ(WhyTracksAreNoUse(Tracks(20, {0, 1, 2}), kept), "");

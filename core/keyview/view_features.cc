@@ -48,7 +48,7 @@ void Append(const T* values, size_t count, std::string* bytes) {
   bytes->append(reinterpret_cast<const char*>(values), count * sizeof(T));
 }
 
-// False when fewer bytes are left.
+// Returns false if fewer bytes remain.
 template <typename T>
 bool Take(std::string_view* bytes, size_t count, T* values) {
   if (bytes->size() < count * sizeof(T)) return false;

@@ -1,5 +1,5 @@
-// What key view selection knows of one view: small, packed, and the same bytes whether it was
-// computed now or comes from a cache. Pure values, thread-safe.
+// Features of a view for key view selection: compact, and with the same bytes whether computed or
+// cached. Pure values, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -16,32 +16,32 @@ namespace color3d {
 inline constexpr int kThumbnailSidePx = 260;
 
 struct ViewFeatures {
-  // More cells tell hardly more; fewer keep 2000 views small.
+  // More cells add little information; this bounds the memory of 2000 views.
   static constexpr int kMaxCells = 256;
 
   std::vector<double> descriptor;  // Encoder::Describe
   FrameContent content;
   int channels = 0;
-  // Deep features of up to kMaxCells cells as IEEE half precision, cell after cell. The cells come
-  // in an order in which every beginning is spread evenly over the picture.
+  // Deep features of up to kMaxCells cells as IEEE half precision, cell after cell, ordered such
+  // that every prefix is spread evenly over the picture.
   std::vector<uint16_t> deep;
-  std::string thumbnail;  // JPEG of at most kThumbnailSidePx, for people
+  std::string thumbnail;  // JPEG of at most kThumbnailSidePx, for display
 
   int Cells() const { return channels > 0 ? static_cast<int>(deep.size()) / channels : 0; }
-  // Drops all cells but the first `count`.
+  // Keeps only the first `count` cells.
   void KeepCells(int count);
 };
 
 // `deep`: features on a coarse grid (Encoder::DeepFeatures); values that are not finite count as 0.
-// `seed` places the sampled cells: the same for the same picture, else a sampling pattern would be
-// shared by all views. Throws Error{kInvalidArgument} when `deep` is empty.
+// `seed` chooses the sampled cells. It should be constant for a picture and differ between views,
+// so that views do not share a sampling pattern. Throws Error{kInvalidArgument} if `deep` is empty.
 ViewFeatures PackViewFeatures(std::vector<double> descriptor,
                               const FrameContent& content,
                               const Image& deep,
                               uint64_t seed);
 
 std::string SerializeViewFeatures(const ViewFeatures& features);
-// Nothing when the bytes are not what SerializeViewFeatures wrote.
+// Returns nothing if the bytes were not written by SerializeViewFeatures.
 std::optional<ViewFeatures> ParseViewFeatures(std::string_view bytes);
 
 }  // namespace color3d

@@ -9,13 +9,13 @@
 namespace color3d {
 namespace {
 
-constexpr int kWindowRadii[] = {1, 3, 9};  // in cells
+constexpr int kWindowRadii[] = {1, 3, 9};  // radii of the windows, in cells
 static_assert(kLuminanceStatistics == 1 + 2 * std::size(kWindowRadii));
 constexpr double kMaxLuminance = 100.0;
-// Of L in 0..1, squared: below a third of a unit of L the deviation is rounding.
+// Variance of L in 0..1: a deviation below a third of a unit of L is rounding.
 constexpr double kMapVarianceFloor = 1e-5;
 
-// Means over squares of `side`; those at the right and lower border count what is there.
+// Means over squares of `side`, clipped at the right and lower borders.
 torch::Tensor MeanPool(const torch::Tensor& x, int64_t side) {
   return torch::avg_pool2d(x,
                            {side, side},
@@ -35,7 +35,7 @@ torch::Tensor WindowMean(const torch::Tensor& x, int radius) {
                            /*count_include_pad=*/false);
 }
 
-// [1,K,rows,columns]: local statistics of L, which normalised encoder features have lost.
+// [1,K,rows,columns]: local statistics of L, which normalised encoder features lack.
 torch::Tensor LuminanceStatistics(const torch::Tensor& luminance) {
   const torch::Tensor unit = luminance / kMaxLuminance;
   const torch::Tensor l = MeanPool(unit, kCellPx);

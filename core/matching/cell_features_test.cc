@@ -16,7 +16,7 @@ ConvNextConfig TwoTaps() {
   return config;
 }
 
-TEST(CellFeaturesTest, CellsAtTheBorderCountWhatThePictureHas) {
+TEST(CellFeaturesTest, BorderCellsIgnorePadding) {
   // 6 x 5 px: two by two cells, of which three are cut.
   const torch::Tensor l = torch::arange(30, torch::kFloat32).view({1, 1, 5, 6});
   const torch::Tensor means = CellMeans(l);
@@ -25,7 +25,7 @@ TEST(CellFeaturesTest, CellsAtTheBorderCountWhatThePictureHas) {
   EXPECT_FLOAT_EQ(means[3][0].item<float>(), 0.5f * (28.0f + 29.0f));
 }
 
-TEST(CellFeaturesTest, TapsOfAPaddedPictureAreCutToThePicture) {
+TEST(CellFeaturesTest, CropsTapsToPicture) {
   const torch::Tensor l = torch::full({1, 1, 6, 10}, 50.0f);
   // Of the picture padded to 16 x 16; what lies beyond it must not be seen.
   std::vector<torch::Tensor> taps = {torch::full({1, 1, 8, 8}, 1.0f),
@@ -46,7 +46,7 @@ TEST(CellFeaturesTest, TapsOfAPaddedPictureAreCutToThePicture) {
   EXPECT_NEAR(cells.blocks[3][5][0].item<float>(), 0.5f, 1e-6f);
 }
 
-TEST(CellFeaturesTest, RowsAreDrawnWithoutRepetition) {
+TEST(CellFeaturesTest, DrawsRowsWithoutRepetition) {
   Random random(3);
   const torch::Tensor rows = SampleRows(50, 20, random);
   ASSERT_EQ(rows.size(0), 20);

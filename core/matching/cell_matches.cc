@@ -16,11 +16,11 @@ namespace {
 constexpr int64_t kQueriesAtOnce = 64;  // distances to the whole bank stay in the cache
 constexpr float kNegligible = 8.0f;     // exp(-8) of the best match's weight
 
-constexpr int64_t kStep = 16;  // entries that are skipped together
+constexpr int64_t kStep = 16;  // entries that are tested together
 
 float Smallest(const float* values, int64_t count) {
   if (count == kStep) {
-    return Eigen::Map<const Eigen::Array<float, kStep, 1>>(values).minCoeff();  // in vectors
+    return Eigen::Map<const Eigen::Array<float, kStep, 1>>(values).minCoeff();  // vectorized
   }
   return *std::min_element(values, values + count);
 }
@@ -32,15 +32,15 @@ torch::Tensor RelativeDistances(const torch::Tensor& x,
   return torch::addmm(y_squares, x, transposed_y, /*beta=*/1.0, /*alpha=*/-2.0);
 }
 
-constexpr double kMedianSoftness = 0.5;  // Lab units: nearer voters than this count as one
-// Voters are gathered by colour first, so that their median costs little more than their mean.
+constexpr double kMedianSoftness = 0.5;  // Lab units; bounds the weight of voters at the median
+// Voters are binned by colour, so that their median costs little more than their mean.
 constexpr float kBinSide = 3.0f;  // Lab units
-constexpr int kBins = 128;        // a side; what lies beyond is gathered in the outermost
+constexpr int kBins = 128;        // per side; the outermost bins hold all colours beyond
 
-// Which entries of a bank are gathered: those of about the same colour.
+// Bins of the entries of a bank by colour.
 struct ColorBins {
   std::vector<int32_t> of_entry;
-  int32_t count = 0;  // of the bins that hold an entry
+  int32_t count = 0;  // number of bins with entries
 
   explicit ColorBins(const torch::Tensor& colors) {
     const float* ab = colors.data_ptr<float>();
@@ -57,7 +57,7 @@ struct ColorBins {
   }
 };
 
-// The colours of a query's matches, weighted.
+// Weighted colours of the matches of a query.
 class Vote {
  public:
   Vote(const CellBank& bank, const ColorBins& bins)
@@ -92,7 +92,7 @@ class Vote {
       b += bin.b;
       filled_.push_back({bin.weight, bin.a / bin.weight, bin.b / bin.weight});
     }
-    // Where nothing has weight nothing is known: grey.
+    // Grey if no match has weight.
     const double scale = sum > 0.0 ? 1.0 / sum : 0.0;
     a *= scale;
     b *= scale;
@@ -107,7 +107,7 @@ class Vote {
     double weight = 0.0, a = 0.0, b = 0.0;
   };
 
-  // Weiszfeld 1937: the mean under weight / distance from where it was.
+  // Weiszfeld 1937: mean weighted by weight / distance from the previous estimate.
   void WeiszfeldStep(double* a, double* b) const {
     double sum = 0.0, next_a = 0.0, next_b = 0.0;
     for (const Bin& bin : filled_) {
@@ -126,12 +126,12 @@ class Vote {
   const float* weights_;
   const int32_t* bin_of_;
   std::vector<Bin> bins_;      // sums
-  std::vector<int32_t> used_;  // of bins_
+  std::vector<int32_t> used_;  // indices of bins_ in use
   std::vector<Bin> filled_;    // means
   double squares_ = 0.0;
 };
 
-// What positions add to the squared distances of features.
+// Penalty of positions on the squared distances of features.
 class Apartness {
  public:
   Apartness(const CellQueries& queries, const CellBank& bank, const VoteOptions& options)
@@ -139,8 +139,8 @@ class Apartness {
         inverse_reach_(static_cast<float>(1.0 / options.position_reach)) {
     if (!queries.positions.defined() || !bank.positions.defined() || !(weight_ > 0.0f)) return;
     if (!(bank.positions.select(1, 3).sum().item<float>() > 0.0f)) return;
-    // Columns whose products are |x|^2 - 2 x y + |y|^2 where both are known, else what an unknown
-    // entry gets, else 0.
+    // Columns with products |x|^2 - 2 x y + |y|^2 if both are known, else the constant of an
+    // unknown entry, else 0.
     const torch::Tensor x = queries.positions.slice(1, 0, 3) * queries.positions.slice(1, 3, 4);
     const torch::Tensor y = bank.positions.slice(1, 0, 3) * bank.positions.slice(1, 3, 4);
     const auto square = [](const torch::Tensor& v) { return v.square().sum(1, true); };
@@ -173,7 +173,7 @@ class Apartness {
   torch::Tensor entries_;  // [5,n]
 };
 
-// Rows of the `count` smallest of `distances`, ascending; of equal ones the first.
+// Rows of the `count` smallest `distances`, ascending; ties by row.
 void NearestRows(const float* distances,
                  int64_t entries,
                  size_t count,
@@ -265,7 +265,7 @@ CellMatches MatchCells(const CellQueries& queries,
             for (int64_t k = j; k < stop; ++k) add(k);
           }
         }
-        if (nearest[i] == entries) nearest[i] = 0;  // features that are no numbers
+        if (nearest[i] == entries) nearest[i] = 0;  // all features are NaN
         vote.Store(options.median_steps, ab + 2 * i, variance + i);
       }
     });

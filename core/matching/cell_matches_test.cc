@@ -17,7 +17,7 @@ CellBank RandomBank() {
 }
 
 // By the definition, in float64.
-TEST(CellMatchesTest, TheNearestVote) {
+TEST(CellMatchesTest, NearestCellsVote) {
   const CellBank bank = RandomBank();
   const torch::Tensor queries = torch::rand({200, 16});
   const torch::Tensor all =
@@ -47,7 +47,7 @@ TEST(CellMatchesTest, TheNearestVote) {
 }
 
 // Seven cells of one hue, five of another, all alike to the query.
-TEST(CellMatchesTest, TheMedianChoosesBetweenTwoHues) {
+TEST(CellMatchesTest, MedianChoosesBetweenTwoHues) {
   CellBank bank{torch::zeros({12, 8}), torch::zeros({12, 2}), torch::ones({12})};
   for (int64_t i = 0; i < 12; ++i) bank.colors[i][i < 7 ? 0 : 1] = 60.0;
   const torch::Tensor query = torch::zeros({1, 8});
@@ -60,7 +60,7 @@ TEST(CellMatchesTest, TheMedianChoosesBetweenTwoHues) {
   EXPECT_EQ(median.variance[0].item<float>(), mean.variance[0].item<float>());
 }
 
-TEST(CellMatchesTest, TheMedianOfAgreeingCellsIsTheirColor) {
+TEST(CellMatchesTest, MedianOfEqualColorsIsThatColor) {
   CellBank bank = RandomBank();
   bank.colors.fill_(-31.5f);
   const CellMatches matches = MatchCells({bank.features}, bank, {.median_steps = 5});
@@ -83,7 +83,7 @@ torch::Tensor RandomPlaces(int64_t count) {
 }
 
 // By the definition, in float64.
-TEST(CellMatchesTest, CellsNearInSpaceAreMoreAlike) {
+TEST(CellMatchesTest, PrefersCellsNearInSpace) {
   CellBank bank = RandomBank();
   bank.positions = RandomPlaces(300);
   const CellQueries queries{torch::rand({200, 16}), RandomPlaces(200)};
@@ -107,7 +107,7 @@ TEST(CellMatchesTest, CellsNearInSpaceAreMoreAlike) {
   EXPECT_GT(moved, 50);
 }
 
-TEST(CellMatchesTest, PlacesThatNobodyKnowsChangeNothing) {
+TEST(CellMatchesTest, UnknownPositionsChangeNothing) {
   CellBank bank = RandomBank();
   CellQueries queries{torch::rand({50, 16}), RandomPlaces(50)};
   const VoteOptions options{.position_weight = 1.0};
@@ -127,7 +127,7 @@ TEST(CellMatchesTest, StopsWhenCancelled) {
   EXPECT_THROW(MatchCells({bank.features}, bank, {}, cancel), Error);
 }
 
-TEST(CellMatchesTest, SquaredDistancesOfAllPairs) {
+TEST(CellMatchesTest, ComputesSquaredDistancesOfAllPairs) {
   const torch::Tensor x = torch::rand({5, 8}), y = torch::rand({9, 8});
   const torch::Tensor expected = (x.unsqueeze(1) - y.unsqueeze(0)).square().sum(2);
   EXPECT_LT((SquaredDistances(x, y) - expected).abs().max().item<float>(), 1e-5f);

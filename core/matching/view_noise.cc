@@ -11,14 +11,14 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kCellsOfPair = 1000;
-constexpr double kReach = 0.03;      // radii of the scene, about a cell
-constexpr int64_t kMinPairs = 2000;  // some times the channels of a block
+constexpr double kReach = 0.03;      // maximum distance, in radii of the scene; about a cell
+constexpr int64_t kMinPairs = 2000;  // several times the channels of a block
 
 torch::Tensor PlacedRows(const torch::Tensor& positions) {
   return (positions.select(1, 3) > 0.5).nonzero().squeeze(1);
 }
 
-torch::Tensor PlacesOf(const torch::Tensor& positions, const torch::Tensor& rows) {
+torch::Tensor CellPositions(const torch::Tensor& positions, const torch::Tensor& rows) {
   return positions.index_select(0, rows).slice(1, 0, 3);
 }
 
@@ -31,7 +31,7 @@ void ViewNoise::Add(const PlacedCells& x, const PlacedCells& y, Random& random) 
   of_x = of_x.index_select(0, SampleRows(of_x.size(0), kCellsOfPair, random));
   torch::Tensor nearest, match;
   std::tie(nearest, match) =
-      SquaredDistances(PlacesOf(x.positions, of_x), PlacesOf(y.positions, of_y)).min(1);
+      SquaredDistances(CellPositions(x.positions, of_x), CellPositions(y.positions, of_y)).min(1);
   const torch::Tensor same = (nearest < kReach * kReach).nonzero().squeeze(1);
   if (same.size(0) == 0) return;
   const torch::Tensor rows_x = of_x.index_select(0, same);
@@ -50,7 +50,7 @@ void ViewNoise::Add(const PlacedCells& x, const PlacedCells& y, Random& random) 
 std::vector<torch::Tensor> ViewNoise::Covariances() const {
   if (pairs_ < kMinPairs) return {};
   std::vector<torch::Tensor> covariances;
-  // Of a difference twice that of one view.
+  // The variance of a difference is twice that of one view.
   for (const torch::Tensor& moment : moments_) {
     covariances.push_back(moment / (2.0 * static_cast<double>(pairs_)));
   }

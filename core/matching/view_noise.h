@@ -1,5 +1,5 @@
-// How much the features of one place differ from view to view: what tells views apart but not
-// places, and should not count when places are compared. Torch in the interface. Not thread-safe.
+// Variation of features of one place between views, which comparisons of places should ignore.
+// Torch in the interface. Not thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -11,21 +11,21 @@
 
 namespace color3d {
 
-// The cells of one view.
+// Cells of one view.
 struct PlacedCells {
-  const std::vector<torch::Tensor>& blocks;  // as CellFeatures'
-  const torch::Tensor& positions;            // [cells,4], as CellQueries'
+  const std::vector<torch::Tensor>& blocks;  // as in CellFeatures
+  const torch::Tensor& positions;            // [cells,4], as in CellQueries
 };
 
 class ViewNoise {
  public:
-  // Adds the pairs of cells that show the same place: of some cells of `x`, drawn at random, the
-  // nearest in space of `y`, when it is near. Both views have the same blocks.
+  // Adds pairs of cells that show the same place: random cells of `x`, each with the nearest cell
+  // of `y` in space, if it is near. Requires: both views have the same blocks.
   void Add(const PlacedCells& x, const PlacedCells& y, Random& random);
 
   int64_t pairs() const { return pairs_; }
-  // [C,C] of each block, float64: covariance of one view's features about the place's. Empty when
-  // too few pairs were found to tell.
+  // Returns the covariance of a view's features about the mean of the place, [C,C] for each block,
+  // float64, or nothing if there are too few pairs.
   std::vector<torch::Tensor> Covariances() const;
 
  private:

@@ -28,7 +28,7 @@ class ViewNoiseTest : public testing::Test {
   const torch::Tensor deviations_ = torch::tensor({1.0f, 2.0f, 0.5f});
 };
 
-TEST_F(ViewNoiseTest, IsWhatViewsOfOnePlaceDifferBy) {
+TEST_F(ViewNoiseTest, IsCovarianceBetweenViewsOfPlace) {
   ViewNoise noise;
   Random random(1);
   const torch::Tensor positions = Positions(0.0), near = Positions(0.01);
@@ -43,7 +43,7 @@ TEST_F(ViewNoiseTest, IsWhatViewsOfOnePlaceDifferBy) {
   EXPECT_LT((covariances[0] - expected).abs().max().item<double>(), 0.15);
 }
 
-TEST_F(ViewNoiseTest, PlacesApartOrUnknownAreNoPairs) {
+TEST_F(ViewNoiseTest, IgnoresDistantAndUnknownPlaces) {
   ViewNoise noise;
   Random random(1);
   const auto x = View(places_, deviations_), y = View(places_, deviations_);
@@ -56,7 +56,7 @@ TEST_F(ViewNoiseTest, PlacesApartOrUnknownAreNoPairs) {
   EXPECT_TRUE(noise.Covariances().empty());
 }
 
-TEST_F(ViewNoiseTest, TooFewPairsTellNothing) {
+TEST_F(ViewNoiseTest, IsEmptyForTooFewPairs) {
   ViewNoise noise;
   Random random(1);
   const auto x = View(places_, deviations_), y = View(places_, deviations_);

@@ -11,8 +11,8 @@ namespace color3d {
 namespace {
 
 constexpr double kEigenvalueFloor = 0.02;  // share of the largest eigenvalue
-constexpr double kNoiseFloor = 0.005;      // share of the mean variance of the noise
-constexpr double kVarianceFloor = 1e-8;    // a constant channel is divided by this, not by 0
+constexpr double kNoiseFloor = 0.005;      // share of the mean noise variance
+constexpr double kVarianceFloor = 1e-8;    // divisor for constant channels
 constexpr double kScaleFloor = 1e-12;
 constexpr int64_t kVectorColumns = 8;
 
@@ -22,13 +22,13 @@ double ShareOfTap(const WhiteningOptions& options, int stride_px) {
   return options.tap_shares[octave];
 }
 
-// The `dims` last columns.
+// The last `dims` columns.
 torch::Tensor Leading(const torch::Tensor& ascending, int64_t dims) {
   const int64_t columns = ascending.size(-1);
   return ascending.slice(-1, columns - dims, columns);
 }
 
-// Leading principal components, each with the same variance: [C,D].
+// Leading principal components, scaled to equal variance, [C,D].
 torch::Tensor PrincipalDirections(const torch::Tensor& covariance, int64_t dims) {
   torch::Tensor values, vectors;
   std::tie(values, vectors) = torch::linalg_eigh(covariance);  // ascending
@@ -39,8 +39,8 @@ torch::Tensor PrincipalDirections(const torch::Tensor& covariance, int64_t dims)
   return Leading(vectors, dims) * scale.sqrt();
 }
 
-// Directions in which places differ most against the noise, in units of the noise, scaled so that
-// the variances add up to 1: [C,D].
+// Directions of highest variance between places relative to the noise, in units of the noise,
+// scaled to a total variance of 1, [C,D].
 torch::Tensor DistinctiveDirections(const torch::Tensor& covariance,
                                     const torch::Tensor& noise,
                                     int64_t dims) {
@@ -57,8 +57,7 @@ torch::Tensor DistinctiveDirections(const torch::Tensor& covariance,
   return torch::mm(in_noise, Leading(vectors, dims)) / total.sqrt();
 }
 
-// In float64. `share` scales the block so that each kind of feature takes the share of the distance
-// that it is given. `noise`: [C,C], or undefined.
+// Computes in float64. `share`: share of the block in the distance. `noise`: [C,C], or undefined.
 Whitening::Projection Fit(const torch::Tensor& samples,
                           int64_t dims,
                           double share,

@@ -20,7 +20,7 @@ class WhiteningTest : public testing::Test {
   WhiteningTest() { torch::manual_seed(3); }
 };
 
-TEST_F(WhiteningTest, EachKindOfFeatureTakesItsShareOfTheDistance) {
+TEST_F(WhiteningTest, EachBlockHasItsShareOfTheDistance) {
   const auto blocks = Blocks();
   const std::vector<torch::Tensor> noise{torch::eye(6, torch::kFloat64) * 0.3,
                                          torch::eye(2, torch::kFloat64)};
@@ -37,7 +37,7 @@ TEST_F(WhiteningTest, EachKindOfFeatureTakesItsShareOfTheDistance) {
 }
 
 // Mahalanobis' distance under the noise, up to a factor, when no direction is left out.
-TEST_F(WhiteningTest, DistancesAreMeasuredInTheNoiseOfViews) {
+TEST_F(WhiteningTest, MeasuresDistancesInUnitsOfNoise) {
   const auto blocks = Blocks();
   const torch::Tensor mixing = torch::randn({6, 6}, torch::kFloat64);
   const torch::Tensor noise = torch::mm(mixing, mixing.t()) + 0.5 * torch::eye(6, torch::kFloat64);
@@ -58,7 +58,7 @@ TEST_F(WhiteningTest, DistancesAreMeasuredInTheNoiseOfViews) {
   for (const double ratio : ratios) EXPECT_NEAR(ratio / ratios.front(), 1.0, 1e-4);
 }
 
-TEST_F(WhiteningTest, DirectionsThatStandOutOfTheNoiseAreKept) {
+TEST_F(WhiteningTest, KeepsDirectionsAboveTheNoise) {
   // The first channel varies most, but as much from view to view as from place to place.
   const torch::Tensor tap = torch::randn({kCells, 3}) * torch::tensor({10.0f, 1.0f, 1.0f});
   const torch::Tensor noise = torch::diag(torch::tensor({100.0, 1.0, 0.01}, torch::kFloat64));
@@ -73,7 +73,7 @@ TEST_F(WhiteningTest, DirectionsThatStandOutOfTheNoiseAreKept) {
   EXPECT_GT(kept[2].item<double>(), 20.0 * 10.0 * kept[0].item<double>());
 }
 
-TEST_F(WhiteningTest, NothingThatVariesOrNoNoiseIsFinite) {
+TEST_F(WhiteningTest, IsFiniteWithoutVarianceOrNoise) {
   const std::vector<torch::Tensor> flat{torch::ones({100, 6}), torch::ones({100, 2})};
   const auto varied = Blocks();
   const std::vector<torch::Tensor> silent{torch::zeros({6, 6}, torch::kFloat64),

@@ -4,53 +4,15 @@
 // errors: of the console; requests: other than for what is inside of the page; looks: for each look
 // the page's width beyond the window (px), the time of the first paint (ms), the background, how
 // much of the picture before is shown after the slider went to 20 %, and pictures without a text.
-// With a third argument every look leaves PNG files there. Needs no npm package: it talks to the
-// browser over a pipe.
-import { spawn } from 'node:child_process';
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+// With a third argument every look leaves PNG files there.
+import { mkdirSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
+
+import { openBrowser, pause } from '../../tests/support/browser.mjs';
 
 const [chromium, page, screenshots] = process.argv.slice(2);
 if (screenshots) mkdirSync(screenshots, { recursive: true });
-const profile = mkdtempSync(join(tmpdir(), 'color3d-browser-'));
-const browser = spawn(chromium, [
-  '--headless', '--no-sandbox', '--no-first-run', '--remote-debugging-pipe', '--disable-gpu',
-  '--disable-dev-shm-usage', '--user-data-dir=' + profile,
-], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
-browser.on('error', (error) => { console.error(String(error)); process.exit(1); });
-
-const waiting = new Map();
-const errors = [], requests = [];
-let buffer = '', next = 1, session;
-browser.stdio[4].on('data', (data) => {
-  const messages = (buffer + data).split('\0');
-  buffer = messages.pop();
-  for (const text of messages) receive(JSON.parse(text));
-});
-const receive = ({ id, error, result, method, params }) => {
-  if (id) {
-    const { done, failed } = waiting.get(id);
-    waiting.delete(id);
-    return error ? failed(new Error(error.message)) : done(result);
-  }
-  if (method === 'Runtime.exceptionThrown') errors.push(params.exceptionDetails.text);
-  if (method === 'Runtime.consoleAPICalled') errors.push(params.args.map((arg) => arg.value).join(' '));
-  if (method === 'Log.entryAdded' && params.entry.level === 'error') errors.push(params.entry.text);
-  if (method === 'Network.requestWillBeSent' && !/^(data|blob|file):/.test(params.request.url)) {
-    requests.push(params.request.url);
-  }
-};
-const send = (method, params = {}) => new Promise((done, failed) => {
-  waiting.set(next, { done, failed });
-  browser.stdio[3].write(JSON.stringify({ id: next++, method, params, sessionId: session }) + '\0');
-});
-const evaluate = async (expression) => {
-  const answer = await send('Runtime.evaluate', { expression, awaitPromise: true, returnByValue: true });
-  if (answer.exceptionDetails) throw new Error(answer.exceptionDetails.exception.description);
-  return answer.result.value;
-};
-const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+const { send, open, evaluate, close, errors, requests } = openBrowser(chromium, ['--disable-gpu']);
 
 const measure = `(() => {
   const root = document.documentElement, at = document.getElementById('at');
@@ -78,10 +40,7 @@ const measure = `(() => {
 })()`;
 
 const lookAs = async (name, width, height, scheme) => {
-  session = undefined;
-  const { targetId } = await send('Target.createTarget', { url: 'about:blank' });
-  session = (await send('Target.attachToTarget', { targetId, flatten: true })).sessionId;
-  for (const domain of ['Page', 'Runtime', 'Log', 'Network']) await send(domain + '.enable');
+  await open();
   await send('Emulation.setDeviceMetricsOverride',
       { width, height, deviceScaleFactor: 1, mobile: width < 500 });
   await send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: scheme }] });
@@ -117,10 +76,5 @@ try {
   console.error(error.stack);
   failed = 1;
 }
-session = undefined;
-const ended = new Promise((done) => browser.once('exit', done));
-send('Browser.close').catch(() => {});
-await Promise.race([ended, pause(5000)]);
-browser.kill('SIGKILL');
-rmSync(profile, { recursive: true, force: true, maxRetries: 5, retryDelay: 200 });
+await close();
 process.exit(failed);

@@ -15,7 +15,7 @@ Camera Camera::Scaled(int new_width, int new_height) const {
 Camera Camera::FitWithin(int max_side_px) const {
   const int side = std::max(width, height);
   if (max_side_px <= 0 || side <= max_side_px) return *this;
-  // The rounding of FitWithin(Image).
+  // Rounds as FitWithin(Image).
   const double scale = static_cast<double>(max_side_px) / side;
   return Scaled(std::max(1, static_cast<int>(std::lround(width * scale))),
                 std::max(1, static_cast<int>(std::lround(height * scale))));

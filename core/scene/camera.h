@@ -17,22 +17,23 @@ struct Camera {
   double cx = 0.0;
   double cy = 0.0;
 
-  // The same camera for an image resized to width x height px.
+  // Returns the same camera for an image resized to width x height px.
   Camera Scaled(int new_width, int new_height) const;
-  // Scaled so that the longer side is at most max_side_px; unchanged when it is, or for <= 0.
+  // Returns the camera scaled so that the longer side is at most max_side_px; the same camera if it
+  // already is, or if max_side_px <= 0.
   Camera FitWithin(int max_side_px) const;
 
-  // Pixel at which the picture shows a point of the camera's frame with z > 0. It may lie outside
-  // of the picture: see Contains.
+  // Projects a point of the camera frame with z > 0. The pixel may lie outside of the picture: see
+  // Contains.
   Eigen::Vector2d Project(const Eigen::Vector3d& in_camera) const {
     return {fx * in_camera.x() / in_camera.z() + cx, fy * in_camera.y() / in_camera.z() + cy};
   }
-  // The inverse: the point of the camera's frame at z = 1 that this pixel shows. Times a depth, the
-  // point at that depth.
+  // Inverse of Project: the point of the camera frame at z = 1 that projects to the pixel. Times a
+  // depth, the point at that depth.
   Eigen::Vector3d Ray(double x_px, double y_px) const {
     return {(x_px - cx) / fx, (y_px - cy) / fy, 1.0};
   }
-  // 0 <= x < width and 0 <= y < height; false for NaN.
+  // Returns true if 0 <= x < width and 0 <= y < height; false for NaN.
   bool Contains(const Eigen::Vector2d& pixel) const {
     return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < width && pixel.y() < height;
   }

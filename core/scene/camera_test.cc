@@ -9,7 +9,7 @@ namespace {
 
 const Camera kCamera{640, 480, 500.0, 510.0, 323.0, 236.0};
 
-TEST(Camera, ScalesWithItsPicture) {
+TEST(Camera, ScalesWithPicture) {
   const Camera half = kCamera.Scaled(320, 240);
   EXPECT_DOUBLE_EQ(half.fx, 250.0);
   EXPECT_DOUBLE_EQ(half.fy, 255.0);
@@ -23,7 +23,7 @@ TEST(Camera, ScalesWithItsPicture) {
   EXPECT_NEAR(small.fx / small.width, kCamera.fx / kCamera.width, 1e-12);
 }
 
-TEST(Camera, ProjectsAndGoesBack) {
+TEST(Camera, RayInvertsProject) {
   const Eigen::Vector2d pixel = kCamera.Project({0.2, -0.3, 2.0});
   EXPECT_DOUBLE_EQ(pixel.x(), 373.0);  // 500 * 0.1 + 323
   EXPECT_DOUBLE_EQ(pixel.y(), 159.5);  // 510 * -0.15 + 236
@@ -35,7 +35,7 @@ TEST(Camera, ProjectsAndGoesBack) {
   EXPECT_LT((pose.WorldFromCamera(pose.Apply(world)) - world).norm(), 1e-14);
 }
 
-TEST(Camera, ContainsItsFirstColumnAndNotTheOneBehindItsLast) {
+TEST(Camera, ContainsFirstColumnButNotWidth) {
   EXPECT_TRUE(kCamera.Contains({0.0, 0.0}));
   EXPECT_TRUE(kCamera.Contains({639.99, 479.99}));
   EXPECT_FALSE(kCamera.Contains({640.0, 10.0}));

@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-// Of a name: digits and what is not, in turns.
+// Alternating runs of digits and other characters of a name.
 std::vector<std::string_view> PartsOf(std::string_view name) {
   const auto is_digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
   std::vector<std::string_view> parts;
@@ -33,8 +33,8 @@ std::optional<int64_t> NumberIn(std::string_view part) {
   return number;
 }
 
-// The only number in which the names differ; empty where there is no such number. An ending may
-// have digits, too, but does not differ.
+// Returns the only number in which the names differ; empty if there is none. Digits in extensions
+// do not differ.
 std::vector<int64_t> NumbersOf(const std::vector<std::string>& names) {
   std::optional<size_t> differs;
   const std::vector<std::string_view> first = PartsOf(names.front());
@@ -57,8 +57,8 @@ std::vector<int64_t> NumbersOf(const std::vector<std::string>& names) {
   return numbers;
 }
 
-// By which numbers grow: the step that is most frequent, at least half of all, and of which all
-// others are multiples. 0: there is none.
+// Returns the step of the numbers: the most frequent one, if it makes up at least half of all steps
+// and all others are multiples of it; else 0.
 int64_t StepOf(const std::vector<int64_t>& numbers) {
   std::map<int64_t, size_t> steps;
   for (size_t i = 1; i < numbers.size(); ++i) ++steps[numbers[i] - numbers[i - 1]];
@@ -74,7 +74,7 @@ int64_t StepOf(const std::vector<int64_t>& numbers) {
 
 }  // namespace
 
-FrameNumbers PlacesOfFrames(const std::vector<std::string>& names) {
+FrameNumbers FramePositions(const std::vector<std::string>& names) {
   FrameNumbers result;
   result.places.resize(names.size());
   std::iota(result.places.begin(), result.places.end(), int64_t{0});
@@ -85,7 +85,7 @@ FrameNumbers PlacesOfFrames(const std::vector<std::string>& names) {
   const auto count = static_cast<int64_t>(names.size());
   const int64_t missing = (numbers.back() - numbers.front()) / step + 1 - count;
   if (missing == 0) return result;
-  size_t gaps = 0, first = 0;  // the picture behind the first gap
+  size_t gaps = 0, first = 0;  // picture after the first gap
   for (size_t i = 1; i < numbers.size(); ++i) {
     if (numbers[i] - numbers[i - 1] == step) continue;
     if (gaps++ == 0) first = i;

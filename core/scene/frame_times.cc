@@ -15,9 +15,9 @@
 namespace color3d {
 namespace {
 
-constexpr double kSameTime = 1e-6;    // share of all time
-constexpr double kSameTick = 0.25;    // share of a step of the cameras' clock
-constexpr double kToldOffset = 0.05;  // likewise: farther apart it is no matter of rounding
+constexpr double kSameTime = 1e-6;    // fraction of the whole range
+constexpr double kSameTick = 0.25;    // fraction of a step of the cameras' clock
+constexpr double kToldOffset = 0.05;  // likewise: a larger offset is no rounding error
 
 // Relative to images/.
 std::string Folder(std::string file) {
@@ -26,7 +26,7 @@ std::string Folder(std::string file) {
   return slash == std::string::npos ? "" : file.substr(0, slash);
 }
 
-// True when all have it, false when none has.
+// Returns true if all frames have it, false if none has.
 template <typename Has>
 bool AllOrNone(const std::vector<FrameTime>& frames, const char* what, const Has& has) {
   const bool first = !frames.empty() && has(frames[0]);
@@ -43,7 +43,7 @@ bool AllOrNone(const std::vector<FrameTime>& frames, const char* what, const Has
   return first;
 }
 
-// From the earliest on, with those that only rounding keeps apart made equal.
+// Shifts times so that the earliest is 0, and makes times equal that differ by rounding only.
 std::vector<double> ShiftedTimes(const std::vector<FrameTime>& frames) {
   std::vector<size_t> order(frames.size());
   std::iota(order.begin(), order.end(), size_t{0});
@@ -95,8 +95,8 @@ double MedianStep(const FramesByCamera& cameras, const std::vector<double>& time
   return steps.empty() ? 0.0 : Median(std::move(steps));
 }
 
-// The tick of each frame of one clock that all cameras follow to a quarter of a step; empty where
-// they follow none. Rounded times drift against any one step, so that steps are counted.
+// Returns the tick of each frame if all cameras follow one clock to a quarter of a step; else
+// empty. Steps are counted one by one, since rounded times drift against any constant step.
 std::vector<int64_t> TicksOf(const FramesByCamera& cameras, const std::vector<double>& times) {
   constexpr double kMaxSteps = 1e6;  // missing between two frames
   const double step = MedianStep(cameras, times);
@@ -128,8 +128,8 @@ std::vector<int64_t> TicksOf(const FramesByCamera& cameras, const std::vector<do
   return ticks;
 }
 
-// Makes times of one tick of a rig's clock the earliest of them, where there is such a clock; a
-// note where that is more than what containers round.
+// Sets the times of each tick of a rig's clock, if there is one, to the earliest of them; adds a
+// note if they differ by more than the rounding of containers.
 void ShareMoments(const std::vector<std::string>& camera,
                   std::vector<double>* times,
                   FrameMoments* result) {

@@ -21,7 +21,7 @@ FrameTime Frame(const std::string& file,
   return {"frame " + file.substr(0, 3), file, time, camera};
 }
 
-TEST(FrameTimes, OneMovingCameraInAnyOrder) {
+TEST(FrameTimes, OrdersFramesOfOneCamera) {
   const FrameMoments m = MomentsOf(
       {Frame("images/c.png", 0.5), Frame("images/a.png", -0.5), Frame("images/b.png", 0)});
   EXPECT_EQ(m.moments[0], (Moment{1.0, 0}));
@@ -32,7 +32,7 @@ TEST(FrameTimes, OneMovingCameraInAnyOrder) {
   EXPECT_EQ(MomentsOf({Frame("a/1.png", 0), Frame("b/2.png", 1)}).cameras.size(), 1u);
 }
 
-TEST(FrameTimes, FoldersAreCamerasWhereFramesShareATime) {
+TEST(FrameTimes, FoldersAreCamerasIfFramesShareTime) {
   const FrameMoments m = MomentsOf({Frame("images/cam02/1.png", 3),
                                     Frame("images/cam01/1.png", 3),
                                     Frame("images/cam01/2.png", 3.04),
@@ -45,7 +45,7 @@ TEST(FrameTimes, FoldersAreCamerasWhereFramesShareATime) {
   EXPECT_EQ(m.moments[4]->shot, 1);
 }
 
-TEST(FrameTimes, NamedCamerasMayShareAFolder) {
+TEST(FrameTimes, NamedCamerasMayShareFolder) {
   const FrameMoments m = MomentsOf({Frame("a.png", 0, "right"),
                                     Frame("b.png", 0, "left"),
                                     Frame("c.png", 1, "right"),
@@ -54,7 +54,7 @@ TEST(FrameTimes, NamedCamerasMayShareAFolder) {
   EXPECT_EQ(m.moments[2], (Moment{1.0, 1}));
 }
 
-TEST(FrameTimes, WhatRoundingKeepsApartIsOneTime) {
+TEST(FrameTimes, MergesTimesThatDifferByRounding) {
   const FrameMoments m = MomentsOf({Frame("a/1.png", 0.1 * 3),
                                     Frame("b/1.png", 0.3),
                                     Frame("a/0.png", 0),
@@ -74,7 +74,7 @@ std::vector<FrameTime> Rounded(const std::string& camera, int ticks, double offs
   return frames;
 }
 
-TEST(FrameTimes, CamerasWhoseContainersRoundShareTheirMoments) {
+TEST(FrameTimes, CamerasShareMomentsDespiteRounding) {
   constexpr int kCount = 900;  // rounded steps of 1/600 s drift by 15 ticks
   std::vector<FrameTime> frames = Rounded("a", 600, 0.0, kCount);
   for (const FrameTime& frame : Rounded("b", 90000, 0.0, kCount)) frames.push_back(frame);
@@ -86,7 +86,7 @@ TEST(FrameTimes, CamerasWhoseContainersRoundShareTheirMoments) {
   EXPECT_EQ(m.note, "");
 }
 
-TEST(FrameTimes, CamerasThatBeganAFifthOfAStepApartShareTheirMomentsAndItIsSaid) {
+TEST(FrameTimes, NotesOffsetOfFifthOfStep) {
   std::vector<FrameTime> frames = Rounded("a", 90000, 0.0, 40);
   for (const FrameTime& frame : Rounded("b", 90000, 0.0067, 40)) frames.push_back(frame);
   const FrameMoments m = MomentsOf(frames);
@@ -94,7 +94,7 @@ TEST(FrameTimes, CamerasThatBeganAFifthOfAStepApartShareTheirMomentsAndItIsSaid)
   EXPECT_THAT(m.note, HasSubstr("clocks differ by up to 0.0067"));
 }
 
-TEST(FrameTimes, CamerasHalfAStepApartOrOfOtherRatesKeepTheirTimes) {
+TEST(FrameTimes, KeepsTimesOfUnsynchronizedCameras) {
   std::vector<FrameTime> halves = Rounded("a", 90000, 0.0, 40);
   for (const FrameTime& frame : Rounded("b", 90000, 0.0167, 40)) halves.push_back(frame);
   const FrameMoments m = MomentsOf(halves);
@@ -109,7 +109,7 @@ TEST(FrameTimes, CamerasHalfAStepApartOrOfOtherRatesKeepTheirTimes) {
   EXPECT_EQ(rates.moments[4]->time_s, 0.06);
 }
 
-TEST(FrameTimes, OneTimeIsAStillScene) {
+TEST(FrameTimes, OneTimeMakesStaticScene) {
   const FrameMoments m = MomentsOf({Frame("a.png", 7), Frame("b.png", 7)});
   EXPECT_FALSE(m.moments[0] || m.moments[1]);
   EXPECT_THAT(m.note, HasSubstr("all 2 frames were taken at one time"));
@@ -124,7 +124,7 @@ std::string Said(const std::vector<FrameTime>& frames) {
   return Refusal([&] { MomentsOf(frames); });
 }
 
-TEST(FrameTimes, ContradictionsAreRefusedByName) {
+TEST(FrameTimes, NamesContradictions) {
   EXPECT_THAT(Said({Frame("a.png", 0), Frame("b.png", {}), Frame("c.png", 1)}),
               HasSubstr("frame b.p (b.png) has no time, but frame a.p has one"));
   EXPECT_THAT(Said({Frame("a.png", {}), Frame("b.png", 0)}), HasSubstr("(a.png) has no time"));

@@ -6,8 +6,8 @@
 namespace color3d {
 
 void RequireKeyViewMemory(const std::string& file, int width, int height, int64_t memory_bytes) {
-  // The photo, its luminance, the coloured picture, its copy without alpha and its Lab: of a grey
-  // photo, the least that any source of colour takes.
+  // The photo, its luminance, the coloured picture, its copy without alpha and its Lab. For a grey
+  // photo this is the minimum for any source of colour.
   constexpr int64_t kBytesPerPixel = 44;
   RequirePictureMemory({file, width, height, kBytesPerPixel * width * height},
                        memory_bytes,

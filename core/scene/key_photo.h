@@ -1,5 +1,5 @@
-// The photo that is coloured as the key view: at full size, unlike all others, and therefore only
-// where memory allows. Pure functions, thread-safe.
+// Photo of the key view: coloured at full size, unlike all others, if memory allows. Pure
+// functions, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace color3d {
 
-// Throws Error{kResourceExhausted} with the numbers when a photo of this size (px) takes more than
-// `memory_bytes` as the key view. Any photo may become it.
+// Throws Error{kResourceExhausted} with the numbers if a photo of this size (px) needs more than
+// `memory_bytes` as the key view. Checked for every photo, since any may be chosen.
 void RequireKeyViewMemory(const std::string& file, int width, int height, int64_t memory_bytes);
 
-// ReadImage's picture, after RequireKeyViewMemory for its size.
+// ReadImage after RequireKeyViewMemory for the size of the picture.
 Image ReadKeyPhoto(const std::filesystem::path& file, int64_t memory_bytes);
 
 }  // namespace color3d

@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-// Radius after distortion without the tangential part, which is small against it.
+// Radius after distortion without the tangential part, which is comparatively small.
 double DistortedRadius(const Distortion& distortion, double r) {
   const auto& k = distortion.k;
   if (distortion.model == Distortion::Model::kFisheye) {
@@ -23,8 +23,8 @@ double DistortedRadius(const Distortion& distortion, double r) {
   return r * numerator / denominator;
 }
 
-// Radius up to which distortion is one-to-one: beyond it the polynomial turns back and would show
-// the same part of the photo twice.
+// Radius up to which distortion is one-to-one: beyond it the polynomial folds back and would show
+// parts of the photo twice.
 double OneToOneRadius(const Distortion& distortion) {
   constexpr double kStep = 1.0 / 256.0;
   constexpr double kMaxRadius = 12.0;  // 85 degrees off axis
@@ -37,8 +37,8 @@ double OneToOneRadius(const Distortion& distortion) {
   return kMaxRadius;
 }
 
-// True when the outline of the picture of `camera` lies inside the photo, give or take half a pixel
-// (which replicated border pixels fill).
+// Returns true if the outline of the picture of `camera` lies inside the photo, with half a pixel
+// of tolerance (filled by replicated border pixels).
 bool OutlineIsInside(const Camera& camera,
                      const Camera& captured,
                      const Distortion& distortion,

@@ -53,7 +53,7 @@ TEST(Lens, AgreesWithOpenCv) {
   }
 }
 
-TEST(Lens, UndistortedPictureHasNoEmptyBordersAndKeepsTheField) {
+TEST(Lens, UndistortedPictureHasNoEmptyBorders) {
   for (const Distortion& d : {Brown({-0.2, 0.05, 0.003, -0.002}),
                               Brown({0.15, 0.02}),
                               Brown({0.0, 0.0, 0.01, -0.01}),
@@ -76,7 +76,7 @@ TEST(Lens, UndistortedPictureHasNoEmptyBordersAndKeepsTheField) {
   }
 }
 
-TEST(Lens, WithoutDistortionTheCameraStays) {
+TEST(Lens, KeepsCameraWithoutDistortion) {
   for (const Distortion& d : {Distortion{}, Brown({})}) {
     EXPECT_TRUE(IsUndistorted(d));
     EXPECT_EQ(UndistortedCamera(kCamera, d).fx, kCamera.fx);
@@ -84,7 +84,7 @@ TEST(Lens, WithoutDistortionTheCameraStays) {
   EXPECT_FALSE(IsUndistorted(Fisheye({})));
 }
 
-TEST(Lens, FoldingDistortionIsAvoidedOrRefused) {
+TEST(Lens, AvoidsOrRefusesFoldingDistortion) {
   // r (1 - r^2) turns back at r = 0.577, inside the picture: the field must end before.
   const Distortion fold = Brown({-1.0});
   const Camera camera = UndistortedCamera(kCamera, fold);

@@ -16,17 +16,17 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kFolders[] = {"images/", "input/", ""};
-// So much worse is a name whose first folder was left out than one that differs otherwise.
+// Penalty for a name whose first folder was dropped, larger than for any other difference.
 constexpr int kFolderLeftOut = 10;
 
-// Without what follows the last dot of the last part.
+// Drops everything from the last dot of the last part.
 std::string WithoutEnding(const std::string& path) {
   const size_t slash = path.rfind('/'), dot = path.rfind('.');
   const size_t first = slash == path.npos ? 0 : slash + 1;
   return dot == path.npos || dot <= first ? path : path.substr(0, dot);
 }
 
-// The parts of a name that lie below whatever it begins with: a drive, a root, "..".
+// Parts of a name below its drive, root or "..".
 std::vector<std::string> PartsOf(std::string name) {
   std::replace(name.begin(), name.end(), '\\', '/');
   std::vector<std::string> parts;
@@ -81,7 +81,7 @@ const std::string* NamedFiles::Only(const Index& index, const std::string& key) 
 
 NamedFiles::Match NamedFiles::LookUp(const std::string& path) const {
   const std::string stem = WithoutEnding(path);
-  // A path without an ending, or with a dot in its name, is a stem as it is.
+  // A name without an extension, or with a dot in the stem, is a stem itself.
   const std::vector<std::pair<const Index*, std::string>> ways = {
       {&by_path_, path},
       {&by_stem_, path},
@@ -95,7 +95,7 @@ NamedFiles::Match NamedFiles::LookUp(const std::string& path) const {
       const std::string full = folder + key;
       if (index->count(full) == 0) continue;
       const std::string* file = Only(*index, full);
-      // A file that is there under the very name is meant in preference to its copies elsewhere.
+      // An exact match is preferred to copies in other folders.
       if (file != nullptr) return {*file, way < 2 ? 0 : static_cast<int>(way)};
       return {};
     }
@@ -144,7 +144,7 @@ std::string ViewNameOf(std::string_view file) {
   return std::string(file);
 }
 
-std::string SomeOf(const std::vector<std::string>& names, size_t most) {
+std::string SummarizeNames(const std::vector<std::string>& names, size_t most) {
   std::string text;
   for (size_t i = 0; i < std::min(names.size(), most); ++i) {
     text += (i == 0 ? "" : ", ") + names[i];

@@ -1,4 +1,4 @@
-// Which of a scene's files a name in somebody's list of poses means. For core/scene only.
+// Matches the names in a file of poses with the scene's files. For core/scene only.
 #pragma once
 
 #include <filesystem>
@@ -11,7 +11,7 @@ namespace color3d {
 
 class NamedFiles {
  public:
-  // The files that names may mean, relative to the scene's folder.
+  // `files`: candidates, relative to the scene's folder.
   explicit NamedFiles(std::vector<std::string> files);
   NamedFiles(NamedFiles&&) = default;
   NamedFiles& operator=(NamedFiles&&) = default;
@@ -22,12 +22,12 @@ class NamedFiles {
   static NamedFiles Films(const std::filesystem::path& scene_folder);
 
   size_t size() const { return files_.size(); }
-  // The file for each name; empty where there is none. A name is looked for in images/, input/ and
-  // the folder itself, then without its first folders: by path, then without regard to case, then
-  // without its ending (photos are saved in other formats, and some lists have no endings). Where
-  // several files fit equally well, none does. Where two names mean one file, the one that fits
-  // better gets it; both do where they fit equally well, which is for the reader to refuse.
-  // Names may have Windows separators; what they name outside of the scene is never found.
+  // Returns the file of each name; empty if there is none. Looks in images/, in input/ and in the
+  // folder itself, then without the first folders of the name; by path, then ignoring case, then
+  // ignoring the file extension (photos are converted to other formats, and some lists have no
+  // extensions). A name that fits several files equally well gets none. If two names fit one file,
+  // the better match gets it; both get it if they match equally well, and the reader refuses that.
+  // Names may have Windows separators. Files outside of the scene are never found.
   std::vector<std::string> Find(const std::vector<std::string>& names) const;
   std::string Find(const std::string& name) const;
 
@@ -46,10 +46,10 @@ class NamedFiles {
   Index by_path_, by_lower_, by_stem_, by_lower_stem_;
 };
 
-// A file's name as a view has it: its path relative to images/ or input/.
+// Name of a file's view: its path relative to images/ or input/.
 std::string ViewNameOf(std::string_view file);
 
 // "a, b, c and 4 more"; at most `most` names.
-std::string SomeOf(const std::vector<std::string>& names, size_t most = 5);
+std::string SummarizeNames(const std::vector<std::string>& names, size_t most = 5);
 
 }  // namespace color3d

@@ -18,7 +18,7 @@ std::string Found(const std::vector<std::string>& files, const std::string& name
   return NamedFiles(files).Find(name);
 }
 
-TEST(NamedFiles, PathsComeFirstThenCaseThenStem) {
+TEST(NamedFiles, PrefersPathThenCaseThenStem) {
   EXPECT_EQ(Found({"images/a.jpg", "a.jpg"}, "a.jpg"), "images/a.jpg");
   EXPECT_EQ(Found({"input/a.jpg"}, "a.jpg"), "input/a.jpg");
   EXPECT_EQ(Found({"images/a.jpg", "images/A.JPG"}, "A.JPG"), "images/A.JPG");
@@ -34,13 +34,13 @@ TEST(NamedFiles, PathsComeFirstThenCaseThenStem) {
   EXPECT_EQ(Found({"images/a.jpg.png"}, "a.jpg"), "images/a.jpg.png");
 }
 
-TEST(NamedFiles, WhatIsAmbiguousIsNotGuessed) {
+TEST(NamedFiles, FindsNothingForAmbiguousNames) {
   EXPECT_EQ(Found({"images/a.png", "images/a.tif"}, "a.jpg"), "");
   EXPECT_EQ(Found({"images/a.png", "images/A.PNG"}, "a.PNG"), "");
   EXPECT_EQ(Found({"images/a.png"}, "b.png"), "");
 }
 
-TEST(NamedFiles, FoldersThatAreElsewhereAreLeftOut) {
+TEST(NamedFiles, DropsUnknownFolders) {
   const std::vector<std::string> rig = {"images/left/0.jpg", "images/right/0.jpg"};
   EXPECT_EQ(Found(rig, "images\\left\\0.jpg"), "images/left/0.jpg");
   EXPECT_EQ(Found(rig, "C:\\data\\scene\\images\\right\\0.jpg"), "images/right/0.jpg");
@@ -59,7 +59,7 @@ TEST(NamedFiles, TwoNamesDoNotShareAFile) {
               ElementsAre("images/a.jpg", "images/a.jpg"));
 }
 
-TEST(NamedFiles, NothingOutsideOfTheSceneIsFound) {
+TEST(NamedFiles, FindsNothingOutsideOfScene) {
   const ScratchFolder folder;
   const fs::path scene = folder.path() / "scene";
   fs::create_directories(scene / "images");
@@ -80,11 +80,11 @@ TEST(NamedFiles, NothingOutsideOfTheSceneIsFound) {
   }
 }
 
-TEST(NamedFiles, NamesAreShort) {
+TEST(NamedFiles, ViewNamesAreShort) {
   EXPECT_EQ(ViewNameOf("images/l/a.jpg"), "l/a.jpg");
   EXPECT_EQ(ViewNameOf("train/a.jpg"), "train/a.jpg");
-  EXPECT_EQ(SomeOf({"a", "b"}), "a, b");
-  EXPECT_EQ(SomeOf({"a", "b", "c", "d"}, 2), "a, b and 2 more");
+  EXPECT_EQ(SummarizeNames({"a", "b"}), "a, b");
+  EXPECT_EQ(SummarizeNames({"a", "b", "c", "d"}, 2), "a, b and 2 more");
 }
 
 }  // namespace

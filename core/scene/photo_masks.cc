@@ -19,9 +19,9 @@ namespace {
 
 constexpr char kFolder[] = "masks/";
 constexpr const char* kPhotoFolders[] = {"images/", "input/", ""};
-constexpr float kWhole = 0.999f;  // of what a reduced pixel covers
+constexpr float kWhole = 0.999f;  // coverage of a reduced pixel
 
-// Where the mask of a photo may be, best first.
+// Candidate paths of the mask of a photo, best first.
 std::vector<std::string> MaskNames(const std::string& photo_file) {
   std::vector<std::string> names;
   for (const std::string folder : kPhotoFolders) {
@@ -37,8 +37,8 @@ bool HasTransparency(const fs::path& file, const std::string& name) {
   const std::string bytes = ReadFile(file);
   const ImageInfo info = ProbeImage(bytes, name);
   if (info.format != ImageFormat::kPng && info.format != ImageFormat::kWebp) return false;
-  // Colours of a palette, and one colour of other pictures, may be transparent by a chunk of its
-  // own; where it is not there, decoding is saved.
+  // Transparency of palettes, and of one colour in other pictures, is in a chunk of its own;
+  // without it there is nothing to decode.
   const bool has_alpha = info.channels == 2 || info.channels == 4;
   if (!has_alpha && bytes.find("tRNS") == std::string::npos) return false;
   const Image image = DecodeImage(bytes, name, /*keep_alpha=*/true);
@@ -47,7 +47,7 @@ bool HasTransparency(const fs::path& file, const std::string& name) {
   return std::any_of(alpha, alpha + image.PlaneSize(), [](float a) { return a <= 0.5f; });
 }
 
-// The files in masks/, relative to the scene's folder.
+// Files in masks/, relative to the scene's folder.
 class MaskFiles {
  public:
   explicit MaskFiles(const fs::path& scene_folder) {
@@ -59,7 +59,7 @@ class MaskFiles {
     }
   }
   const std::set<std::string>& all() const { return all_; }
-  // The file of this name, or the only one that differs by the case of letters; else empty.
+  // Returns the file of this name, or the only one that differs in case only; else empty.
   std::string Find(const std::string& name) const {
     if (all_.contains(name)) return name;
     const std::string key = LowerCase(name);
@@ -115,7 +115,7 @@ std::vector<std::string> FindMasks(const fs::path& scene_folder,
         "(a.png or a.jpg.png for a.jpg)",
         unused.size(),
         files.all().size(),
-        SomeOf(unused)));
+        SummarizeNames(unused)));
   }
   return masks;
 }
@@ -141,7 +141,7 @@ Image ReadMask(const fs::path& scene_folder,
                           Size(image.width, image.height),
                           Size(width, height));
   }
-  // Of a mask in colour the mean of red, green and blue.
+  // Colour masks: mean of red, green and blue.
   const int first = is_alpha ? image.channels - 1 : 0;
   const int count = is_alpha ? 1 : image.channels;
   Image mask(width, height, 1);

@@ -52,7 +52,7 @@ class PhotoMasksTest : public ::testing::Test {
   const ScratchFolder scratch_;
 };
 
-TEST_F(PhotoMasksTest, AreFoundUnderEitherNameAndInAlpha) {
+TEST_F(PhotoMasksTest, FindsEitherNameAndAlpha) {
   const std::string photo = EncodePng8(Image(8, 6, 3, 0.5f));
   for (const char* name : {"images/a.png", "images/s/b.png", "images/c.png"}) Write(name, photo);
   Image clear(8, 6, 4, 1.0f);
@@ -78,7 +78,7 @@ TEST_F(PhotoMasksTest, AreFoundUnderEitherNameAndInAlpha) {
   EXPECT_EQ(alpha.At(0, 2, 2), 1.0f);
 }
 
-TEST_F(PhotoMasksTest, BadOnesAreRefusedByName) {
+TEST_F(PhotoMasksTest, NamesBadMasks) {
   Write("images/a.jpg", EncodeJpeg(Image(8, 6, 3, 0.5f)));
   const auto find = [&] { FindMasks(root(), {"images/a.jpg"}, {"images/unposed.jpg"}); };
   Write("masks/b.png", "");
@@ -99,7 +99,7 @@ TEST_F(PhotoMasksTest, BadOnesAreRefusedByName) {
   EXPECT_THAT(ErrorOf(read), HasSubstr("masks/a.png"));
 }
 
-TEST_F(PhotoMasksTest, MasksOfPhotosThatWereThrownAwayAreLeftOutWithANote) {
+TEST_F(PhotoMasksTest, LeavesOutMasksOfDeletedPhotosWithNote) {
   Write("images/a.jpg", EncodeJpeg(Image(8, 6, 3, 0.5f)));
   Write("masks/A.PNG", EncodePng8(Stripe(8, 6, 0, 3)));
   Write("masks/gone.jpg.png", EncodePng8(Stripe(8, 6, 0, 3)));
@@ -111,12 +111,12 @@ TEST_F(PhotoMasksTest, MasksOfPhotosThatWereThrownAwayAreLeftOutWithANote) {
                         "masks/gone.jpg.png"));
 }
 
-TEST_F(PhotoMasksTest, AReducedPixelCountsOnlyAsAWhole) {
+TEST_F(PhotoMasksTest, ReducedPixelNeedsFullCoverage) {
   const Image mask = ResizeMask(Stripe(8, 4, 0, 2), 4, 2);
   EXPECT_THAT(mask.data, ElementsAre(0, 0, 1, 1, 0, 0, 1, 1));
 }
 
-TEST_F(PhotoMasksTest, TravelWithTheSceneAndThroughTheLens) {
+TEST_F(PhotoMasksTest, FollowSceneAndLens) {
   const Scene scene = ArcScene(4);
   WritePhotos(scene, root());
   WriteColmapText(scene, root() / "sparse/0");
@@ -162,7 +162,7 @@ TEST_F(PhotoMasksTest, TravelWithTheSceneAndThroughTheLens) {
   EXPECT_THAT(kept[2].views, ElementsAre(1, 2));
 }
 
-TEST_F(PhotoMasksTest, GoToStructureFromMotionAtTheCopiesSize) {
+TEST_F(PhotoMasksTest, StructureFromMotionGetsMasksOfCopiesSize) {
   Write("images/a.png", EncodePng8(Image(80, 60, 1, 0.5f)));
   Write("images/b.png", EncodePng8(Image(80, 60, 1, 0.5f)));
   Write("masks/b.png", EncodePng8(Stripe(80, 60, 0, 39)));
@@ -181,7 +181,7 @@ TEST_F(PhotoMasksTest, GoToStructureFromMotionAtTheCopiesSize) {
   EXPECT_EQ(mask.At(0, 9, 20), 1.0f);
 }
 
-TEST_F(PhotoMasksTest, MaskedPartsTieNoPhotosTogether) {
+TEST_F(PhotoMasksTest, MaskedFeaturesConnectNoPhotos) {
   Image photo(320, 240, 1, 0.4f);  // squares of different sizes all over
   for (int i = 0; i < 40; ++i) {
     const int size = 5 + i % 7, left = 20 + 36 * (i % 8), top = 20 + 44 * (i / 8);

@@ -22,7 +22,8 @@ bool StartsWith(const std::string& text, const std::string& prefix) {
 
 std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
 
-// Same shape up to the rounding of a downscaled copy: one pixel of the smaller picture.
+// Returns true for the same shape up to the rounding of a downscaled copy: one pixel of the smaller
+// picture.
 bool SameShape(int width, int height, int other_width, int other_height) {
   const double sx = static_cast<double>(other_width) / width;
   const double sy = static_cast<double>(other_height) / height;
@@ -33,8 +34,8 @@ bool SameShape(int width, int height, int other_width, int other_height) {
                        std::abs(other_width / sy - width) <= 1.0;
 }
 
-// The camera frame turned by 180 or +-90 degrees about its axis: what EXIF orientations 3, 6 and 8
-// do to a photo. Distortion turns along: radial terms stay, tangential ones swap.
+// Rotates the camera frame by 180 or +-90 degrees about its axis, as EXIF orientations 3, 6 and 8
+// rotate photos. Radial distortion is unchanged, tangential terms swap.
 void TurnView(int orientation, View* view) {
   const Camera c = view->captured_camera;
   const double w = c.width;
@@ -96,8 +97,8 @@ void FitViewToPhoto(const Photo& photo, View* view) {
   const Camera& camera = view->captured_camera;
   const int w = photo.stored_width;
   const int h = photo.stored_height;
-  // Calibration tools, COLMAP among them, work on the pixels as stored. Only a camera that fits
-  // the picture as looked at and not the stored one was made by a tool that turns photos first.
+  // Calibration tools such as COLMAP use stored pixels. A camera that fits only the displayed
+  // picture comes from a tool that rotates photos first.
   const bool as_stored = SameShape(camera.width, camera.height, w, h);
   const bool as_seen = SameShape(camera.width, camera.height, photo.width, photo.height);
   if (!as_stored && !as_seen) {

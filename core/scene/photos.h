@@ -1,6 +1,5 @@
-// The photographs of a scene's folder: which files they are, how large they look, and how a camera
-// that was calibrated for the stored pixels becomes one for the picture as it is looked at. For
-// this folder only.
+// Photos in a scene's folder: the files, their displayed sizes, and the conversion of cameras
+// calibrated for stored pixels to the displayed picture. For this folder only.
 #pragma once
 
 #include <filesystem>
@@ -18,25 +17,26 @@ struct Photo {
   int stored_width = 0;  // px
   int stored_height = 0;
   int orientation = 1;  // EXIF, 1..8
-  int width = 0;        // px, as looked at: after orientation
+  int width = 0;        // px, as displayed: after orientation
   int height = 0;
   double focal_px = 0.0;  // from EXIF; 0: unknown
   std::string mask_file;  // as View::mask_file
   int camera = 0;         // photos of different cameras never share a lens
 };
 
-// Photos in images/ (any depth) when there are some, else those directly in the folder, else those
-// in subfolders other than augment, masks and hidden ones. Sorted by name; sizes are not read yet.
+// Returns the photos in images/ (any depth) if there are some, else those directly in the folder,
+// else those in subfolders other than augment, masks and hidden ones. Sorted by name; sizes are not
+// read yet.
 std::vector<Photo> ListPhotos(const std::filesystem::path& scene_folder);
 
-// Fills sizes, orientation and focal length; refuses files that are no images, cut short or too
-// large (Error{kInvalidArgument} that names the file).
+// Reads size, orientation and focal length. Throws Error{kInvalidArgument} that names the file if
+// it is no image, is truncated or too large.
 void ProbePhoto(const std::filesystem::path& scene_folder, Photo* photo);
 
-// Makes the view's captured camera (calibrated at any size, for the pixels as stored) fit the
-// photo: scaled when the photo is another size of the same shape, and turned with its EXIF
-// orientation. Then sets the undistorted camera. Throws Error{kInvalidArgument} naming both sizes
-// when the shapes differ.
+// Fits the view's captured camera (calibrated at any size, for stored pixels) to the photo: scales
+// it if the photo has another size of the same shape, and rotates it by the EXIF orientation. Then
+// sets the undistorted camera. Throws Error{kInvalidArgument} naming both sizes if the shapes
+// differ.
 void FitViewToPhoto(const Photo& photo, View* view);
 
 }  // namespace color3d

@@ -9,10 +9,10 @@ double Relief::Depth(double row) const {
   return backdrop_depth * (foot - horizon) / (std::max(row, foot) - horizon);
 }
 
-Relief ReliefBehind(std::vector<double> feet) {
-  constexpr double kFarthest = 0.1;  // quantile: limbs and shadows that were torn off aside
-  constexpr double kMargin = 0.02;   // nobody stands in the wall
-  constexpr double kHighest = 0.3, kLowest = 0.9;  // of the backdrop's foot
+Relief FitRelief(std::vector<double> feet) {
+  constexpr double kFarthest = 0.1;                // quantile, to ignore detached limbs and shadows
+  constexpr double kMargin = 0.02;                 // keeps feet off the backdrop
+  constexpr double kHighest = 0.3, kLowest = 0.9;  // limits for the backdrop's foot
   constexpr double kDepthRatio = 4.0;              // of the backdrop to the nearest ground
   Relief relief;
   if (!feet.empty()) {
@@ -25,7 +25,7 @@ Relief ReliefBehind(std::vector<double> feet) {
   return relief;
 }
 
-std::vector<Eigen::Vector3d> PointsOn(const Relief& relief, const Camera& camera, int count) {
+std::vector<Eigen::Vector3d> ReliefPoints(const Relief& relief, const Camera& camera, int count) {
   const double step =
       std::sqrt(static_cast<double>(camera.width) * camera.height / std::max(1, count));
   const auto columns = static_cast<int>(std::ceil(camera.width / step));

@@ -23,7 +23,7 @@ bool HasMoments(const std::vector<View>& views) {
   });
 }
 
-// Not all views stand at one place and look one way.
+// Returns true unless all views have the same position and direction.
 bool HasPoses(const std::vector<View>& views) {
   return std::any_of(views.begin(), views.end(), [&](const View& view) {
     const Pose &one = view.cam_from_world, &first = views.front().cam_from_world;

@@ -1,5 +1,5 @@
-// A posed scene: views with cameras, sparse points, and where the photographs are. A plain value;
-// serialised as scene.json, the output of the import stage and the input of every later one.
+// A posed scene: views with cameras, sparse points, and paths of the photos. Plain value;
+// serialised as scene.json, the output of import and the input of every later stage.
 #pragma once
 
 #include <Eigen/Core>
@@ -16,18 +16,18 @@
 
 namespace color3d {
 
-// When a frame of a film was taken, and by which camera.
+// Time and camera of a frame of a film.
 struct Moment {
   double time_s = 0.0;  // from the scene's first frame, >= 0
-  int shot = 0;         // frames of one shot are one camera's, without a cut between them
+  int shot = 0;         // frames of one shot are of one camera, without a cut
   bool operator==(const Moment&) const = default;
 };
 
 struct View {
   std::string name;        // unique in the scene: the photo's path relative to the images folder
   std::string image_file;  // path of the photo relative to the scene's folder
-  // What counts of the photo (photo_masks.h), relative to the scene's folder: the photo
-  // itself when its alpha tells; empty: all of it.
+  // Mask of the photo (photo_masks.h), relative to the scene's folder: the photo itself if its
+  // alpha is the mask; empty: nothing is masked out.
   std::string mask_file;
   // Camera of the *undistorted* picture at full size, and of the photo as captured.
   Camera camera;
@@ -35,8 +35,8 @@ struct View {
   Distortion distortion;  // of captured_camera
   Pose cam_from_world;
   bool held_out = false;  // used for evaluation only, never by any trainer
-  // Of a frame of a film; none: the photo shows a place that stands still. Frames of a film need
-  // not have poses: theirs are then all the same, as are those of a relief.
+  // Frames of films and of dynamic scenes only. Films need no poses: theirs are all equal, as are
+  // those of a relief.
   std::optional<Moment> moment;
 
   // 0 for a photo.
@@ -52,12 +52,11 @@ struct SparsePoint {
 struct Scene {
   std::vector<View> views;  // sorted by name
   std::vector<SparsePoint> points;
-  // What import did to coordinates that float32 or the near plane could not bear
-  // (import/normalise.h), and every writer and export undoes: world = world_from_scene_scale *
-  // scene + world_offset.
+  // Rescaling and recentring by import (import/normalise.h), which every writer and export undoes:
+  // world = world_from_scene_scale * scene + world_offset.
   double world_from_scene_scale = 1.0;  // > 0
   Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
-  // Frames of one camera that stands still, at the origin: no depth is known, this is assumed.
+  // Frames of one static camera at the origin: depth is unknown, and this is assumed.
   std::optional<Relief> relief;
 
   std::vector<int> TrainingViews() const;
@@ -69,11 +68,11 @@ struct Scene {
   // for all views, which means none. kStatic without views.
   CaptureKind kind() const;
   const CaptureKindInfo& capture() const { return InfoOf(kind()); }
-  // Indices of all views; those of one time, or without one, in their order.
+  // Indices of all views in order of time; views of equal time, or without one, keep their order.
   std::vector<int> ViewsInOrderOfTime() const;
-  // The views' different times, seconds, ascending.
+  // The distinct times of the views, seconds, ascending.
   std::vector<double> Times() const;
-  // The views of that view's shot, in order of time. It must have a moment.
+  // Views of the shot of `view`, in order of time. Requires: the view has a moment.
   std::vector<int> FramesOfShotOf(int view) const;
   // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.
   double Extent() const;

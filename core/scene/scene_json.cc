@@ -40,7 +40,7 @@ const char* ModelName(Distortion::Model model) {
   return "none";
 }
 
-// Reads fields and names the place ("views[3].camera.fx") when one is wrong.
+// Reads fields; errors name the place ("views[3].camera.fx").
 class Field {
  public:
   Field(const json& value, std::string place) : value_(value), place_(std::move(place)) {}
@@ -173,7 +173,7 @@ Relief ReliefFromJson(const Field& field) {
   return relief;
 }
 
-// [x, y, z, error, [views]]: there may be a million of them.
+// As [x, y, z, error, [views]], which is compact: a scene may have a million points.
 SparsePoint PointFromJson(const Field& field, int view_count) {
   if (field.ArraySize() != 5) throw field.Wrong("[x, y, z, error, [views]]");
   SparsePoint point;

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
+#include <utility>
 
 #include "tests/support/scenes/test_scenes.h"
 
@@ -28,7 +30,7 @@ TEST(Scene, HoldsOutAndFindsViews) {
   EXPECT_THROW(Scene().FindView("a"), Error);
 }
 
-TEST(Scene, ExtentIsOfTrainingCameras) {
+TEST(Scene, ExtentUsesTrainingCameras) {
   Scene scene = ArcScene(3);
   for (int i = 0; i < 3; ++i) {
     scene.views[i].cam_from_world = {};
@@ -41,7 +43,7 @@ TEST(Scene, ExtentIsOfTrainingCameras) {
   EXPECT_EQ(Scene().Extent(), 1.0);
 }
 
-TEST(Scene, FramesOfOnePoseAreAFilmUntilTheyAreARelief) {
+TEST(Scene, FramesOfOnePoseAreFilmOrRelief) {
   Scene scene = ArcScene(3);
   for (View& view : scene.views) {
     view.cam_from_world = {};
@@ -86,7 +88,7 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
   return text.replace(at, from.size(), to);
 }
 
-TEST(Scene, BrokenJsonIsRefusedByField) {
+TEST(Scene, NamesFieldOfBrokenJson) {
   const std::string good = SceneToJson(ArcScene(3));
   EXPECT_EQ(Refusal([&] { SceneFromJson(good); }), "");
   const auto said = [&](const std::string& from, const std::string& to) {
@@ -126,6 +128,36 @@ TEST(Scene, OldFilesHaveScaleOne) {
       1.0);
   text.replace(text.find(field), field.size(), "\"world_from_scene_scale\":0,");
   EXPECT_THAT(Refusal([&] { SceneFromJson(text); }), HasSubstr("must be positive"));
+}
+
+TEST(Scene, JsonHasKindAndOlderFilesOpenWithoutIt) {
+  Scene photos = ArcScene(3), dynamic = photos;
+  for (View& view : dynamic.views) view.moment = Moment{0.1, 0};
+  Scene film = dynamic;
+  for (View& view : film.views) view.cam_from_world = {};
+  Scene relief = film;
+  relief.relief = Relief{0.3, 0.5, 4.0};
+  const std::pair<Scene, CaptureKind> cases[] = {{photos, CaptureKind::kStatic},
+                                                 {dynamic, CaptureKind::kDynamic},
+                                                 {film, CaptureKind::kFilm},
+                                                 {relief, CaptureKind::kRelief}};
+  for (const auto& [scene, kind] : cases) {
+    EXPECT_EQ(scene.kind(), kind);
+    const std::string text = SceneToJson(scene);
+    const std::string field = std::string("\"kind\":\"") + InfoOf(kind).name + "\",";
+    const size_t at = text.find(field);
+    ASSERT_NE(at, std::string::npos) << text.substr(0, 200);
+    EXPECT_EQ(SceneFromJson(text).kind(), kind);
+    EXPECT_EQ(SceneFromJson(std::string(text).erase(at, field.size())).kind(), kind);
+    for (const CaptureKindInfo& other : CaptureKinds()) {
+      if (other.kind == kind) continue;
+      const std::string wrong = std::string("\"kind\":\"") + other.name + "\",";
+      const std::string changed = std::string(text).replace(at, field.size(), wrong);
+      EXPECT_THAT(Refusal([&] { SceneFromJson(changed); }), HasSubstr("kind")) << other.name;
+    }
+    const std::string unknown = std::string(text).replace(at, field.size(), "\"kind\":\"rig\",");
+    EXPECT_THAT(Refusal([&] { SceneFromJson(unknown); }), HasSubstr("no kind of scene 'rig'"));
+  }
 }
 
 }  // namespace

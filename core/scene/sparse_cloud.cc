@@ -23,7 +23,7 @@ Eigen::Vector3d MeanCenter(const Scene& scene) {
   return mean / static_cast<double>(scene.views.size());
 }
 
-// Largest distance of a camera from their mean; 1 when all stand in one place.
+// Largest distance of a camera from their mean; 1 if all are in one place.
 double Baseline(const Scene& scene, const Eigen::Vector3d& mean) {
   double radius = 0.0;
   for (const View& view : scene.views) {
@@ -38,7 +38,7 @@ bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
   return view.camera.Contains(view.camera.Project(p));
 }
 
-std::vector<int> AllThatFace(const Scene& scene, const Eigen::Vector3d& world, double near) {
+std::vector<int> AllViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
   std::vector<int> views;
   for (size_t i = 0; i < scene.views.size(); ++i) {
     if (Sees(scene.views[i], world, near)) views.push_back(static_cast<int>(i));
@@ -52,15 +52,15 @@ bool MostLookAt(const Scene& scene, const Eigen::Vector3d& world) {
   return 2 * in_front > scene.views.size();
 }
 
-// Range of depths of a view in which other views may overlap with it.
+// Range of depths at which other views may overlap with a view.
 struct DepthRange {
   double near = 0.0;
   double far = 0.0;
 };
 
-// Around the place where the axes meet. Measured on three scenes without their points (held-out
-// luminance after 800 iterations at 252 px): 0.4 to 1.4 dB better than a box around the focus,
-// which in turn is better than a range of 0.3..4, whose nearest points hide all others.
+// Range around the point where the axes meet. Measured on three scenes without their points
+// (held-out luminance after 800 iterations at 252 px): 0.4 to 1.4 dB better than a box around the
+// focus, which is better than a range of 0.3..4, whose nearest points hide all others.
 DepthRange RangeOf(const View& view, const Eigen::Vector3d& focus, double distance) {
   const double depth = std::max(view.cam_from_world.Apply(focus).z(), distance);
   return {0.6 * depth, 2.0 * depth};
@@ -89,12 +89,12 @@ Eigen::Vector3d FocusPoint(const Scene& scene) {
     b += normal * view.cam_from_world.Center();
   }
   const Eigen::Vector3d focus = a.ldlt().solve(b);
-  // Axes that diverge meet behind the cameras, which is of no use.
+  // Diverging axes meet behind the cameras; that point is useless.
   return MostLookAt(scene, focus) ? focus : fallback;
 }
 
-std::vector<int> ViewsThatFace(const Scene& scene, const Eigen::Vector3d& world, double near) {
-  return EvenlyOf(AllThatFace(scene, world, near), kMaxListedViews);
+std::vector<int> ViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
+  return EvenlyOf(AllViewsFacing(scene, world, near), kMaxListedViews);
 }
 
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed) {
@@ -105,17 +105,16 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
   double distance = 0.0;
   for (const View& view : scene.views) distance += (view.cam_from_world.Center() - focus).norm();
   distance /= static_cast<double>(scene.views.size());
-  // Cameras that look outward from one place: the scene is around them.
+  // Cameras look outward from one place: the scene is around them.
   if (!MostLookAt(scene, focus)) distance = std::max(distance, 5.0 * Baseline(scene, mean));
   const double near = 0.15 * distance;
   const size_t wanted_views = std::max<size_t>(2, (scene.views.size() + 3) / 4);
-  // Views that do not overlap at all would never give a point: after enough misses one view does.
+  // Views without any overlap would never give a point: after enough misses one view is enough.
   const int64_t patience = int64_t{10} * count;
   Random random(seed);
   for (int64_t attempt = 0; attempt < 2 * patience; ++attempt) {
     if (static_cast<int>(points.size()) == count) break;
-    // A pixel of one view after the other, at a depth that is uniform in 1 / z: what other views
-    // can tell apart (parallax) is, too.
+    // Picks pixels of all views in turn, at a depth uniform in 1 / z, as parallax is.
     const View& view = scene.views[attempt % static_cast<int64_t>(scene.views.size())];
     const DepthRange range = RangeOf(view, focus, 0.3 * distance);
     const double z = 1.0 / random.NextUniform(1.0 / range.far, 1.0 / range.near);
@@ -123,7 +122,7 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     const double v = random.NextUniform(0.0, view.camera.height);
     SparsePoint point;
     point.position = view.cam_from_world.WorldFromCamera(z * view.camera.Ray(u, v));
-    point.views = AllThatFace(scene, point.position, near);
+    point.views = AllViewsFacing(scene, point.position, near);
     const bool relaxed = attempt >= patience;
     if (point.views.size() < (relaxed ? 1 : std::min(wanted_views, scene.views.size()))) continue;
     point.views = EvenlyOf(std::move(point.views), kMaxListedViews);

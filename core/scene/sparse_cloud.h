@@ -1,5 +1,5 @@
-// A start for reconstruction when a scene comes with poses but without sparse points. For this
-// folder only.
+// Initial points for reconstruction if a scene has poses but no sparse points. For this folder
+// only.
 #pragma once
 
 #include <cstdint>
@@ -9,17 +9,17 @@
 
 namespace color3d {
 
-// The point closest to all optical axes, in front of the cameras. When the axes are nearly parallel
-// it is pulled to where they would meet if the scene were three baselines away.
+// Returns the point closest to all optical axes, in front of the cameras. For nearly parallel axes
+// it is pulled towards where they would meet three baselines away.
 Eigen::Vector3d FocusPoint(const Scene& scene);
 
-// Views, ascending, into whose picture a point falls that is further than `near` (scene units)
-// from them; of more than 64 an even choice, so that a long film's points stay small.
-std::vector<int> ViewsThatFace(const Scene& scene, const Eigen::Vector3d& world, double near);
+// Returns the views, ascending, whose picture contains a point that is farther than `near` (scene
+// units) from them; if there are more than 64, an even selection, to bound the size of long films.
+std::vector<int> ViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near);
 
-// Up to `count` points in the views' frusta that at least two (or a quarter, whichever is more) of
-// the views see: on random pixels, uniform in inverse depth around the focus. Deterministic for a
-// seed. Each lists ViewsThatFace; the reprojection error is -1 (unknown).
+// Returns up to `count` points that at least two views, or a quarter of them if that is more, see:
+// on random pixels, uniform in inverse depth around the focus. Deterministic for a seed. Each lists
+// ViewsFacing; the reprojection error is -1 (unknown).
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed);
 
 }  // namespace color3d

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-TEST(SparseCloud, FocusOfConvergingParallelAndDivergingCameras) {
+TEST(SparseCloud, FindsFocusOfAnyCameraArrangement) {
   EXPECT_LT(FocusPoint(ArcScene(7)).norm(), 0.05);
   Scene parallel = ArcScene(5);
   for (int i = 0; i < 5; ++i) {
@@ -28,7 +28,7 @@ TEST(SparseCloud, FocusOfConvergingParallelAndDivergingCameras) {
   EXPECT_GE(in_front, 3);
 }
 
-TEST(SparseCloud, CamerasInOnePlaceOrWithoutOverlapStillGivePoints) {
+TEST(SparseCloud, GivesPointsWithoutBaselineOrOverlap) {
   Scene one_place = ArcScene(3);
   for (View& view : one_place.views) view.cam_from_world = one_place.views[0].cam_from_world;
   EXPECT_EQ(RandomPoints(one_place, 500, 1).size(), 500u);

@@ -25,8 +25,8 @@
 namespace color3d {
 namespace {
 
-// For every pixel of the undistorted picture, the place in the (reduced) photo, with pixel centres
-// at whole numbers.
+// Position in the (reduced) photo for every pixel of the undistorted picture; pixel centres are at
+// integers.
 struct RemapTable {
   int width = 0;
   int height = 0;
@@ -60,8 +60,8 @@ std::array<float, 4> CubicWeights(float t) {
           0.5f * t3 - 0.5f * t2};
 }
 
-// Bicubic, because bilinear would blur every photo; ringing is cut at each channel's own range.
-// Border pixels are continued outward.
+// Bicubic, since bilinear would blur every photo; overshoot is clamped to each channel's own range.
+// Border pixels are replicated.
 Image Remap(const Image& image, const RemapTable& table) {
   Image out(table.width, table.height, image.channels);
   std::vector<std::pair<float, float>> range;
@@ -114,9 +114,9 @@ struct ViewImages::Impl {
   const int max_side_px;
   const int64_t budget_bytes;
 
-  std::vector<int> lens_of_view;   // index of the first view with the same lens
-  std::deque<std::mutex> loading;  // one per view: a picture is decoded once, not twice
-  std::mutex mutex;                // guards all below
+  std::vector<int> lens_of_view;                       // index of the first view with the same lens
+  std::deque<std::mutex> loading;                      // one per view: each picture is decoded once
+  std::mutex mutex;                                    // guards all below
   std::map<int, std::shared_ptr<const Image>> cached;  // by view; masks by MaskKey()
   std::list<int> recent;                               // most recently used first
   int64_t cached_bytes = 0;
@@ -142,8 +142,8 @@ struct ViewImages::Impl {
     return scene.views[view];
   }
 
-  // Undistortion runs at no more than twice the working size: sharp enough, and tables and times
-  // stay small for photos of 50 megapixels.
+  // Undistortion runs at no more than twice the working size: sharp enough, and it bounds tables
+  // and times for photos of 50 megapixels.
   int RemapSide() const { return max_side_px > 0 ? 2 * max_side_px : 0; }
 
   std::shared_ptr<const RemapTable> TableOf(int view) {
@@ -175,15 +175,15 @@ struct ViewImages::Impl {
                           Size(width, height));
   }
 
-  // The size at which a picture of the size `own` is undistorted: the working size where there is
-  // nothing to undistort.
+  // Size at which a picture of size `own` is undistorted; the working size if there is no
+  // distortion.
   PictureSize SizeBeforeRemap(const View& v, const PictureSize& own) const {
     if (!IsUndistorted(v.distortion)) return SizeWithin(own, RemapSide());
     const Camera working = v.camera.FitWithin(max_side_px);
     return {working.width, working.height};
   }
 
-  // Of a picture that has that size.
+  // Requires: the picture has that size.
   Image FromSizeBeforeRemap(int view, Image picture) {
     const View& v = At(view);
     if (IsUndistorted(v.distortion)) return picture;

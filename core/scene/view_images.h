@@ -1,5 +1,5 @@
 // Pictures of a scene's views: decoded, undistorted, reduced to a working size, converted to L, and
-// kept in a cache with a byte budget, so that memory does not grow with the number of photos.
+// cached within a budget in bytes, so that memory does not grow with the number of photos.
 // Thread-safe. Resampled as sRGB (bicubic at up to twice the working size, then area-averaged), so
 // that Luminance() is exactly the L of Srgb().
 #pragma once
@@ -27,16 +27,15 @@ class ViewImages {
   Camera WorkingCamera(int view) const;
   // 1 channel, L in 0..100, captured precision.
   std::shared_ptr<const Image> Luminance(int view) const;
-  // 1 channel, 1 where the photo counts and 0 where it is masked out, also in part; null: all
-  // counts.
+  // 1 channel: 1 where the photo is used, 0 where it is masked out, even in part; null: no mask.
   std::shared_ptr<const Image> Mask(int view) const;
   // 3 channels, sRGB 0..1 (grey photos: three equal channels). Not cached.
   Image Srgb(int view) const;
-  // Any picture (1..4 channels) that has the size of the view's photo as captured, after EXIF
-  // orientation: undistorted and reduced in the same way. Throws Error{kInvalidArgument} with both
-  // sizes when the size is another.
+  // Undistorts and reduces any picture (1..4 channels) of the size of the captured photo after EXIF
+  // orientation, in the same way. Throws Error{kInvalidArgument} with both sizes if its size
+  // differs.
   Image Undistort(int view, const Image& captured) const;
-  // The same of a picture in a file, in little memory. Channels as ReadImage gives them.
+  // As Undistort for a picture in a file, with little memory. Channels as from ReadImage.
   Image UndistortFile(int view, const std::filesystem::path& file) const;
 
  private:

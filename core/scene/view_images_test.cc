@@ -31,7 +31,7 @@ Image CoordinatePhoto(int width, int height) {
   return image;
 }
 
-TEST(ViewImages, UndistortionMatchesThePinholeProjection) {
+TEST(ViewImages, UndistortionMatchesPinholeProjection) {
   for (const Distortion& distortion :
        {kBarrel, Distortion{Distortion::Model::kFisheye, {0.02, -0.01}}}) {
     Scene scene = ArcScene(2, distortion);
@@ -70,7 +70,7 @@ TEST(ViewImages, UndistortionMatchesThePinholeProjection) {
   }
 }
 
-TEST(ViewImages, WithoutDistortionAtFullSizeThePhotoIsUntouched) {
+TEST(ViewImages, KeepsUndistortedPhotoAtFullSize) {
   const ScratchFolder folder;
   const Scene scene = ArcScene(2);
   WritePhotos(scene, folder.path());
@@ -81,7 +81,7 @@ TEST(ViewImages, WithoutDistortionAtFullSizeThePhotoIsUntouched) {
   EXPECT_EQ(images.Luminance(0)->data, LuminanceFromSrgb(photo).data);
 }
 
-TEST(ViewImages, LuminanceIsOfTheSamePictureAsSrgb) {
+TEST(ViewImages, LuminanceIsThatOfSrgb) {
   const ScratchFolder folder;
   Scene scene = ArcScene(1, kBarrel);
   std::filesystem::create_directories(folder.path() / "images");
@@ -93,7 +93,7 @@ TEST(ViewImages, LuminanceIsOfTheSamePictureAsSrgb) {
   EXPECT_EQ(images.Luminance(0)->data, LuminanceFromSrgb(srgb).data);
 }
 
-TEST(ViewImages, WrongSizesAndNumbersAreRefused) {
+TEST(ViewImages, RefusesWrongSizesAndNumbers) {
   const ScratchFolder folder;
   const Scene scene = ArcScene(1);
   std::filesystem::create_directories(folder.path() / "images");
@@ -106,7 +106,7 @@ TEST(ViewImages, WrongSizesAndNumbersAreRefused) {
   EXPECT_THAT(Refusal([&] { images.WorkingCamera(-1); }), HasSubstr("view -1 does not exist"));
 }
 
-TEST(ViewImages, CacheStaysWithinItsBudget) {
+TEST(ViewImages, CacheStaysWithinBudget) {
   const ScratchFolder folder;
   const Scene scene = ArcScene(6);
   WritePhotos(scene, folder.path());
@@ -126,7 +126,7 @@ TEST(ViewImages, CacheStaysWithinItsBudget) {
   EXPECT_TRUE(uncached.expired());
 }
 
-TEST(ViewImages, ManyThreadsGetTheSamePictures) {
+TEST(ViewImages, ThreadsGetSamePictures) {
   const ScratchFolder folder;
   const Scene scene = ArcScene(8, kBarrel);
   WritePhotos(scene, folder.path());

@@ -1,7 +1,7 @@
-// Which instruction set the numeric kernels use. The kernels are compiled once per
-// set (Highway's foreach_target) and chosen when the program runs: the best that the machine has,
-// unless the environment variable COLOR3D_ISA names a lesser one (portable, sse4, avx2, avx512;
-// neon). Thread-safe, but a change in the middle of a training changes its last digits.
+// Instruction set of the numeric kernels. The kernels are compiled once per set (Highway's
+// foreach_target) and selected at run time: the best set of the machine, unless the environment
+// variable COLOR3D_ISA names a lesser one (portable, sse4, avx2, avx512; neon). Thread-safe, but a
+// change during training changes the last digits of its results.
 #pragma once
 
 // Compiled: a fallback for any machine, SSE4, AVX2 and AVX-512, or NEON. The vector types are
@@ -18,15 +18,15 @@
 
 namespace color3d {
 
-// The set in use: "portable", "sse4", "avx2", "avx512" or "neon". Throws
-// Error{kInvalidArgument} when COLOR3D_ISA names a set that this machine does not have.
+// The set in use: "portable", "sse4", "avx2", "avx512" or "neon". Throws Error{kInvalidArgument} if
+// COLOR3D_ISA names a set that this machine does not support.
 std::string_view ActiveInstructionSet();
 
-// The sets that this machine can run, the best one first.
+// Sets that this machine supports, best first.
 std::vector<std::string> SupportedInstructionSets();
 
-// Uses `name` from now on, the best set when it is empty. Throws Error{kInvalidArgument} for a name
-// that is not supported here.
+// Selects `name` from now on, or the best set if it is empty. Throws Error{kInvalidArgument} if
+// this machine does not support it.
 void LimitInstructionSet(std::string_view name);
 
 // Reads COLOR3D_ISA at the first call; every kernel is entered through it.
@@ -34,6 +34,6 @@ void ApplyInstructionSetLimit();
 
 }  // namespace color3d
 
-// The chosen set's version of a function named in HWY_EXPORT.
+// The selected set's version of a function named in HWY_EXPORT.
 #define COLOR3D_KERNEL(FUNCTION) \
   (::color3d::ApplyInstructionSetLimit(), HWY_DYNAMIC_DISPATCH(FUNCTION))

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-TEST(InstructionSetsTest, TheBestIsTheDefaultAndUnknownNamesAreRefused) {
+TEST(InstructionSetsTest, DefaultsToBestAndRejectsUnknownNames) {
   LimitInstructionSet("");
   EXPECT_EQ(ActiveInstructionSet(), SupportedInstructionSets().front());
   EXPECT_THROW(LimitInstructionSet("avx1024"), Error);

@@ -24,7 +24,7 @@ struct CacheLineAllocator {
 using AlignedFloats = std::vector<float, CacheLineAllocator<float>>;
 
 // Planar picture whose rows and height are padded to multiples of 16 (whole tiles, whole vectors).
-// What lies outside width x height is never read as a pixel.
+// The padding is never read as pixels.
 struct PlaneBuffer {
   int width = 0;
   int height = 0;

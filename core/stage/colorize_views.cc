@@ -13,7 +13,7 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kColoredFramesCacheBytes = int64_t{32}
-                                             << 20;  // neighbours are read several times
+                                             << 20;  // neighbouring views are read several times
 
 }  // namespace
 
@@ -32,7 +32,7 @@ ColorSources SourcesOf(const Colorizer& colorizer,
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder) {
   CheckMaxSide(max_side_px);
   const Scene scene = ReadScene(context);
-  // Views are coloured side by side, each on one thread.
+  // Colours views concurrently, each on one thread.
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
   const ViewPositions positions(scene, context);

@@ -47,7 +47,7 @@ class ColorizeViewsTest : public StageTest {
   Scene scene_;
 };
 
-TEST_F(ColorizeViewsTest, AFilmOfWhatStandsStillIsColouredAsPhotosAre) {
+TEST_F(ColorizeViewsTest, ColorsFilmOfStaticSceneLikePhotos) {
   const std::vector<std::string> photos = Colored(SmallModel());
   MakeFilm();
   EXPECT_EQ(Colored(SmallModel()), photos);

@@ -140,7 +140,7 @@ class HeldOutScores {
                 const std::optional<GaussianModel>& model,
                 const std::optional<GaussianModel>& bound,
                 StageContext& context)
-      : scene_(scene), how_(HowHeldOut(scene)), model_(model), bound_(bound), context_(context) {}
+      : scene_(scene), how_(HeldOutKinds(scene)), model_(model), bound_(bound), context_(context) {}
 
   void Add(int index, const std::filesystem::path& truth) {
     const View& view = scene_.views[index];

@@ -24,11 +24,11 @@ using Kind = AugmentationKind;
 using nlohmann::ordered_json;
 
 constexpr int kMaxSamples = 64;
-constexpr int kRemoteSidePx = 1024;  // what a model server is given
+constexpr int kRemoteSidePx = 1024;  // longer side of pictures sent to model servers
 constexpr int kThumbnailPx = 320;
-// The key view shows so much of the scene that there is nothing to invent around it.
+// Coverage of the scene by the key view above which no pictures are generated.
 constexpr double kNothingToOutpaint = 0.9;
-// The paper's eight in the order in which fewer are taken.
+// The eight pictures of the paper, in order of priority.
 constexpr Kind kOrder[] = {Kind::kNovelView,
                            Kind::kOutpaint,
                            Kind::kNovelView,
@@ -46,7 +46,7 @@ struct Outcome {
   }
 };
 
-// How many of each kind; kinds that are switched off give their turns to nobody.
+// Number of pictures of each kind. Turns of disabled kinds are dropped.
 std::map<Kind, int> Deal(const AugmentationOptions& options) {
   std::map<Kind, int> counts;
   for (int i = 0; i < options.samples; ++i) {
@@ -59,7 +59,7 @@ std::map<Kind, int> Deal(const AugmentationOptions& options) {
   return counts;
 }
 
-// The coloured key view at a working size.
+// Coloured key view at working size.
 Image KeyLab(const Scene& scene, int key, int max_side_px, const StageContext& context) {
   const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
@@ -79,7 +79,7 @@ KeyPicture ReadKeyPicture(const Scene& scene,
   return picture;
 }
 
-// Pictures of the kinds that the backend claims; those of the others stay in `counts`.
+// Requests pictures of the kinds that the backend supports. Other kinds stay in `counts`.
 void TakeFromBackend(const AugmentationOptions& options,
                      const Image& key_srgb,
                      StageContext& context,
@@ -107,12 +107,12 @@ void TakeFromBackend(const AugmentationOptions& options,
   }
   if (asked || counts->empty()) return;
   throw Error(ErrorCode::kFailedPrecondition,
-              "the backend '{}' generates none of the pictures that are asked for (outpaint, "
-              "animate, novel_view); leave it out to use the embedded ones",
+              "the backend '{}' generates none of the requested pictures (outpaint, "
+              "animate, novel_view); omit it to use the embedded surrogates",
               options.backend);
 }
 
-// Pictures of the luminance geometry at that time, when it is among the inputs.
+// Renders the luminance geometry at that time, if it is among the inputs.
 GeometryRenderer RendererFrom(double time_s, StageContext& context) {
   if (!context.HasInput(artifact::kGeometry)) return {};
   const auto model =
@@ -147,7 +147,7 @@ void MakeSurrogates(const std::map<Kind, int>& counts,
     }
     if (!obstacle.empty()) outcome->LeaveOut(name, obstacle);
     if (poor > 0) {
-      outcome->LeaveOut(name, fmt::format("{} would show hardly anything of the key view", poor));
+      outcome->LeaveOut(name, fmt::format("{} would show almost nothing of the key view", poor));
     }
   }
 }
@@ -174,7 +174,7 @@ void LeaveOutNeedless(const AugmentationOptions& options,
   }
 }
 
-// What is masked out must not be learnt from, and pictures made from it do not tell where it is.
+// Masked pixels must not be learnt, and their places in generated pictures are unknown.
 void LeaveOutMasked(std::map<Kind, int>* counts, Outcome* outcome) {
   for (const auto& [kind, count] : *counts) {
     outcome->LeaveOut(AugmentationKindName(kind), "parts of the key view are masked out");
@@ -241,8 +241,8 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
     outcome.made = AugmentationsFromFiles(options.max_side_px, context);
     if (outcome.made.empty()) {
       throw InvalidArgument(
-          "the user's own pictures are asked for, but the scene has none in augment/; add some or "
-          "leave the option `files` out");
+          "the option `files` is set, but the scene has no pictures in augment/; add some or "
+          "omit the option");
     }
   }
   const KeyPicture key = ReadKeyPicture(scene, key_index, options.max_side_px, context);

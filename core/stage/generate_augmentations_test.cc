@@ -14,7 +14,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-TEST_F(AugmentationStageTest, EightPicturesAreMadeWithGeometry) {
+TEST_F(AugmentationStageTest, MakesEightPicturesWithGeometry) {
   AddGeometry();
   const auto facts = Run();
   EXPECT_THAT(Names(facts),
@@ -47,7 +47,7 @@ TEST_F(AugmentationStageTest, EightPicturesAreMadeWithGeometry) {
   EXPECT_EQ(DecodeImage(Output("augmentations.jpg"), "sheet").channels, 3);
 }
 
-TEST_F(AugmentationStageTest, ANovelViewShiftsTheWallAsItsCameraDoes) {
+TEST_F(AugmentationStageTest, NovelViewShiftsWallByDisparity) {
   AddGeometry();
   options_.outpaint = options_.animate = false;
   const auto facts = Run();
@@ -62,7 +62,7 @@ TEST_F(AugmentationStageTest, ANovelViewShiftsTheWallAsItsCameraDoes) {
   EXPECT_NE(right.ab.data, left.ab.data);
 }
 
-TEST_F(AugmentationStageTest, WithoutGeometryThereAreNoNovelViewsAndTheReasonIsSaid) {
+TEST_F(AugmentationStageTest, ReportsMissingNovelViewsWithoutGeometry) {
   const auto facts = Run();
   EXPECT_EQ(facts.at("samples").size(), 5u);
   ASSERT_EQ(facts.at("left_out").size(), 1u);
@@ -70,7 +70,7 @@ TEST_F(AugmentationStageTest, WithoutGeometryThereAreNoNovelViewsAndTheReasonIsS
   EXPECT_THAT(facts.at("left_out")[0].at("reason").get<std::string>(), HasSubstr("no luminance"));
 }
 
-TEST_F(AugmentationStageTest, NothingIsInventedAroundAKeyViewThatCoversTheScene) {
+TEST_F(AugmentationStageTest, MakesNothingIfKeyViewCoversTheScene) {
   AddInput(artifact::kCarryFacts, R"({"coverage": 0.95})");
   options_.novel_views = false;
   const auto facts = Run();
@@ -78,7 +78,7 @@ TEST_F(AugmentationStageTest, NothingIsInventedAroundAKeyViewThatCoversTheScene)
   EXPECT_THAT(facts.at("left_out").dump(), AllOf(HasSubstr("95 %"), HasSubstr("not asked for")));
 }
 
-TEST_F(AugmentationStageTest, NothingIsMadeFromAKeyViewThatIsMaskedInPart) {
+TEST_F(AugmentationStageTest, MakesNothingFromPartlyMaskedKeyView) {
   Write("m.png", EncodePng8(Image(kWidth, kHeight, 1, 1.0f)));
   scene_.views[1].mask_file = "m.png";
   AddInput(artifact::kScene, SceneToJson(scene_));
@@ -87,12 +87,12 @@ TEST_F(AugmentationStageTest, NothingIsMadeFromAKeyViewThatIsMaskedInPart) {
   EXPECT_THAT(facts.dump(), testing::HasSubstr("masked out"));
 }
 
-TEST_F(AugmentationStageTest, DamagedFactsOfTheCarryAreRefused) {
+TEST_F(AugmentationStageTest, RefusesDamagedCarryFacts) {
   AddInput(artifact::kCarryFacts, R"({"coverage": "most"})");
   EXPECT_THAT(Complaint(), HasSubstr("carry.json is damaged"));
 }
 
-TEST_F(AugmentationStageTest, NoSamplesAndNoFilesLeaveNothing) {
+TEST_F(AugmentationStageTest, WritesNothingWithoutSamplesAndFiles) {
   options_.samples = 0;
   EXPECT_THAT(Names(Run()), IsEmpty());
   EXPECT_THAT(outputs_, ElementsAre("augmentations.json"));
@@ -100,7 +100,7 @@ TEST_F(AugmentationStageTest, NoSamplesAndNoFilesLeaveNothing) {
   EXPECT_THAT(Complaint(), HasSubstr("samples is 65"));
 }
 
-TEST_F(AugmentationStageTest, TheSameSeedGivesTheSameBytes) {
+TEST_F(AugmentationStageTest, IsRepeatableForSameSeed) {
   AddGeometry();
   Run();
   std::map<std::string, std::string> first;
@@ -109,10 +109,10 @@ TEST_F(AugmentationStageTest, TheSameSeedGivesTheSameBytes) {
   for (const std::string& name : outputs_) EXPECT_EQ(Output(name), first.at(name)) << name;
 }
 
-TEST_F(AugmentationStageTest, TheUsersOwnPicturesAreTakenAtWorkingSize) {
+TEST_F(AugmentationStageTest, ReducesFilesToWorkingSize) {
   options_.samples = 0;
   options_.files = true;
-  EXPECT_THAT(Complaint(), HasSubstr("none in augment/"));
+  EXPECT_THAT(Complaint(), HasSubstr("no pictures in augment/"));
   Write("augment/sub/wide.jpg", EncodeJpeg(SrgbFromLab(Painting(300, 100))));
   Write("augment/a.png", EncodePng16(SrgbFromLab(Painting(64, 80))));
   const auto facts = Run();
@@ -124,7 +124,7 @@ TEST_F(AugmentationStageTest, TheUsersOwnPicturesAreTakenAtWorkingSize) {
   EXPECT_THAT(Names(Run()), IsEmpty()) << "nobody asked for them";
 }
 
-TEST_F(AugmentationStageTest, FilesThatDoNotBelongInAugmentAreRefusedByName) {
+TEST_F(AugmentationStageTest, NamesUnusableFiles) {
   options_.samples = 0;
   options_.files = true;
   const auto complaint = [&](const std::string& name, const std::string& bytes) {
@@ -153,7 +153,7 @@ TEST_F(AugmentationStageTest, FilesThatDoNotBelongInAugmentAreRefusedByName) {
               HasSubstr("more than 64"));
 }
 
-TEST_F(AugmentationStageTest, AGeneratorMakesWhatItClaimsAndTheRestIsOurs) {
+TEST_F(AugmentationStageTest, UsesGeneratorForClaimedKinds) {
   options_.backend = "mine";
   const auto facts = Run();
   EXPECT_THAT(FakeGenerator::requests, ElementsAre("outpaint 4"));
@@ -165,7 +165,7 @@ TEST_F(AugmentationStageTest, AGeneratorMakesWhatItClaimsAndTheRestIsOurs) {
   EXPECT_EQ(facts.at("samples")[4].at("source"), "embedded");
 }
 
-TEST_F(AugmentationStageTest, BadAnswersOfAGeneratorAreRefused) {
+TEST_F(AugmentationStageTest, RefusesBadAnswersOfGenerator) {
   options_.backend = "mine";
   FakeGenerator::answer = "nothing that is a picture";
   EXPECT_THAT(Complaint(), AllOf(HasSubstr("'mine'"), HasSubstr("outpaint")));
@@ -176,7 +176,7 @@ TEST_F(AugmentationStageTest, BadAnswersOfAGeneratorAreRefused) {
   EXPECT_THAT(Complaint(), HasSubstr("generates none"));
 }
 
-TEST_F(AugmentationStageTest, EndsWhenItIsCancelled) {
+TEST_F(AugmentationStageTest, StopsWhenCancelled) {
   cancel_.Cancel();
   Complaint();
   EXPECT_EQ(code_, ErrorCode::kCancelled);

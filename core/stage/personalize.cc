@@ -24,7 +24,8 @@ void ExpectShapeOf(const Image& luminance, StageContext& context) {
   const double height = static_cast<double>(luminance.width) / color.width * color.height;
   if (std::abs(height - luminance.height) <= 1.0 + 0.01 * luminance.height) return;
   throw InvalidArgument(
-      "{} is {}x{} px, the key view {}: its shape is another; colour the photo that is the key "
+      "{} is {}x{} px, but the key view {}: the aspect ratio differs; colour the photo that is the "
+      "key "
       "view",
       artifact::kKeyColor,
       color.width,
@@ -32,23 +33,23 @@ void ExpectShapeOf(const Image& luminance, StageContext& context) {
       SizeText(luminance));
 }
 
-// The key view in colour; what the user left unpainted or masked out is not learnt from.
+// Returns the coloured key view. Unpainted and masked pixels have weight 0.
 TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageContext& context) {
   ExpectShapeOf(luminance, context);
   CarriedColor color = ReadKeyColor(context, luminance.width, luminance.height);
   ClearMasked(mask, &color.confidence);
   const ChromaLevel chroma = MeasureChroma(JoinLab(luminance, color.ab));
   if (chroma.IsGray()) {
-    context.progress().OnWarning(fmt::format(
-        "the coloured key view has hardly any colour (mean chroma {:.2f} Lab units), so "
-        "the scene will stay grey; colour it by another means, e.g. hints or a picture",
-        chroma.mean));
+    context.progress().OnWarning(
+        fmt::format("the coloured key view has almost no colour (mean chroma {:.2f} Lab units), so "
+                    "the scene will stay grey; colour it with hints or a picture",
+                    chroma.mean));
   }
   TrainingPicture picture{"the key view", luminance, std::move(color.ab)};
   const auto unpainted = [](float confidence) { return confidence == 0.0f; };
   if (std::all_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
     throw InvalidArgument(
-        "what is painted on the key view (and not masked out) is too fine to be seen at {} px; "
+        "the painted (and unmasked) parts of the key view are too fine at {} px; "
         "paint areas, or give the picture as strokes, which spread",
         SizeText(luminance));
   }
@@ -59,11 +60,11 @@ TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageConte
   return picture;
 }
 
-// Views that carried colours are learnt from: the best covered ones that are not the key view.
+// Views with carried colours for training: those of highest coverage, without the key view.
 constexpr int kMaxCarriedViews = 12;
-constexpr size_t kMaxViewsToLookAt = 120;  // of a film
+constexpr size_t kMaxViewsToLookAt = 120;  // frames of a film to consider
 constexpr double kMinCoverage = 0.05;
-constexpr double kCarriedShare = 0.5;  // of the samples
+constexpr double kCarriedShare = 0.5;  // share of the samples
 
 std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
                                              int key,
@@ -81,7 +82,7 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
     for (float& value : carried.confidence.data) {
       if (value < kTrainingConfidence) value = 0.0f;
     }
-    // The best so far, best first; those of equal coverage in their order.
+    // Best ones so far, best first; ties in order.
     const auto place =
         std::upper_bound(found.begin(), found.end(), coverage, [](double value, const auto& other) {
           return value > other.first;

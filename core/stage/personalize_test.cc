@@ -31,15 +31,15 @@ class PersonalizeStageTest : public AugmentationStageTest {
   Warnings warnings_;
 };
 
-TEST_F(PersonalizeStageTest, AKeyViewWithoutColourIsSaid) {
+TEST_F(PersonalizeStageTest, ReportsKeyViewWithoutColor) {
   Personalize();
   EXPECT_EQ(warnings_.text, "");
   AddInput(artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, 0.3f)));
   Personalize();
-  EXPECT_THAT(warnings_.text, AllOf(HasSubstr("hardly any colour"), HasSubstr("hints")));
+  EXPECT_THAT(warnings_.text, AllOf(HasSubstr("almost no colour"), HasSubstr("hints")));
 }
 
-TEST_F(PersonalizeStageTest, AKeyColourOfAnotherShapeIsRefused) {
+TEST_F(PersonalizeStageTest, RefusesKeyColorOfAnotherShape) {
   AddInput(artifact::kKeyColor, EncodeAbPng(Image(kHeight, kWidth, 2, 30.0f)));
   try {
     Personalize();
@@ -53,7 +53,7 @@ TEST_F(PersonalizeStageTest, AKeyColourOfAnotherShapeIsRefused) {
 }
 
 // Its grey would answer for every other view's, too.
-TEST_F(PersonalizeStageTest, WhatIsLeftUnpaintedIsNotLearntFrom) {
+TEST_F(PersonalizeStageTest, IgnoresUnpaintedPixels) {
   Image ab(kWidth, kHeight, 2, 30.0f), painted(kWidth, kHeight, 1, 1.0f);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = kWidth / 2; x < kWidth; ++x) {
@@ -75,7 +75,7 @@ TEST_F(PersonalizeStageTest, WhatIsLeftUnpaintedIsNotLearntFrom) {
   EXPECT_GT(right_of(painted), 15.0) << "not painted";
 }
 
-TEST_F(PersonalizeStageTest, WhatIsMaskedOutIsNotLearntFrom) {
+TEST_F(PersonalizeStageTest, IgnoresMaskedPixels) {
   Image mask(kWidth, kHeight, 1, 1.0f);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = kWidth / 2; x < kWidth; ++x) mask.At(0, y, x) = 0.0f;
@@ -99,7 +99,7 @@ TEST_F(PersonalizeStageTest, WhatIsMaskedOutIsNotLearntFrom) {
   EXPECT_NEAR(learnt(-60.0f), learnt(30.0f), 3.0);
 }
 
-TEST_F(PersonalizeStageTest, APaintedPartThatIsTooFineIsRefused) {
+TEST_F(PersonalizeStageTest, RefusesPaintedPartThatIsTooFine) {
   Image ab(4 * kWidth, 4 * kHeight, 2, 30.0f), painted(4 * kWidth, 4 * kHeight, 1);
   for (int x = 0; x < painted.width; ++x) painted.At(0, 10, x) = 1.0f;
   AddInput(artifact::kKeyColor, EncodeAbPng(ab, painted));
@@ -112,7 +112,7 @@ TEST_F(PersonalizeStageTest, APaintedPartThatIsTooFineIsRefused) {
   }
 }
 
-TEST_F(PersonalizeStageTest, GeneratedPicturesAreLearntFrom) {
+TEST_F(PersonalizeStageTest, TrainsOnGeneratedPictures) {
   // Not the key view itself, whose own cells would answer.
   const Image luminance = LuminanceOfLab(Painting(kWidth / 2, kHeight));
   const auto colors = [&] {

@@ -33,7 +33,7 @@ const char* StrategyName(KeyViewStrategy strategy) {
   return "coverage";
 }
 
-// Per sparse point the candidates that see it. Empty when the points are made up.
+// For each sparse point the candidates that see it. Empty if the points are synthetic.
 std::vector<std::vector<int>> TracksOf(const Scene& scene,
                                        const std::vector<int>& candidates,
                                        const StageContext& context) {
@@ -77,8 +77,8 @@ void ChooseManually(const std::string& name,
   }
 }
 
-// Several at once; a view that the user names stays the first. What the views see of each other
-// comes from geometry where a job has made some.
+// Selects several key views. A view that the user names remains the first. Visibility between views
+// comes from the geometry of an earlier job, if there is one.
 void ChooseTogether(const SelectKeyViewOptions& options,
                     const Scene& scene,
                     const std::vector<int>& candidates,
@@ -140,13 +140,13 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
     descriptors.push_back(view.descriptor);
     contents.push_back(view.content);
   }
-  std::vector<int> shots;  // of a film
+  std::vector<int> shots;  // shots of a film
   if (!scene.capture().is_reconstructed) {
     for (const int view : candidates) shots.push_back(scene.views[view].moment->shot);
   }
   GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents, shots), options, shots);
   const std::vector<bool> kept = guarded.Kept();
-  // A view that the user names is the first of several; the others stand in the sheet by coverage.
+  // A view that the user names is the first of several. The sheet lists the others by coverage.
   KeyViewStrategy strategy =
       options.strategy == KeyViewStrategy::kManual ? KeyViewStrategy::kCoverage : options.strategy;
   std::vector<double> scores;
@@ -176,7 +176,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   if (options.count > 1) ChooseTogether(stage_options, scene, candidates, kept, context, ranking);
 }
 
-// The views that the guard set aside, by the names that the user knows.
+// Names of the views that the guard excluded.
 void WarnOfViewsSetAside(const KeyViewRanking& ranking, ProgressObserver& progress) {
   constexpr int kMaxNamed = 8;
   std::string names;
@@ -194,12 +194,12 @@ void WarnOfViewsSetAside(const KeyViewRanking& ranking, ProgressObserver& progre
 
 void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context) {
   const Scene scene = ReadScene(context);
-  // A held-out view must never lend its colour.
+  // Colours of held-out views must not be used.
   std::vector<int> candidates = scene.TrainingViews();
   if (!scene.capture().is_reconstructed || scene.capture().is_dynamic)
     candidates = CandidatesOfFilm(scene, options.view);
   if (options.selection.count > static_cast<int>(candidates.size())) {
-    throw InvalidArgument("{} key views are asked for; the scene has {} training views",
+    throw InvalidArgument("{} key views are requested, but the scene has only {} training views",
                           options.selection.count,
                           candidates.size());
   }
@@ -216,7 +216,7 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   }
   WarnOfViewsSetAside(ranking, context.progress());
   const View& key = scene.views[candidates[ranking.selection.index]];
-  // The photo as captured, in grey: what the user colours.
+  // The photo as captured, in grey, for the user to colour.
   Image gray = LuminanceFromSrgb(
       ReadKeyPhoto(context.scene_folder() / key.image_file, context.MemoryBytes()));
   for (float& v : gray.data) v = static_cast<float>(GrayFromLuminance(v));

@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, AManualKeyViewMayNotBeHeldOut) {
+TEST_F(StageTest, RefusesHeldOutManualKeyView) {
   const Scene scene = RampScene(scratch_.path(), 48, 32);
   AddInput(artifact::kScene, SceneToJson(scene));
   StageContext context = MakeContext();

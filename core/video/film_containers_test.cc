@@ -37,7 +37,7 @@ void ExpectEveryFrame(const fs::path& file, int frames) {
   for (int i = frames - 1; i >= 0; i -= 5) ASSERT_EQ(NumberOf(strides.Read(i)), i);
 }
 
-TEST_F(FilmContainersTest, EveryFrameOfEveryContainerIsFound) {
+TEST_F(FilmContainersTest, FindsEveryFrameOfEveryContainer) {
   const struct {
     const char* encoder;
     const char* name;
@@ -71,13 +71,13 @@ TEST_F(FilmContainersTest, EveryFrameOfEveryContainerIsFound) {
   }
 }
 
-TEST_F(FilmContainersTest, TwoPicturesInAPacketAreTwoFrames) {
+TEST_F(FilmContainersTest, SplitsTwoPicturesOfOnePacket) {
   const fs::path file = folder_.path() / "film.avi";
   WriteNumberedFilm(file, {.encoder = "mpeg4", .frames = 50, .b_frames = 1, .is_packed = true});
   ExpectEveryFrame(file, 50);
 }
 
-TEST_F(FilmContainersTest, FieldsThatAreCodedApartAreOneFrame) {
+TEST_F(FilmContainersTest, JoinsSeparatelyCodedFields) {
   for (const bool one_packet : {true, false}) {
     SCOPED_TRACE(one_packet);
     const fs::path file = folder_.path() / "fields.mts";
@@ -87,7 +87,7 @@ TEST_F(FilmContainersTest, FieldsThatAreCodedApartAreOneFrame) {
   }
 }
 
-TEST_F(FilmContainersTest, RecordingsBehindOneAnotherAreOneFilm) {
+TEST_F(FilmContainersTest, ReadsConcatenatedRecordings) {
   for (const char* name : {"film.mts", "film.mpg"}) {
     SCOPED_TRACE(name);
     const fs::path file = folder_.path() / name;
@@ -101,7 +101,7 @@ TEST_F(FilmContainersTest, RecordingsBehindOneAnotherAreOneFilm) {
   }
 }
 
-TEST_F(FilmContainersTest, ARecordingMayBeginWithinAGroup) {
+TEST_F(FilmContainersTest, RecordingMayBeginInsideGroup) {
   constexpr int kPacket = 188;
   const fs::path file = folder_.path() / "film.mts";
   WriteNumberedFilm(file, {.encoder = "mpeg2video", .frames = 50});
@@ -122,7 +122,7 @@ double ShareThatDiffers(const Image& x, const Image& y) {
 }
 
 // A frame in the middle of a group is damaged. What is handed over is as it was.
-TEST_F(FilmContainersTest, WhatIsPredictedFromADamagedFrameIsDamaged) {
+TEST_F(FilmContainersTest, FramesPredictedFromDamagedOneAreDamaged) {
   constexpr int kFrames = 60, kDamaged = 16;  // key frames at 0, 12, 24, ... or one or two later
   const struct {
     const char* encoder;

@@ -1,5 +1,4 @@
-// Frames of a film, decoded when they are asked for, and which of them are whole. For this folder
-// only.
+// Frames of a film, decoded on demand, and their damage. For this folder only.
 #pragma once
 
 #include <deque>
@@ -17,7 +16,7 @@ namespace color3d {
 // Not thread-safe.
 class FilmDecoder {
  public:
-  // Reads the file once through. Throws as FilmReader does. `cancel` may be null and outlives this
+  // Reads the file once. Throws as FilmReader does. `cancel` may be null and must outlive this
   // object.
   FilmDecoder(std::filesystem::path file, const CancellationToken* cancel);
 
@@ -25,10 +24,10 @@ class FilmDecoder {
   const AVCodecContext& codec() const { return *codec_; }
   const FilmIndex& index() const { return index_; }
 
-  // Decodes up to `frame`; false when it does not come out whole. The one after the last costs the
-  // least. Throws Error{kCancelled}.
+  // Decodes up to `frame`; returns false if it is damaged. The frame after the last one is the
+  // cheapest. Throws Error{kCancelled}.
   bool Decode(int frame);
-  // The frame that was decoded last, whole or not.
+  // The frame decoded last, damaged or not.
   const AVFrame& picture() const { return *picture_; }
 
  private:
@@ -64,19 +63,19 @@ class FilmDecoder {
   std::unique_ptr<AVFrame, FreeFrame> picture_;
   FilmIndex index_;
   std::unique_ptr<AVCodecContext, FreeCodec> codec_;
-  std::vector<bool> is_damaged_;  // frames that are known not to come out whole
+  std::vector<bool> is_damaged_;  // frames known to be damaged
   int tried_again_ = -2;          // group
   int at_ = -1;                   // frame of picture_; -1: none
-  bool is_whole_ = false;         // and whether it is undamaged
+  bool is_whole_ = false;         // picture_ is undamaged
 
   // A run: packets decoded one after the other.
   int begin_ = -1;               // its first packet; -1: there is none
   int next_ = 0;                 // packet that comes next
   bool has_packet_ = false;      // it lies in packet_
   bool has_ended_ = false;       // nothing more comes
-  int passed_ = -1;              // frame that came out last
-  int reached_ = -1;             // frame that was asked for last, or skipped
-  std::deque<Waiting> waiting_;  // came out before it was known whether they are damaged
+  int passed_ = -1;              // last frame output
+  int reached_ = -1;             // last frame requested or skipped
+  std::deque<Waiting> waiting_;  // output before their damage is known
   std::map<int, int> damage_;    // by group: its first damaged packet
 };
 

@@ -1,5 +1,5 @@
-// A film's file, opened the one way that films are opened: as one file of a container that we
-// support. Whatever other file, address or device it names stays closed. For this folder only.
+// Opens a film's file as a single file of a supported container. Never opens other files, addresses
+// or devices that it references. For this folder only.
 #pragma once
 
 #include <cstdint>
@@ -13,32 +13,32 @@
 
 namespace color3d {
 
-// `why` it is no film: throws Error{kInvalidArgument} that names the file.
+// Throws Error{kInvalidArgument} with the file's name; `why` it is not a film.
 [[noreturn]] void RefuseFilm(const std::filesystem::path& file, const std::string& why);
 
-// Of a film's frames; larger ones are never decoded.
+// Limit for the frames of a film; larger ones are never decoded.
 inline constexpr int kMaxFilmSidePx = 8192;
 inline constexpr int64_t kMaxFilmPixels = int64_t{kMaxFilmSidePx} * kMaxFilmSidePx;
 
 // Not thread-safe.
 class FilmFile {
  public:
-  // Opens the file and finds its streams. FFmpeg's libraries get its bytes from us and can open
-  // nothing else. `cancel` may be null; it outlives this object, and ends what the libraries do.
-  // Throws Error{kNotFound} when there is no such regular file; Error{kInvalidArgument} that names
-  // the file and says what it is when it is no container of films, or when its frames are larger
-  // than kMaxFilmSidePx; Error{kCancelled}.
+  // Opens the file and finds its streams. FFmpeg's libraries receive its bytes from this class and
+  // can open nothing else. `cancel` may be null; it must outlive this object and interrupts the
+  // libraries. Throws Error{kNotFound} if there is no such regular file; Error{kInvalidArgument}
+  // with the file's name and type if it is no film container or its frames are larger than
+  // kMaxFilmSidePx; Error{kCancelled}.
   FilmFile(const std::filesystem::path& file, const CancellationToken* cancel);
   ~FilmFile();
 
   AVFormatContext* container() const { return container_.get(); }
 
-  // The range of values that the container states of a stream, whatever its decoder says.
+  // The value range that the container states for a stream, regardless of the decoder.
   AVColorRange StatedRange(const AVStream* stream) const { return ranges_[stream->index]; }
 
-  // Only this stream is read; it is one of the container's.
+  // Restricts reading to this stream of the container.
   void ReadOnly(const AVStream* stream);
-  // The next packet of the file; false at its end, or where it cannot be read on. Throws
+  // Reads the next packet; returns false at the end of the file or where reading fails. Throws
   // Error{kCancelled}.
   bool ReadPacket(AVPacket* packet);
 

@@ -157,7 +157,7 @@ class FilmFileTest : public testing::Test {
   const fs::path secret_ = folder_.path() / "secret.ts";
 };
 
-TEST_F(FilmFileTest, TheFilmThatOthersNameIsOne) {
+TEST_F(FilmFileTest, ReadsReferencedFilmDirectly) {
   EXPECT_EQ(FilmReader(secret_).times().size(), 30u);
   EXPECT_FALSE(SoundLevels({secret_, 0.0, 1.0}, CancellationToken()).empty());
   const Watch opened(secret_, IN_OPEN);
@@ -166,7 +166,7 @@ TEST_F(FilmFileTest, TheFilmThatOthersNameIsOne) {
   EXPECT_TRUE(opened.HasEvent());
 }
 
-TEST_F(FilmFileTest, ListsOfOtherFilesAreRefusedUnderEveryEnding) {
+TEST_F(FilmFileTest, RejectsPlaylistsUnderAnyExtension) {
   const std::string path = secret_.string();
   const std::vector<std::string> lists = {
       "#EXTM3U\n#EXT-X-VERSION:3\n#EXT-X-TARGETDURATION:2\n#EXTINF:1.2,\nsecret.ts\n#EXT-X-"
@@ -201,7 +201,7 @@ TEST_F(FilmFileTest, ListsOfOtherFilesAreRefusedUnderEveryEnding) {
   EXPECT_THAT(Complaint(folder_.path() / "film.mp4"), HasSubstr("list of other files"));
 }
 
-TEST_F(FilmFileTest, AReferenceMovieGetsNothingFromOtherFiles) {
+TEST_F(FilmFileTest, ReferenceMovieOpensNoOtherFile) {
   ASSERT_TRUE(WriteNumberedFilm(folder_.path() / "whole.mov", {.encoder = "mpeg4", .frames = 10}));
   MakeReferenceMovie(folder_.path() / "whole.mov", folder_.path() / "film.mov", "whole.mov");
   const Watch opened(folder_.path() / "whole.mov", IN_OPEN | IN_ACCESS);
@@ -210,7 +210,7 @@ TEST_F(FilmFileTest, AReferenceMovieGetsNothingFromOtherFiles) {
   EXPECT_FALSE(opened.HasEvent());
 }
 
-TEST_F(FilmFileTest, SegmentsThatAMatroskaFileNamesStayClosed) {
+TEST_F(FilmFileTest, MatroskaSegmentsOpenNoOtherFile) {
   ASSERT_TRUE(
       WriteNumberedFilm(folder_.path() / "next.mkv", {.encoder = "mpeg2video", .frames = 10}));
   const Watch opened(folder_.path() / "next.mkv", IN_OPEN | IN_ACCESS);
@@ -220,7 +220,7 @@ TEST_F(FilmFileTest, SegmentsThatAMatroskaFileNamesStayClosed) {
 }
 
 // A name in which FFmpeg's libraries would see a pattern, a protocol or a list is one of a file.
-TEST_F(FilmFileTest, NamesAreNamesOfFiles) {
+TEST_F(FilmFileTest, TakesUrlsAsFileNames) {
   for (const char* name :
        {"f%01d.mp4", "concat:a|b.ts", "http:a.ts", "*.ts", "-i.ts", "a b#?.ts"}) {
     SCOPED_TRACE(name);
@@ -229,7 +229,7 @@ TEST_F(FilmFileTest, NamesAreNamesOfFiles) {
   }
 }
 
-TEST_F(FilmFileTest, WhatIsNoFilmSaysWhatItIs) {
+TEST_F(FilmFileTest, NamesTypeOfFileThatIsNoFilm) {
   WriteFileAtomic(folder_.path() / "a.mp4",
                   std::string("GIF89a\1\0\1\0\x80\0\0\0\0\0\xff\xff\xff", 19) +
                       std::string("!\xf9\4\0\0\0\0\0,\0\0\0\0\1\0\1\0\0\2\2D\1\0;", 26));
@@ -279,7 +279,7 @@ TEST_F(FilmFileTest, CancellationEndsEveryCall) {
 
 // A terabyte of nothing behind the film's beginning: FFmpeg's libraries look for a picture in it
 // for a quarter of an hour, in one call.
-TEST_F(FilmFileTest, CancellationEndsWhatTheLibrariesDo) {
+TEST_F(FilmFileTest, CancellationInterruptsLibraries) {
   const fs::path file = folder_.path() / "film.mpg";
   ASSERT_TRUE(WriteNumberedFilm(file, {.encoder = "mpeg2video", .frames = 30}));
   std::error_code error;

@@ -1,4 +1,4 @@
-// The packets of a film's pictures, as its file holds them. For this folder only.
+// Packets of a film's picture stream in file order. For this folder only.
 #pragma once
 
 extern "C" {
@@ -23,18 +23,18 @@ class FilmPackets {
 
   AVFormatContext* container() const { return file_.container(); }
   AVStream* stream() const { return stream_; }
-  // Streams of pictures in the file; stream() is the one that players show.
+  // Picture streams in the file; stream() is the one that players show.
   int stream_count() const { return stream_count_; }
-  // The range of values that the container states, whatever the decoder says.
+  // The value range that the container states, regardless of the decoder.
   AVColorRange stated_range() const { return file_.StatedRange(stream_); }
   const AVCodecParameters& codec() const {
     return filter_ ? *filter_->par_out : *stream_->codecpar;
   }
 
-  // The next one, never empty; false at the end. Throws Error{kCancelled}.
+  // Returns the next packet, never empty; false at the end. Throws Error{kCancelled}.
   bool Read(AVPacket* packet);
-  // Goes to a key packet at or before `stamp`, in most containers a time of decoding; the wrong one
-  // where the container knows no better. False where it cannot.
+  // Seeks to a key packet at or before `stamp`, which is a decoding time in most containers; to a
+  // wrong one if the container's index is wrong. Returns false if it cannot seek.
   bool Seek(int64_t stamp);
 
  private:
@@ -50,8 +50,8 @@ class FilmPackets {
   AVStream* stream_ = nullptr;
   int stream_count_ = 0;
   std::unique_ptr<AVBSFContext, FreeFilter> filter_;  // may be none
-  std::map<int64_t, std::string> palettes_;           // that packets brought, by their place
-  bool has_ended_ = false;                            // the file; filter_ may still hold some
+  std::map<int64_t, std::string> palettes_;           // palettes of packets, by their position
+  bool has_ended_ = false;                            // end of file; filter_ may still hold packets
 };
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
-// Frames of a video file, decoded when they are asked for: memory does not grow with the length of
-// the film (FILM.md "Film").
+// Random access to the frames of a video file, decoded on demand: memory does not grow with the
+// length of the film (FILM.md "Film").
 #pragma once
 
 #include <filesystem>
@@ -13,18 +13,18 @@
 namespace color3d {
 
 struct FilmFacts {
-  int width = 0;  // px, as people see it: upright, of square pixels
+  int width = 0;  // px, as displayed: upright, with square pixels
   int height = 0;
-  int quarter_turns = 0;  // clockwise, that the file asks for and Read has done; 0..3
+  int quarter_turns = 0;  // clockwise rotation stored in the file and applied by Read; 0..3
   std::string codec;      // FFmpeg's name, e.g. "h264"
-  double seconds = 0.0;   // from the first frame's beginning to the last one's end
-  double first_s = 0.0;   // the file's own time of the first frame, which times() count from
+  double seconds = 0.0;   // from the start of the first frame to the end of the last one
+  double first_s = 0.0;   // timestamp of the first frame in the file, the origin of times()
   bool constant_rate = true;
   bool has_sound = false;
-  bool interlaced = false;  // its first whole frame is; of each frame Read then takes one field
-  std::string hdr;          // "PQ" or "HLG": Read maps its tones to the usual range; empty: no HDR
-  double peak_nits = 0.0;   // of HDR: cd/m2 that become white
-  // What a user should know of how the film is read, a line each; they go on from its name: "is
+  bool interlaced = false;  // the first undamaged frame is; Read then takes one field of each
+  std::string hdr;          // "PQ" or "HLG": Read maps its tones to SDR; empty: no HDR
+  double peak_nits = 0.0;   // HDR only: luminance that becomes white, cd/m2
+  // Notes for the user on how the film is read, one line each; each continues the film's name: "is
   // ..."
   std::vector<std::string> notes;
 };
@@ -32,32 +32,31 @@ struct FilmFacts {
 // Not thread-safe.
 class FilmReader {
  public:
-  // Reads the file once through, without decoding it, for its times. Of several streams of pictures
-  // the one that is marked as the default counts, else the largest. No other file is opened,
-  // whatever the film names. `cancel` may be null; it outlives this object and ends every call with
-  // Error{kCancelled}. Throws Error{kInvalidArgument} that names the file when it is no film in one
-  // of our containers that FFmpeg's libraries can decode, has sound only, or frames of more than
-  // 8192 px; Error{kNotFound} when it is not there.
+  // Reads the file once, without decoding it, for its times. Of several picture streams it takes
+  // the one marked as default, else the largest. Opens no other file, even if the film references
+  // one. `cancel` may be null; it must outlive this object and ends every call with
+  // Error{kCancelled}. Throws Error{kInvalidArgument} with the file's name if it is not a film in a
+  // supported container that FFmpeg's libraries can decode, has sound only, or has frames of more
+  // than 8192 px; Error{kNotFound} if it does not exist.
   explicit FilmReader(std::filesystem::path file, const CancellationToken* cancel = nullptr);
   ~FilmReader();
   FilmReader(FilmReader&&) noexcept;
   FilmReader& operator=(FilmReader&&) noexcept;
 
   const FilmFacts& facts() const;
-  // When each frame is shown: s from the first one, strictly ascending, never empty. Frames that
-  // the file gives one time count once, those that its edit list cuts off do not. H.264 in AVI has
-  // no times of its own: its frames are put in order by their numbers, and may come a frame or two
-  // late against the sound. Of recordings put behind one another (MPEG-TS, MPEG-PS) each begins
-  // where the one before it ends; sound has only the first one.
+  // Time of each frame: seconds from the first one, strictly ascending, never empty. Frames with
+  // the same timestamp count once; frames cut off by the edit list are omitted. H.264 in AVI has no
+  // timestamps: its frames are ordered by their numbers and may be a frame or two late against the
+  // sound. Concatenated recordings (MPEG-TS, MPEG-PS) follow each other without a gap; only the
+  // first one has sound.
   const std::vector<double>& times() const;
 
-  // sRGB in 0..1 (tones of HDR are mapped), 3 channels, facts().width x facts().height. The frame
-  // after the last one read costs the least; others are decoded from the key frame before them.
-  // Throws Error{kDataLoss} that names the frame and its time when it is damaged (others may still
-  // be whole): it, or one since the last key frame that it may be predicted from, is flagged by the
-  // decoder, refused or missing. What the decoder makes up without a word, and what is predicted
-  // from a frame that the file has lost without a trace, is not known to be damaged and handed
-  // over.
+  // Returns sRGB in 0..1 (HDR tones are mapped), 3 channels, facts().width x facts().height. The
+  // frame after the last one read is the cheapest; others are decoded from the preceding key frame.
+  // Throws Error{kDataLoss} with the frame and its time if the frame, or one since the last key
+  // frame that it may be predicted from, is flagged by the decoder, refused or missing; other
+  // frames may still be intact. Frames that the decoder conceals without an error, or predicts from
+  // a frame missing from the file without a trace, are returned.
   Image Read(int frame);
 
  private:

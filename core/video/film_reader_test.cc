@@ -72,7 +72,7 @@ class FilmReaderTest : public testing::Test {
   ThreadPool pool_{1};
 };
 
-TEST_F(FilmReaderTest, FramesComeAsTheyWereInAnyOrder) {
+TEST_F(FilmReaderTest, ReadsFramesInAnyOrder) {
   constexpr int kFrames = 130;  // more than two groups of pictures
   FilmReader film(Film(kFrames));
   EXPECT_EQ(film.facts().width, kWidth);
@@ -112,7 +112,7 @@ double MiddleOfBar(const Image& image, int y) {
   return weighted / sum;
 }
 
-TEST_F(FilmReaderTest, OfInterlacedFilmOneFieldOfEachFrameIsTaken) {
+TEST_F(FilmReaderTest, TakesOneFieldOfInterlacedFrames) {
   constexpr int kFrames = 10;
   for (const char* name : {"fields.mov", "fields.mts", "fields.mpg"}) {
     SCOPED_TRACE(name);
@@ -134,7 +134,7 @@ TEST_F(FilmReaderTest, OfInterlacedFilmOneFieldOfEachFrameIsTaken) {
   }
 }
 
-TEST_F(FilmReaderTest, OneFrameIsAFilm) {
+TEST_F(FilmReaderTest, AcceptsOneFrame) {
   FilmReader film(Film(1));
   EXPECT_EQ(film.times(), std::vector<double>{0.0});
   EXPECT_NEAR(MeanGreen(film.Read(0), 56, 88, 8, 56), 0.2, 0.02);
@@ -159,7 +159,7 @@ void Turn(const fs::path& file, int quarter_turns) {
   WriteFileAtomic(file, bytes);
 }
 
-TEST_F(FilmReaderTest, APhoneThatWasTurnedGivesUprightFrames) {
+TEST_F(FilmReaderTest, AppliesRotationOfPhone) {
   for (int turns = 1; turns < 4; ++turns) {
     const fs::path file = Film(3);
     Turn(file, turns);
@@ -203,7 +203,7 @@ void TrimBegin(const fs::path& file, double seconds) {
   WriteFileAtomic(file, bytes);
 }
 
-TEST_F(FilmReaderTest, WhatAPhoneHasTrimmedIsNoFrame) {
+TEST_F(FilmReaderTest, OmitsFramesTrimmedByEditList) {
   constexpr int kFrames = 80, kTrimmed = 30;
   const fs::path file = Film(kFrames);
   TrimBegin(file, kTrimmed / 25.0);
@@ -217,7 +217,7 @@ TEST_F(FilmReaderTest, WhatAPhoneHasTrimmedIsNoFrame) {
   }
 }
 
-TEST_F(FilmReaderTest, ADamagedPartCostsItsOwnFramesOnly) {
+TEST_F(FilmReaderTest, DamageLosesAffectedFramesOnly) {
   constexpr int kFrames = 150;  // key frames every 2 s: 0, 50, 100
   const fs::path file = Film(kFrames);
   std::string bytes = ReadFile(file);
@@ -256,7 +256,7 @@ std::string Silence() {
          little(8000, 4) + std::string(8000, '\x80');
 }
 
-TEST_F(FilmReaderTest, WhatIsNoFilmIsRefused) {
+TEST_F(FilmReaderTest, RejectsOtherFiles) {
   WriteFileAtomic(folder_.path() / "sound.wav", Silence());
   EXPECT_THAT(Complaint(folder_.path() / "sound.wav"), HasSubstr("only sound"));
   WriteFileAtomic(folder_.path() / "text.mp4", "this is no film");
@@ -272,7 +272,7 @@ TEST_F(FilmReaderTest, WhatIsNoFilmIsRefused) {
   EXPECT_THROW(FilmReader(file).Read(5), Error);
 }
 
-TEST_F(FilmReaderTest, RealClips) {
+TEST_F(FilmReaderTest, ReadsRealClips) {
   const fs::path clips = fs::path(COLOR3D_SHARED_DATA) / "video/clips";
   if (!fs::exists(clips)) GTEST_SKIP() << "no clips";
   for (const auto& entry : fs::directory_iterator(clips)) {

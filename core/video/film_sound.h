@@ -1,5 +1,5 @@
-// The sound of a part of a film as MP4 takes it (FILM.md "Film"): packets as they are where the
-// codec is one that MP4 holds, else coded again as AAC. For this folder only.
+// The sound of a part of a film for MP4 (FILM.md "Film"): packets are copied if MP4 supports the
+// codec, else re-encoded as AAC. For this folder only.
 #pragma once
 
 #include <memory>
@@ -11,22 +11,23 @@
 
 namespace color3d {
 
-// Of the stream of sound that players play. Not thread-safe.
+// Reads the audio stream that players choose. Not thread-safe.
 class FilmSound {
  public:
-  // Throws nothing for a file without sound or with one that cannot be had. `cancel` may be null
-  // and outlives this object; throws Error{kCancelled}.
+  // Does not throw for a file without sound or with unreadable sound. `cancel` may be null and must
+  // outlive this object; throws Error{kCancelled}.
   FilmSound(const SoundPart& part, const CancellationToken* cancel);
   ~FilmSound();
 
-  // None: there is no sound.
+  // Null if there is no sound.
   const AVCodecParameters* parameters() const;
-  AVRational time_base() const;  // of Next
-  // Why there is none, or what was done to it; empty: it is whole, or there never was any.
+  AVRational time_base() const;  // time base of Next
+  // Why there is no sound or how it was changed; empty if it is complete or the film has none.
   const std::string& warning() const;
 
-  // The next packet; its time counts from the part's beginning and may lie up to two packets before
-  // it, for the decoder to begin with. False behind the last one. Throws Error{kCancelled}.
+  // Returns the next packet. Its time counts from the start of the part and may be up to two
+  // packets earlier, as decoder preroll. Returns false after the last one. Throws
+  // Error{kCancelled}.
   bool Next(AVPacket* packet);
 
  private:

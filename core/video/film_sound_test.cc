@@ -105,7 +105,7 @@ void ExpectBeeps(const HeardSound& sound, double begin_s, double end_s, double t
   }
 }
 
-TEST_F(FilmSoundTest, SoundGoesAlongAsItIs) {
+TEST_F(FilmSoundTest, CopiesSoundUnchanged) {
   const std::pair<const char*, const char*> kinds[] = {
       {"aac", ".mp4"}, {"ac3", ".mp4"}, {"aac", ".mkv"}, {"aac", ".mov"}, {"ac3", ".mts"}};
   for (const auto& [codec, ending] : kinds) {
@@ -125,7 +125,7 @@ TEST_F(FilmSoundTest, SoundGoesAlongAsItIs) {
   }
 }
 
-TEST_F(FilmSoundTest, WhatMp4DoesNotHoldIsCodedAgain) {
+TEST_F(FilmSoundTest, ReencodesSoundUnsupportedByMp4) {
   const std::pair<const char*, const char*> kinds[] = {
       {"pcm_s16le", ".mov"}, {"flac", ".mkv"}, {"mp2", ".mkv"}, {"pcm_s32le", ".mkv"}};
   for (const auto& [codec, ending] : kinds) {
@@ -143,7 +143,7 @@ TEST_F(FilmSoundTest, WhatMp4DoesNotHoldIsCodedAgain) {
   }
 }
 
-TEST_F(FilmSoundTest, SoundThatBeginsLateOrEndsEarlyKeepsItsPlace) {
+TEST_F(FilmSoundTest, KeepsOffsetAndEndOfSound) {
   for (const char* codec : {"aac", "pcm_s16le"}) {
     SCOPED_TRACE(codec);
     const fs::path film =
@@ -156,7 +156,7 @@ TEST_F(FilmSoundTest, SoundThatBeginsLateOrEndsEarlyKeepsItsPlace) {
   }
 }
 
-TEST_F(FilmSoundTest, ALongSilenceBeforeTheSoundIsNotKeptInMemory) {
+TEST_F(FilmSoundTest, LeadingSilenceTakesNoMemory) {
   const fs::path film = WithSound(
       {.encoder = "pcm_s16le", .begin_s = 30.0, .seconds = 1.0, .level = Beeps}, ".mov", 32.0);
   const std::vector<double> onsets = Onsets(PartOf(film, 0.0, 32.0));
@@ -164,7 +164,7 @@ TEST_F(FilmSoundTest, ALongSilenceBeforeTheSoundIsNotKeptInMemory) {
   EXPECT_NEAR(onsets[0], 30.0, 0.008);
 }
 
-TEST_F(FilmSoundTest, ASoundThatCannotBeHadIsNamed) {
+TEST_F(FilmSoundTest, NamesUnreadableSound) {
   // A rate that AAC does not know.
   const fs::path film = WithSound(
       {.encoder = "pcm_s16le", .sample_rate = 37000, .seconds = 2.0, .level = Beeps}, ".mov");
@@ -173,7 +173,7 @@ TEST_F(FilmSoundTest, ASoundThatCannotBeHadIsNamed) {
   EXPECT_THAT(warning_, HasSubstr("left out"));
 }
 
-TEST_F(FilmSoundTest, WithoutSoundThereIsNoStream) {
+TEST_F(FilmSoundTest, WritesNoStreamWithoutSound) {
   const fs::path file = folder_.path() / "still.mp4";
   const fs::path film = Silent(1.0);
   EXPECT_FALSE(FilmReader(film).facts().has_sound);
@@ -186,7 +186,7 @@ TEST_F(FilmSoundTest, WithoutSoundThereIsNoStream) {
   EXPECT_EQ(writer.sound_warning(), "");
 }
 
-TEST_F(FilmSoundTest, RealClipsAreHeardAsTheyWere) {
+TEST_F(FilmSoundTest, KeepsSoundOfRealClips) {
   const fs::path video = fs::path(COLOR3D_SHARED_DATA) / "video";
   const fs::path clips[] = {video / "clips/pi3_skating.mp4",
                             video / "athlete4cam/videos/cam02.mp4"};
@@ -236,7 +236,7 @@ TEST_F(FilmSoundTest, RealClipsAreHeardAsTheyWere) {
   }
 }
 
-TEST_F(FilmSoundTest, PicturesAtTimesOfTheirOwn) {
+TEST_F(FilmSoundTest, AcceptsUnevenFrameTimes) {
   const std::vector<double> times = {0.0, 0.1, 0.15, 0.4, 1.0, 1.0 + 1 / 24.0};
   const fs::path file = folder_.path() / "uneven.mp4";
   Mp4Writer writer(file,

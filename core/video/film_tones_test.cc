@@ -49,7 +49,7 @@ class FilmTonesTest : public testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(FilmTonesTest, AWedgeComesBackFromEveryCodec) {
+TEST_F(FilmTonesTest, WedgeRoundTripsThroughEveryCodec) {
   const struct {
     const char* encoder;
     const char* name;
@@ -119,7 +119,7 @@ TEST_F(FilmTonesTest, AWedgeComesBackFromEveryCodec) {
   EXPECT_GT(written, 60);
 }
 
-TEST_F(FilmTonesTest, ARangeThatIsStatedCounts) {
+TEST_F(FilmTonesTest, UsesStatedRange) {
   for (const char* range : {"tv", "pc"}) {
     for (const char* format : {"gray", "gray16le", "yuv420p", "yuv422p10le"}) {
       SCOPED_TRACE(std::string(format) + " " + range);
@@ -133,7 +133,7 @@ TEST_F(FilmTonesTest, ARangeThatIsStatedCounts) {
 }
 
 // The wedge's black, middle and white after tones were mapped.
-TEST_F(FilmTonesTest, TonesOfHdrAreMappedAndSaidSo) {
+TEST_F(FilmTonesTest, MapsHdrTonesWithNote) {
   for (const auto& [transfer, name, white] :
        {std::tuple("smpte2084", "PQ", 0.752), std::tuple("arib-std-b67", "HLG", 1.0)}) {
     SCOPED_TRACE(name);
@@ -158,7 +158,7 @@ TEST_F(FilmTonesTest, TonesOfHdrAreMappedAndSaidSo) {
   }
 }
 
-TEST_F(FilmTonesTest, OfSeveralStreamsTheDefaultOneIsTaken) {
+TEST_F(FilmTonesTest, TakesDefaultOfSeveralStreams) {
   const auto flat = [](double tone) { return [tone](double) { return tone; }; };
   const ToneStream small = {.width = 32, .height = 32, .tone = flat(0.25)};
   const ToneStream large = {.width = 64, .height = 48, .tone = flat(0.75)};
@@ -194,7 +194,7 @@ std::string Complaint(const fs::path& file) {
   return "";
 }
 
-TEST_F(FilmTonesTest, FramesThatAreTooLargeAreRefusedBeforeTheyAreDecoded) {
+TEST_F(FilmTonesTest, RejectsLargeFramesBeforeDecoding) {
   const fs::path file = folder_.path() / "a.mov";
   ASSERT_TRUE(WriteToneFilm(file, {{.encoder = "png", .width = 9000, .height = 16}}));
   EXPECT_THAT(Complaint(file), HasSubstr("its frames are 9000 x 16 px; up to 8192 px are taken"));

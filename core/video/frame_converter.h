@@ -1,4 +1,4 @@
-// Decoded frames as pictures, by FFmpeg's own conversion. For this folder only.
+// Conversion of decoded frames to pictures by FFmpeg's libswscale. For this folder only.
 #pragma once
 
 #include <cstdint>
@@ -12,26 +12,26 @@ struct SwsContext;
 
 namespace color3d {
 
-// Whether frames of that format can be converted.
+// Returns true if frames of that format can be converted.
 bool CanConvert(AVPixelFormat format);
-// Grey, perhaps with transparency, in whole numbers or floating point.
+// Returns true for grey formats, with or without alpha, integer or floating point.
 bool IsGray(AVPixelFormat format);
 
 // Not thread-safe.
 class FrameConverter {
  public:
-  // R'G'B' in 0..1 of `width` x `height` px, as the frame codes it; of an interlaced frame the
-  // lines that come first. The matrix is the one that the frame states; `range` of values: as
-  // stated, too. Where none is, greys are of full range, as RGB is, and Y'CbCr is of limited range,
-  // but for the formats of JPEG (yuvj): so do FFmpeg's programs. Throws Error{kDataLoss} where it
-  // cannot be converted.
+  // Returns R'G'B' in 0..1 of `width` x `height` px, in the frame's encoding; for an interlaced
+  // frame the field that comes first. Uses the matrix that the frame states, and its `range`.
+  // Without a stated range, grey and RGB are full range and Y'CbCr is limited range, except for
+  // JPEG formats (yuvj), as in FFmpeg's programs. Throws Error{kDataLoss} if the frame cannot be
+  // converted.
   Image Convert(const AVFrame& frame, AVColorRange range, int width, int height);
 
  private:
   struct FreeConverter {
     void operator()(SwsContext* converter) const;
   };
-  // What converter_ was made for.
+  // Parameters of converter_.
   struct Shape {
     int width = 0, lines = 0, format = AV_PIX_FMT_NONE;
     int out_width = 0, out_height = 0;
@@ -42,7 +42,7 @@ class FrameConverter {
 
   std::unique_ptr<SwsContext, FreeConverter> converter_;
   Shape shape_;
-  bool is_full_ = false;  // the range where a frame of that format states none
+  bool is_full_ = false;  // range of frames that state none
   std::vector<uint16_t> rgb_;
 };
 

@@ -174,7 +174,7 @@ class FrameConverterTest : public testing::TestWithParam<AVPixelFormat> {
 
 class LumaFormatTest : public FrameConverterTest {};
 
-TEST_P(FrameConverterTest, AsFfmpegConvertsIt) {
+TEST_P(FrameConverterTest, AgreesWithFfmpeg) {
   FrameConverter converter;
   const Frame frame = Pattern(GetParam());
   for (const AVColorRange range :
@@ -188,7 +188,7 @@ TEST_P(FrameConverterTest, AsFfmpegConvertsIt) {
 }
 
 // Without any help of FFmpeg's conversions: black, grey and white by what the standards say.
-TEST_P(LumaFormatTest, TonesAreThoseOfTheFormat) {
+TEST_P(LumaFormatTest, TonesMatchFormat) {
   const bool is_jpeg = std::string(facts().name).starts_with("yuvj");
   FrameConverter converter;
   const struct {
@@ -213,7 +213,7 @@ TEST_P(LumaFormatTest, TonesAreThoseOfTheFormat) {
 INSTANTIATE_TEST_SUITE_P(EveryFormat, FrameConverterTest, testing::ValuesIn(Formats()), NameOf);
 INSTANTIATE_TEST_SUITE_P(EveryFormat, LumaFormatTest, testing::ValuesIn(LumaFormats()), NameOf);
 
-TEST(FrameConverter, FormatsThatCannotBeConvertedAreKnown) {
+TEST(FrameConverter, KnowsUnsupportedFormats) {
   EXPECT_FALSE(CanConvert(AV_PIX_FMT_VAAPI));
   EXPECT_FALSE(CanConvert(AV_PIX_FMT_NONE));
   EXPECT_GT(Formats().size(), 150u);

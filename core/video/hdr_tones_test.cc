@@ -17,7 +17,7 @@ float Mapped(const HdrTones& tones, float value) {
 }
 
 // ST 2084 and BT.2408, table 1.
-TEST(HdrTones, PqIsThatOfTheStandard) {
+TEST(HdrTones, PqMatchesStandard) {
   EXPECT_NEAR(PqNits(0.0), 0.0, 1e-9);
   EXPECT_NEAR(PqNits(1.0), 10000.0, 1e-6);
   EXPECT_NEAR(PqNits(0.58), 203.0, 2.0);
@@ -28,7 +28,7 @@ TEST(HdrTones, PqIsThatOfTheStandard) {
   }
 }
 
-TEST(HdrTones, TheCurveKeepsDarkTonesAndBendsBrightOnesToWhite) {
+TEST(HdrTones, CurveKeepsDarkAndCompressesBrightTones) {
   for (const double peak : {400.0, 1000.0, 4000.0, 10000.0}) {
     SCOPED_TRACE(peak);
     EXPECT_NEAR(ToneMappedNits(0.0, peak), 0.0, 1e-9);
@@ -47,7 +47,7 @@ TEST(HdrTones, TheCurveKeepsDarkTonesAndBendsBrightOnesToWhite) {
   EXPECT_NEAR(ToneMappedNits(500.0, 100.0), kHdrWhiteNits, 1e-6);
 }
 
-TEST(HdrTones, AFilmUsesTheWholeRange) {
+TEST(HdrTones, FilmUsesWholeRange) {
   const HdrTones pq(FilmTransfer::kPq, true, 1000.0);
   EXPECT_NEAR(Mapped(pq, 0.0f), 0.0f, 1e-4);
   EXPECT_NEAR(Mapped(pq, static_cast<float>(PqValue(1000.0))), 1.0f, 2e-3);
@@ -65,7 +65,7 @@ TEST(HdrTones, AFilmUsesTheWholeRange) {
   EXPECT_NEAR(Mapped(hlg, 0.75f), paper, 0.01f);
 }
 
-TEST(HdrTones, ColoursOfBt2020BecomeThoseOfBt709) {
+TEST(HdrTones, ConvertsBt2020ToBt709) {
   const HdrTones usual(FilmTransfer::kUsual, true, kUsualPeakNits);
   for (const float value : {0.0f, 0.02f, 0.3f, 0.7f, 1.0f}) {
     EXPECT_NEAR(Mapped(usual, value), value, 1e-3f);

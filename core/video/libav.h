@@ -1,4 +1,4 @@
-// Owners of what FFmpeg's libraries hand out. For this folder only.
+// Owning pointers for objects of FFmpeg's libraries. For this folder only.
 #pragma once
 
 extern "C" {
@@ -24,7 +24,7 @@ struct FreePacket {
   void operator()(AVPacket* packet) const { av_packet_free(&packet); }
 };
 
-// What FFmpeg means by `result`, < 0.
+// FFmpeg's message for `result`, < 0.
 inline std::string LibavError(int result) {
   char words[AV_ERROR_MAX_STRING_SIZE] = {};
   av_strerror(result, words, sizeof words);

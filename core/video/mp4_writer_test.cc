@@ -42,7 +42,7 @@ class Mp4WriterTest : public testing::Test {
   ThreadPool pool_{2};
 };
 
-TEST_F(Mp4WriterTest, APlayerSeesThePicturesAsTheyWere) {
+TEST_F(Mp4WriterTest, DecodesToWrittenPictures) {
   constexpr int kWidth = 178, kHeight = 102, kFrames = 50;  // no multiples of 16
   Mp4Writer writer(file_,
                    {.width = kWidth, .height = kHeight, .frames_per_second = 25, .threads = 2});
@@ -69,7 +69,7 @@ TEST_F(Mp4WriterTest, APlayerSeesThePicturesAsTheyWere) {
   EXPECT_EQ(ListFiles(folder_.path()).size(), 1u) << "nothing else is left";
 }
 
-TEST_F(Mp4WriterTest, PlainColorsComeBackWithinTwoOf255) {
+TEST_F(Mp4WriterTest, PlainColorsRoundTripWithinTwoOf255) {
   const float colors[][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 1}, {0, 0, 0}, {.5, .2, .7}};
   for (const auto& color : colors) {
     Image plain(64, 48, 3);
@@ -100,7 +100,7 @@ TEST_F(Mp4WriterTest, EqualPicturesGiveEqualBytes) {
   EXPECT_EQ(bytes[0], bytes[1]);
 }
 
-TEST_F(Mp4WriterTest, WhatIsNotFinishedLeavesNothing) {
+TEST_F(Mp4WriterTest, UnfinishedMovieLeavesNoFile) {
   {
     Mp4Writer writer(file_, {.width = 64, .height = 48});
     writer.Add(Stripes(64, 48, 0), pool_);
@@ -110,7 +110,7 @@ TEST_F(Mp4WriterTest, WhatIsNotFinishedLeavesNothing) {
   EXPECT_THROW(empty.Finish(), Error);
 }
 
-TEST_F(Mp4WriterTest, WhatIsNoMovieIsRefused) {
+TEST_F(Mp4WriterTest, RejectsInvalidMovies) {
   for (const Mp4Options& options : {Mp4Options{.width = 65, .height = 48},
                                     Mp4Options{.width = 64, .height = 47},
                                     Mp4Options{.width = 1, .height = 1},
@@ -128,7 +128,7 @@ TEST_F(Mp4WriterTest, WhatIsNoMovieIsRefused) {
   EXPECT_THROW(writer.Add(Image(64, 48, 1), pool_), Error);
 }
 
-TEST_F(Mp4WriterTest, AFullDiskIsToldAsSuch) {
+TEST_F(Mp4WriterTest, ReportsFullDisk) {
   const std::filesystem::path full = "/dev/full";
   if (!std::filesystem::exists(full)) GTEST_SKIP() << "skipped, because there is no /dev/full";
   std::filesystem::create_symlink(full, file_.string() + ".part");
@@ -148,7 +148,7 @@ TEST_F(Mp4WriterTest, AFullDiskIsToldAsSuch) {
   }
 }
 
-TEST(YuvTest, BlackAndWhiteAreAtTheEndsOfTheRangeAndNanIsBlack) {
+TEST(YuvTest, MapsBlackWhiteAndNaN) {
   ThreadPool pool(1);
   uint8_t y[16] = {}, cb[4] = {}, cr[4] = {};
   for (const float value : {0.0f, 1.0f, 7.0f, NAN}) {

@@ -37,7 +37,7 @@ std::vector<float> Part(const std::vector<float>& levels, int begin, int end) {
   return {levels.begin() + begin, levels.begin() + end};
 }
 
-TEST(SoundOffsetTest, IsFoundInNoiseWhoeverBeganFirst) {
+TEST(SoundOffsetTest, FindsPositiveAndNegativeOffsetsInNoise) {
   const std::vector<float> event = Talk(1, 3000);
   const auto one = Noisy(Part(event, 0, 2000), 2, 2.0);
   const auto other = Noisy(Part(event, 734, 2600), 3, 2.0);
@@ -47,7 +47,7 @@ TEST(SoundOffsetTest, IsFoundInNoiseWhoeverBeganFirst) {
   EXPECT_NEAR(*SoundOffset(one, one), 0.0, 0.005);
 }
 
-TEST(SoundOffsetTest, LoudnessAndASlowChangeOfItDoNotMatter) {
+TEST(SoundOffsetTest, IgnoresLoudnessAndSlowChanges) {
   const std::vector<float> event = Talk(1, 2000);
   std::vector<float> other = Part(event, 300, 2000);
   for (size_t i = 0; i < other.size(); ++i) {
@@ -57,7 +57,7 @@ TEST(SoundOffsetTest, LoudnessAndASlowChangeOfItDoNotMatter) {
   EXPECT_NEAR(*SoundOffset(event, other), 3.0, 0.02);
 }
 
-TEST(SoundOffsetTest, NothingInCommonIsNoOffset) {
+TEST(SoundOffsetTest, UnrelatedSoundsHaveNoOffset) {
   for (uint64_t seed = 1; seed <= 20; ++seed) {
     EXPECT_FALSE(SoundOffset(Talk(seed, 1500), Talk(seed + 100, 1200)).has_value()) << seed;
   }
@@ -67,13 +67,13 @@ TEST(SoundOffsetTest, NothingInCommonIsNoOffset) {
 }
 
 // A beat fits as well a beat later.
-TEST(SoundOffsetTest, AnEvenBeatDoesNotTell) {
+TEST(SoundOffsetTest, PeriodicSoundHasNoOffset) {
   std::vector<float> beat(2000, -6.0f);
   for (size_t i = 0; i < beat.size(); i += 50) beat[i] = beat[i + 1] = beat[i + 2] = -2.0f;
   EXPECT_FALSE(SoundOffset(beat, Part(beat, 130, 1800)).has_value());
 }
 
-TEST(SoundLevelsTest, AreThoseOfTheFilm) {
+TEST(SoundLevelsTest, MatchesFilm) {
   const ScratchFolder folder;
   ThreadPool pool(1);
   Mp4Writer writer(folder.path() / "silent.mp4",

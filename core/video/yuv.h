@@ -1,4 +1,4 @@
-// Pictures as movies keep them. Pure functions.
+// Conversion of pictures to YUV. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -8,15 +8,14 @@
 
 namespace color3d {
 
-// A plane of bytes in somebody's memory.
+// A plane of bytes that the caller owns.
 struct BytePlane {
   uint8_t* data = nullptr;
-  int stride = 0;  // bytes from a row to the next
+  int stride = 0;  // bytes between rows
 };
 
-// sRGB in 0..1 (3 channels, even sides) as BT.709 Y'CbCr of limited range: Y at full size; Cb, Cr
-// for every 2x2 pixels, sited as H.264 has them unless told otherwise: at the left pixel's middle,
-// between the rows.
+// sRGB in 0..1 (3 channels, even sides) to BT.709 Y'CbCr of limited range: Y at full size; Cb, Cr
+// for every 2x2 pixels, sited as is H.264's default: at the left pixel's centre, between the rows.
 void YuvFromSrgb(const Image& srgb, BytePlane y, BytePlane cb, BytePlane cr, ThreadPool& pool);
 
 }  // namespace color3d

@@ -2,58 +2,20 @@
 //   node look_at_page.mjs CHROMIUM PAGE [SCREENSHOTS]
 // state: data-state of the page; note: its text; errors: of the console; requests: other than for
 // what is inside of the page; seen: for each step the mean colours (0..255) of the stage's left and
-// right part. With a third argument every step leaves a PNG there. Needs no npm package: it talks to
-// the browser over a pipe.
-import { spawn } from 'node:child_process';
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from 'node:fs';
-import { tmpdir } from 'node:os';
+// right part. With a third argument every step leaves a PNG there.
+import { mkdirSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
+
+import { openBrowser, pause } from '../../tests/support/browser.mjs';
 
 const [chromium, page, screenshots] = process.argv.slice(2);
 if (screenshots) mkdirSync(screenshots, { recursive: true });
-const profile = mkdtempSync(join(tmpdir(), 'color3d-browser-'));
-const browser = spawn(chromium, [
-  '--headless', '--no-sandbox', '--no-first-run', '--remote-debugging-pipe', '--use-angle=swiftshader',
-  '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--disable-dev-shm-usage',
-  '--window-size=640,560', ...(process.env.COLOR3D_BROWSER_FLAGS ?? '').split(' ').filter(Boolean),
-  '--user-data-dir=' + profile,
-], { stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'] });
-browser.on('error', (error) => { console.error(String(error)); process.exit(1); });
-
-const waiting = new Map();
-const errors = [], requests = [];
-let buffer = '', next = 1, session;
-browser.stdio[4].on('data', (data) => {
-  const messages = (buffer + data).split('\0');
-  buffer = messages.pop();
-  for (const text of messages) receive(JSON.parse(text));
-});
-const receive = (message) => {
-  if (message.id) {
-    const { done, failed } = waiting.get(message.id);
-    waiting.delete(message.id);
-    return message.error ? failed(new Error(message.error.message)) : done(message.result);
-  }
-  const { method, params } = message;
-  if (method === 'Runtime.exceptionThrown') errors.push(params.exceptionDetails.text);
-  if (method === 'Runtime.consoleAPICalled' && ['error', 'warning', 'assert'].includes(params.type)) {
-    errors.push(params.args.map((arg) => arg.value ?? arg.description).join(' '));
-  }
-  if (method === 'Log.entryAdded' && params.entry.level === 'error') errors.push(params.entry.text);
-  if (method === 'Network.requestWillBeSent' && !/^(data|blob|file):/.test(params.request.url)) {
-    requests.push(params.request.url);
-  }
-};
-const send = (method, params = {}) => new Promise((done, failed) => {
-  waiting.set(next, { done, failed });
-  browser.stdio[3].write(JSON.stringify({ id: next++, method, params, sessionId: session }) + '\0');
-});
-const evaluate = async (expression) => {
-  const answer = await send('Runtime.evaluate', { expression, awaitPromise: true, returnByValue: true });
-  if (answer.exceptionDetails) throw new Error(answer.exceptionDetails.exception.description);
-  return answer.result.value;
-};
-const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+const flags = [
+  '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--window-size=640,560',
+  ...(process.env.COLOR3D_BROWSER_FLAGS ?? '').split(' ').filter(Boolean),
+];
+const { send, open, evaluate, close, errors, requests } =
+    openBrowser(chromium, flags, (type) => ['error', 'warning', 'assert'].includes(type));
 
 // Mean colours of the stage's left and right part, away from the middle and from the texts.
 const measure = `async (png) => {
@@ -77,9 +39,7 @@ const measure = `async (png) => {
 }`;
 
 const look = async () => {
-  const { targetId } = await send('Target.createTarget', { url: 'about:blank' });
-  session = (await send('Target.attachToTarget', { targetId, flatten: true })).sessionId;
-  for (const domain of ['Page', 'Runtime', 'Log', 'Network']) await send(domain + '.enable');
+  await open();
   await send('Page.navigate', { url: 'file://' + resolve(page) });
   const began = Date.now();
   const state = () => evaluate('document.body?.dataset.state ?? "loading"');
@@ -111,9 +71,5 @@ try {
   console.error(error.stack);
   failed = 1;
 }
-const ended = new Promise((done) => browser.once('exit', done));
-send('Browser.close').catch(() => {});
-await Promise.race([ended, pause(5000)]);
-browser.kill('SIGKILL');
-rmSync(profile, { recursive: true, force: true, maxRetries: 5, retryDelay: 200 });
+await close();
 process.exit(failed);

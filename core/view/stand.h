@@ -1,5 +1,5 @@
-// How a scene stands in the page's world: y up as people mean it, what the key view looks at in the
-// origin, the key view's camera two units away from it in front (+z). Pure functions.
+// Placement of a scene in the page's world: y up, the focus of the key view at the origin, the
+// camera of the key view two units in front of it (+z). Pure functions.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,20 +21,20 @@ struct Stand {
   }
 };
 
-// Unit vector against gravity, as far as cameras tell: the mean of their up vectors, made level
-// with their horizons, as people hold cameras. Where those cancel each other (all look straight
-// down), against where they look. -y without views.
+// Unit up vector estimated from the cameras: the mean of their up vectors, levelled with their
+// horizons. If those cancel out (all cameras look straight down), opposite to the viewing
+// direction. -y without views.
 Eigen::Vector3d UpOf(const std::vector<View>& views);
 
-// `focus`: what the key view looks at, in the scene's units. Throws Error{kInvalidArgument} when it
-// is where the camera is.
+// `focus`: the point that the key view looks at, in the scene's units. Throws
+// Error{kInvalidArgument} if it is the camera's centre.
 Stand StandOf(const Scene& scene, int key_view, const Eigen::Vector3d& focus);
 
 // A view's camera in the page's world, axes as in OpenGL: x right, y up, looking along -z.
 struct StandingCamera {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // from the camera to the page
-  // What it turns around: on its axis, as far away as the focus is.
+  // The centre of orbit: on the camera's axis, at the distance of the focus.
   Eigen::Vector3d target = Eigen::Vector3d::Zero();
 };
 StandingCamera CameraOn(const Stand& stand, const View& view);

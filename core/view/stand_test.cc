@@ -28,7 +28,7 @@ View Looking(const Vector3d& position,
   return view;
 }
 
-TEST(UpTest, CamerasOnOneSideThatLookDownAreStillLevel) {
+TEST(UpTest, CamerasLookingDownFromOneSideAreLevel) {
   const Vector3d up = Vector3d(0.2, -0.9, 0.3).normalized();
   const Vector3d side = up.unitOrthogonal();
   std::vector<View> views;
@@ -40,7 +40,7 @@ TEST(UpTest, CamerasOnOneSideThatLookDownAreStillLevel) {
   EXPECT_GT(UpOf(views).dot(up), std::cos(12.0 * M_PI / 180));
 }
 
-TEST(UpTest, ARollIsAveragedAndOverheadViewsLookDown) {
+TEST(UpTest, AveragesRollAndAcceptsOverheadViews) {
   const Vector3d up = -Vector3d::UnitY();
   const std::vector<View> rolled = {Looking({0, 0, -2}, Vector3d::Zero(), up, 0.2),
                                     Looking({0.1, 0, -2}, Vector3d::Zero(), up, -0.2)};
@@ -53,7 +53,7 @@ TEST(UpTest, ARollIsAveragedAndOverheadViewsLookDown) {
   EXPECT_EQ(UpOf({}), -Vector3d::UnitY());
 }
 
-TEST(StandTest, TheKeyViewStandsInFrontAndItsPictureIsTheSame) {
+TEST(StandTest, KeyViewIsInFrontWithSamePicture) {
   Scene scene;
   const Vector3d up = Vector3d(0.1, -1.0, 0.2).normalized(), focus(1.0, 2.0, 3.0);
   scene.views = {Looking({5, 1, 0}, focus, up), Looking({4, 1, -4}, focus, up)};
@@ -77,7 +77,7 @@ TEST(StandTest, TheKeyViewStandsInFrontAndItsPictureIsTheSame) {
   EXPECT_THROW(StandOf(scene, 1, scene.views[1].cam_from_world.Center()), Error);
 }
 
-TEST(StandTest, ACameraFromStraightAboveHasAnUprightPicture) {
+TEST(StandTest, OverheadCameraHasUprightPicture) {
   Scene scene;
   scene.views = {Looking({0, -3, 0}, Vector3d::Zero(), Vector3d::UnitZ()),
                  Looking({0, 0, -3}, Vector3d::Zero(), -Vector3d::UnitY()),

@@ -1,4 +1,4 @@
-// The texts that a page is put together from, parts of the program.
+// The embedded text files of a page.
 #pragma once
 
 #include <string_view>
@@ -9,7 +9,7 @@ std::string_view PageTemplate();  // page/page.html
 std::string_view PageStyle();     // page/page.css
 std::string_view PageScript();    // page/page.js
 
-// The viewer's module, gzip, and its licence; both empty when it was left out at build time.
+// The viewer's module (gzip) and its licence; both empty if left out at build time.
 std::string_view ViewerProgram();
 std::string_view ViewerLicense();
 // "SuperSplat Viewer 1.36.2".

@@ -140,7 +140,7 @@ INSTANTIATE_TEST_SUITE_P(Formats,
                          ::testing::Values("scene.ply", "scene.sog"),
                          [](const auto& format) { return std::string(format.param).substr(6); });
 
-TEST_P(BrowserFormatTest, ShowsTheSceneInColorInGrayAndByWhereItsColorsComeFrom) {
+TEST_P(BrowserFormatTest, ShowsColorGrayAndProvenance) {
   const nlohmann::json looked = Look(GetParam());
   SCOPED_TRACE(looked.dump(1));
   ASSERT_EQ(looked.at("state"), "ready");
@@ -168,7 +168,7 @@ TEST_P(BrowserFormatTest, ShowsTheSceneInColorInGrayAndByWhereItsColorsComeFrom)
   for (const char* half : {"left", "right"}) EXPECT_GT(Seen(looked, "photo", half)[1], 245);
 }
 
-TEST_F(BrowserTest, SaysSoAndShowsAPictureWhereThereIsNoWebGl) {
+TEST_F(BrowserTest, ShowsPictureWithoutWebGl) {
   const nlohmann::json looked = Look("scene.sog", {"COLOR3D_BROWSER_FLAGS=--disable-3d-apis"});
   SCOPED_TRACE(looked.dump(1));
   EXPECT_EQ(looked.at("state"), "failed");

@@ -42,7 +42,7 @@ ViewPage SmallPage() {
   return page;
 }
 
-TEST(PackingTest, GzipIsReadBackByZlib) {
+TEST(PackingTest, ZlibReadsGzip) {
   const std::string bytes(100000, 'a'), packed = Gzip(bytes);
   EXPECT_LT(packed.size(), 400u);
   std::string back(bytes.size(), '\0');
@@ -57,7 +57,7 @@ TEST(PackingTest, GzipIsReadBackByZlib) {
   EXPECT_EQ(back, bytes);
 }
 
-TEST(ViewPageTest, EverythingIsInOneFileAndNothingIsFetched) {
+TEST(ViewPageTest, PageIsSelfContained) {
   if (!HasViewer()) {
     EXPECT_THROW(RenderViewPage(TwoViews(), SmallPage()), Error);
     GTEST_SKIP() << "skipped, because the viewer was left out of this build (no npm)";
@@ -89,7 +89,7 @@ TEST(ViewPageTest, EverythingIsInOneFileAndNothingIsFetched) {
   EXPECT_LT((scale * (rotation * Eigen::Vector3d(10.0, 0.0, 8.0)) + position).norm(), 1e-9);
 }
 
-TEST(ViewPageTest, ACompressedFileIsNotPackedAgainAndTheKeyViewMustBeThere) {
+TEST(ViewPageTest, KeepsCompressedFileAndNeedsKeyView) {
   if (!HasViewer())
     GTEST_SKIP() << "skipped, because the viewer was left out of this build (no npm)";
   ViewPage page = SmallPage();

@@ -13,13 +13,13 @@ namespace color3d {
 
 void ByteSource::ReadAt(uint64_t offset, uint64_t count, void* out) const {
   if (offset > size_ || count > size_ - offset) {
-    throw Refusal("cut short: {} bytes at {} are asked for, the file has {}", count, offset, size_);
+    throw Refusal("cut short: needs {} bytes at {}, but the file has {}", count, offset, size_);
   }
   if (count > 0) DoRead(offset, count, static_cast<char*>(out));
 }
 
 std::string ByteSource::ReadString(uint64_t offset, uint64_t count) const {
-  // Checked before the memory is asked for: `count` may come from a hostile file.
+  // Checked before allocation, since `count` may come from a hostile file.
   if (offset > size_ || count > size_ - offset) ReadAt(offset, count, nullptr);
   std::string bytes(count, '\0');
   ReadAt(offset, count, bytes.data());

@@ -1,6 +1,6 @@
-// Where the weight readers get their bytes: a file or memory. Nothing is mapped, so a file that
-// shrinks while it is read gives an error and not a signal, and the resident memory is what the
-// reader keeps. Immutable; ReadAt() may be called from any thread.
+// Source of bytes for the weight readers: a file or memory. Files are not mapped, so that a file
+// that shrinks while it is read causes an error instead of a signal, and resident memory is bounded
+// by what the reader keeps. Immutable, thread-safe.
 #pragma once
 
 #include <fmt/core.h>
@@ -22,13 +22,13 @@ class ByteSource {
   ByteSource& operator=(const ByteSource&) = delete;
 
   uint64_t size() const { return size_; }
-  // Copies `count` bytes from `offset` to `out`. Throws Error{kInvalidArgument} when the range is
-  // not inside the source, kDataLoss when the file cannot be read.
+  // Copies `count` bytes from `offset` to `out`. Throws Error{kInvalidArgument} if the range is
+  // not inside the source, kDataLoss if the file cannot be read.
   void ReadAt(uint64_t offset, uint64_t count, void* out) const;
   std::string ReadString(uint64_t offset, uint64_t count) const;
-  // Error{kInvalidArgument} that names the source and the reason.
+  // Returns an Error{kInvalidArgument} naming the source and the reason.
   Error Refusal(const std::string& reason) const;
-  // With the parts of the reason put in as fmt does.
+  // Formats the reason as fmt::format does.
   template <typename First, typename... Rest>
   Error Refusal(fmt::format_string<First, Rest...> reason, First&& first, Rest&&... rest) const {
     return Refusal(fmt::format(reason, std::forward<First>(first), std::forward<Rest>(rest)...));
@@ -54,7 +54,7 @@ class MemorySource : public ByteSource {
   std::string_view bytes_;
 };
 
-// Throws Error{kNotFound} when there is no such regular file, kFailedPrecondition when it cannot be
+// Throws Error{kNotFound} if there is no such regular file, kFailedPrecondition if it cannot be
 // opened.
 class FileSource : public ByteSource {
  public:
@@ -72,8 +72,8 @@ class FileSource : public ByteSource {
   int descriptor_;
 };
 
-// A name out of a file for a one-line message: quoted, cut at 100 characters, and every byte that
-// is not printable ASCII as '?'.
+// Formats a name from a file for messages: quoted, at most 100 characters, with '?' for bytes that
+// are not printable ASCII.
 std::string QuotedName(std::string_view name);
 
 }  // namespace color3d

@@ -31,20 +31,20 @@ int ElementBytes(ElementType type);
 // Little-endian elements to float32 (the nearest value; integers above 2^24 are rounded).
 void ConvertToFloat(const char* bytes, ElementType type, uint64_t count, float* out);
 
-// `count` elements at `offset` of the source, read in pieces so that no second copy of a large
-// array exists. Throws Error{kInvalidArgument} when they are not inside the source, before any
-// memory is asked for.
+// `count` elements at `offset` of the source, read in pieces to avoid a second copy of a
+// large array. Throws Error{kInvalidArgument} before any allocation if they are not inside the
+// source.
 std::vector<float> ReadElements(const ByteSource& source,
                                 uint64_t offset,
                                 ElementType type,
                                 uint64_t count);
 
-// Nearest IEEE half, ties to even; beyond 65504 infinity.
+// Returns the nearest IEEE half, ties to even; infinity beyond 65504.
 uint16_t HalfFromFloat(float value);
 float FloatFromHalf(uint16_t half);
 
-// Product of the sizes. Throws what `source.Refusal` gives when a size is negative or the product
-// does not fit 2^60.
+// Returns the product of the sizes. Throws source.Refusal() if a size is negative or the product
+// exceeds 2^60.
 int64_t CheckedElementCount(const ByteSource& source,
                             std::string_view name,
                             const std::vector<int64_t>& shape);

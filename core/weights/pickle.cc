@@ -5,7 +5,7 @@
 #include "core/weights/pickle_bytes.h"
 #include "core/weights/pickle_machine.h"
 
-// Names of instructions are those of Python's pickletools.py.
+// Instructions are named as in Python's pickletools.py.
 namespace color3d {
 namespace {
 
@@ -23,9 +23,9 @@ class Unpickler {
   }
 
  private:
-  // One instruction; true after STOP.
+  // Executes one instruction. Returns true after STOP.
   bool Step(uint8_t opcode);
-  // False when the instruction is of another kind.
+  // Returns false if the instruction is of another kind.
   bool StepNumber(uint8_t opcode);
   bool StepText(uint8_t opcode);
   bool StepMemo(uint8_t opcode);

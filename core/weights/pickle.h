@@ -1,7 +1,7 @@
-// The few opcodes of Python's pickle that PyTorch's state dicts and TorchScript modules consist of,
-// read into inert values. Nothing is executed: the only callables known are those of the list in
-// pickle_callables.cc, each answered by building a value. Format: Python's pickletools.py; opcodes
-// up to protocol 4. For this folder only.
+// Reads the opcodes of Python's pickle that PyTorch's state dicts and TorchScript modules use into
+// inert values. Executes nothing: the only known callables are listed in pickle_callables.cc, and
+// each call builds a value. Format: Python's pickletools.py, opcodes up to protocol 4. For this
+// folder only.
 #pragma once
 
 #include <cstdint>
@@ -14,14 +14,14 @@
 
 namespace color3d {
 
-// Values name each other by index, so neither reading nor freeing a hostile, deeply nested or
-// cyclic pickle recurses.
+// Values refer to each other by index, so that reading and freeing a hostile, deeply nested or
+// cyclic pickle never recurses.
 struct PickleValue {
   enum class Kind : uint8_t {
     kNone,
     kBool,     // number
     kInt,      // number
-    kFloat,    // the value is not kept
+    kFloat,    // value is not kept
     kText,     // text
     kTuple,    // items
     kList,     // items
@@ -29,7 +29,7 @@ struct PickleValue {
     kGlobal,   // number: which
     kStorage,  // number: index into storages
     kTensor,   // number: index into tensors
-    kObject,   // items: the state, when it has one
+    kObject,   // items: the state, if any
   };
   Kind kind = Kind::kNone;
   int64_t number = 0;
@@ -44,7 +44,7 @@ struct PickleStorage {
   int64_t count = 0;     // elements
 };
 
-// A strided view of a storage; sizes and strides are not negative, but not otherwise checked.
+// A strided view of a storage. Sizes and strides are non-negative, but otherwise unchecked.
 struct PickleTensor {
   uint32_t storage = 0;
   int64_t offset = 0;  // elements
@@ -58,13 +58,13 @@ struct PickleGraph {
   std::vector<PickleTensor> tensors;
   uint32_t root = 0;
 
-  // The value of a text key of a dict, or nullptr. `dict` may be of any kind.
+  // Returns the value of a text key of a dict, or nullptr. `dict` may be of any kind.
   const PickleValue* Find(const PickleValue& dict, std::string_view key) const;
 };
 
-// `bytes` must outlive the graph. `source` only names the file in messages. `allow_objects`:
-// classes of TorchScript (`__torch__...`) become objects; a state dict has none. Throws
-// Error{kInvalidArgument} when the pickle is damaged or asks for anything that is not on the list.
+// `bytes` must outlive the graph. `source` names the file in messages. `allow_objects`: accepts
+// classes of TorchScript (`__torch__...`) as objects; a state dict has none. Throws
+// Error{kInvalidArgument} if the pickle is damaged or uses anything outside the list.
 PickleGraph ReadPickle(std::string_view bytes, const ByteSource& source, bool allow_objects);
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// The bytes of a pickle, read from front to back. For this folder only.
+// Sequential reader of the bytes of a pickle. For this folder only.
 #pragma once
 
 #include <fmt/core.h>
@@ -16,10 +16,10 @@ namespace color3d {
 
 class PickleBytes {
  public:
-  // `source` only names the file in messages. Both must outlive this object.
+  // `source` names the file in messages. Both must outlive the object.
   PickleBytes(std::string_view bytes, const ByteSource& source) : bytes_(bytes), source_(source) {}
 
-  // All of these throw Damaged() when the bytes end before.
+  // All of these throw Damaged() if the bytes end too early.
   std::string_view Take(uint64_t count) {
     if (count > bytes_.size() - position_) throw Damaged("ends in the middle of an instruction");
     position_ += count;
@@ -32,7 +32,7 @@ class PickleBytes {
     return value;
   }
   uint8_t ReadByte() { return Read<uint8_t>(); }
-  // Up to the end of the line, which is skipped.
+  // Reads up to the end of the line, which is skipped.
   std::string_view ReadLine() {
     const size_t end = bytes_.find('\n', position_);
     if (end == std::string_view::npos) throw Damaged("ends in the middle of a name");

@@ -35,7 +35,7 @@ std::optional<int64_t> FindPickleCallable(std::string_view module,
   }
   if (!allow_objects) return std::nullopt;
   if (module == "__torch__" || module.starts_with("__torch__.")) return kScriptClass;
-  // TorchScript writes typed lists, dicts and devices as calls around the plain value.
+  // TorchScript wraps typed lists, dicts and devices in calls.
   if (module == "torch.jit._pickle" || (module == "torch" && name == "device")) {
     return kFirstArgument;
   }

@@ -1,5 +1,5 @@
-// What a pickle may ask to be called: a closed list, each answered by building an inert value,
-// never by running anything. For this folder only.
+// Callables that a pickle may use: a closed list. Each call builds an inert value and runs no code.
+// For this folder only.
 #pragma once
 
 #include <cstdint>
@@ -8,16 +8,16 @@
 
 namespace color3d {
 
-// The number of a kGlobal value. Storage types stand for themselves and carry their number format.
+// Number of a kGlobal value. Storage types include their number format.
 enum PickleCallable : int64_t {
   kOrderedDict,    // collections.OrderedDict()
   kRebuildTensor,  // torch._utils._rebuild_tensor_v2(storage, offset, size, stride, ...)
-  kFirstArgument,  // a wrapper whose first argument is what counts
+  kFirstArgument,  // wrapper; the value is its first argument
   kScriptClass,    // __torch__.X, inert
   kStorageTypes,   // + ElementType
 };
 
-// nullopt when the name is not on the list. `allow_objects`: TorchScript's classes are, too.
+// Returns nullopt if the name is not in the list. `allow_objects`: includes classes of TorchScript.
 std::optional<int64_t> FindPickleCallable(std::string_view module,
                                           std::string_view name,
                                           bool allow_objects);

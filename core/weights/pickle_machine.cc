@@ -14,8 +14,8 @@ namespace {
 
 using Kind = PickleValue::Kind;
 
-// A large language model's state dict has some 1e5 values; one byte can make a value, so a pickle's
-// size alone does not bound the memory.
+// Bounds the memory, since one byte can make a value. The state dict of a large language model has
+// about 1e5 values.
 constexpr size_t kMaxValues = 500'000;
 constexpr size_t kMaxTensors = 100'000;
 
@@ -86,8 +86,8 @@ const PickleValue& PickleMachine::Expect(uint32_t index, Kind kind, const char* 
   return value;
 }
 
-// The first items of a tuple, at most `count`: a long tuple that is used again and again would cost
-// quadratic time if it were copied whole.
+// Returns the first items of a tuple, at most `count`. Copying a long tuple in full at each use
+// would take quadratic time.
 std::vector<uint32_t> PickleMachine::FirstItems(uint32_t index,
                                                 size_t count,
                                                 const char* what) const {
@@ -202,7 +202,7 @@ void PickleMachine::SetItems(const std::vector<uint32_t>& items) {
 void PickleMachine::Build() {
   const uint32_t state = Pop();
   PickleValue& target = graph_.values[Top()];
-  // A dict's state is the `_metadata` that state_dict() adds: versions, of no use here.
+  // The state of a dict is the `_metadata` that state_dict() adds: versions, unused here.
   if (target.kind == Kind::kDict || target.kind == Kind::kTensor) return;
   if (target.kind != Kind::kObject)
     throw bytes_.Damaged("gives a state to a value that takes none");

@@ -1,5 +1,4 @@
-// The stack machine that a pickle's instructions are written for: what each of them does to the
-// values. For this folder only.
+// Stack machine of a pickle: the effect of each instruction on the values. For this folder only.
 #pragma once
 
 #include <cstddef>
@@ -13,20 +12,20 @@
 
 namespace color3d {
 
-// Every function throws Error{kInvalidArgument} when the values that it takes are not there or are
-// of another kind. Values are named by their index in the graph.
+// All functions throw Error{kInvalidArgument} if the values that they pop are missing or of another
+// kind. Values are identified by their index in the graph.
 class PickleMachine {
  public:
-  // `bytes` must outlive the machine; it only tells messages where the pickle is damaged.
+  // `bytes` must outlive the machine. It gives the position in messages.
   PickleMachine(const PickleBytes& bytes, bool allow_objects)
       : bytes_(bytes), allow_objects_(allow_objects) {}
 
   void Push(PickleValue::Kind kind, int64_t number = 0, std::string_view text = {});
   void PushItems(PickleValue::Kind kind, std::vector<uint32_t> items);
   void PushGlobal(std::string_view module, std::string_view name);
-  // Takes a module's and a class's name.
+  // Pops the names of a module and a class.
   void PushGlobalOfNames();
-  // Takes the tuple that names a storage.
+  // Pops the tuple that describes a storage.
   void PushStorage();
 
   std::vector<uint32_t> PopLast(size_t count);
@@ -37,15 +36,15 @@ class PickleMachine {
   void RememberNext() { Remember(static_cast<uint32_t>(memo_.size())); }
   void Recall(uint32_t slot);
 
-  // To the list or dict on top of the stack.
+  // Adds to the list or dict on top of the stack.
   void Append(const std::vector<uint32_t>& items);
   void SetItems(const std::vector<uint32_t>& items);  // key, value, key, value ...
-  // Takes an argument tuple and a callable and pushes what the call makes.
+  // Pops a tuple of arguments and a callable, and pushes the result of the call.
   void Call();
-  // Takes a state and gives it to the value below it.
+  // Pops a state and sets it on the value below.
   void Build();
 
-  // The value on top is the result. The machine is used up.
+  // Returns the value on top as the result. The machine must not be used afterwards.
   PickleGraph Finish();
 
  private:

@@ -46,8 +46,8 @@ struct Entry {
   std::vector<uint64_t> offsets;
 };
 
-// Reads the header as events: the JSON is never held as a tree, whose size could be a hundred times
-// the text's, and whatever does not belong to the format is refused where it stands.
+// Parses the header as events, since a JSON tree can take a hundred times the memory of the text.
+// Refuses anything outside the format at once.
 class HeaderHandler : public nlohmann::json::json_sax_t {
  public:
   HeaderHandler(const ByteSource& source, WeightMetadata* metadata)
@@ -152,8 +152,8 @@ class HeaderHandler : public nlohmann::json::json_sax_t {
   std::vector<Entry> entries_;
 };
 
-// Every byte of the data belongs to exactly one array, as the format demands; so the sum of what is
-// read is the file's size.
+// Checks that every byte of the data belongs to exactly one array, as the format requires, so that
+// the total read equals the size of the file.
 void CheckLayout(const ByteSource& source, std::vector<Entry>& entries, uint64_t data_bytes) {
   std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) {
     return a.offsets != b.offsets ? a.offsets < b.offsets : a.name < b.name;
@@ -269,7 +269,7 @@ std::string SerializeSafetensors(const WeightMap& weights,
   } catch (const nlohmann::json::exception&) {
     throw InvalidArgument("weights to write: a name or the metadata is not UTF-8");
   }
-  text.resize((text.size() + 7) / 8 * 8, ' ');  // the data starts aligned, as the format asks
+  text.resize((text.size() + 7) / 8 * 8, ' ');  // aligns the data, as the format requires
   const uint64_t header_bytes = text.size();
   std::string bytes(reinterpret_cast<const char*>(&header_bytes), kLengthBytes);
   bytes.reserve(kLengthBytes + header_bytes + offset);

@@ -54,7 +54,7 @@ TEST(SafetensorsTest, RoundTripInSinglePrecision) {
   EXPECT_EQ(metadata, (WeightMetadata{{"card", "a \"b\""}}));
 }
 
-TEST(SafetensorsTest, RoundTripInHalfPrecisionIsWithinItsRounding) {
+TEST(SafetensorsTest, RoundTripInHalfPrecision) {
   const std::string bytes = SerializeSafetensors(SomeWeights(), true);
   const WeightMap read = ParseSafetensors(bytes);
   for (const auto& [name, array] : SomeWeights()) {
@@ -67,13 +67,13 @@ TEST(SafetensorsTest, RoundTripInHalfPrecisionIsWithinItsRounding) {
   EXPECT_EQ(SerializeSafetensors(read, true), bytes);
 }
 
-TEST(SafetensorsTest, ValuesBeyondHalfPrecisionAreNotWrittenAsInfinity) {
+TEST(SafetensorsTest, RefusesValuesBeyondHalfPrecision) {
   const WeightMap weights{{"big", {{1}, {70000.0f}}}};
   EXPECT_THROW(SerializeSafetensors(weights, true), Error);
   EXPECT_NO_THROW(SerializeSafetensors(weights, false));
 }
 
-TEST(SafetensorsTest, ShapeAndValuesMustAgreeWhenWriting) {
+TEST(SafetensorsTest, RefusesToWriteShapeThatDoesNotFit) {
   EXPECT_THROW(SerializeSafetensors({{"a", {{2}, {1.0f}}}}, false), Error);
 }
 
@@ -104,7 +104,7 @@ TEST(ElementTypeTest, HalfConversionIsExactForAllValues) {
   EXPECT_EQ(HalfFromFloat(1e-8f), 0);
 }
 
-TEST(SafetensorsTest, EveryStoredTypeBecomesFloat) {
+TEST(SafetensorsTest, ConvertsEveryTypeToFloat) {
   const std::string data(
       "\x00\x00\x80\x3f\x00\x3c\xc0\x3f\x00\x00\x00\x00\x00\x00\x04\x40"
       "\xff\xfe\x05\x00\xff\xff\xff\xff\x01",
@@ -131,7 +131,7 @@ TEST(SafetensorsTest, EveryStoredTypeBecomesFloat) {
   EXPECT_EQ(read.at("bool").values[0], 1.0f);
 }
 
-TEST(SafetensorsTest, HostileHeadersAreRefusedWithTheReason) {
+TEST(SafetensorsTest, RefusesHostileHeaders) {
   const auto entry = [](const std::string& shape, const std::string& offsets) {
     return R"({"dtype":"F32","shape":)" + shape + R"(,"data_offsets":)" + offsets + "}";
   };
@@ -180,7 +180,7 @@ TEST(SafetensorsTest, AFileCutAnywhereIsRefused) {
   }
 }
 
-TEST(SafetensorsTest, AnyFlippedBitIsReadOrRefused) {
+TEST(SafetensorsTest, ReadsOrRefusesAnyFlippedBit) {
   const std::string bytes = SerializeSafetensors(SomeWeights(), false);
   for (size_t bit = 0; bit < bytes.size() * 8; ++bit) {
     std::string damaged = bytes;
@@ -189,7 +189,7 @@ TEST(SafetensorsTest, AnyFlippedBitIsReadOrRefused) {
   }
 }
 
-TEST(WeightFileTest, AMissingFileAndAFolderAreNamed) {
+TEST(WeightFileTest, NamesMissingFileAndFolder) {
   const ScratchFolder folder;
   for (const auto& path : {folder.path() / "none.safetensors", folder.path()}) {
     try {

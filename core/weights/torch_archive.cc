@@ -16,14 +16,15 @@ namespace {
 using Kind = PickleValue::Kind;
 
 constexpr uint64_t kMaxPickleBytes = 64'000'000;
-constexpr int kMaxDepth = 64;           // of nested modules
-constexpr size_t kMaxNameBytes = 1024;  // of an attribute path
+constexpr int kMaxDepth = 64;           // nesting of modules
+constexpr size_t kMaxNameBytes = 1024;  // length of an attribute path
 constexpr uint64_t kSpareElements = 1 << 16;
-constexpr uint64_t kSpareForName = 32;  // a map's node, in floats
-constexpr size_t kMaxVisits = 100'000;  // a graph that shares modules can have 2^64 paths
+constexpr uint64_t kSpareForName = 32;  // size of a node of the map, in floats
+constexpr size_t kMaxVisits =
+    100'000;  // bounds graphs with shared modules, which can have 2^64 paths
 
-// Last element that a view touches plus one, relative to its first; 0 when it is empty, and more
-// than 2^62 when it does not fit.
+// Returns the last element of a view plus one, relative to its first; 0 if it is empty, and more
+// than 2^62 on overflow.
 int64_t SpanOf(const PickleTensor& tensor) {
   constexpr __int128 kMaxSpan = __int128{1} << 62;
   __int128 last = 0;
@@ -44,7 +45,7 @@ bool IsContiguous(const PickleTensor& tensor) {
   return true;
 }
 
-// Row-major copy of the view whose first element is storage[0].
+// Returns a row-major copy of the view that starts at storage[0].
 std::vector<float> Gather(const std::vector<float>& storage,
                           const PickleTensor& tensor,
                           int64_t count) {
@@ -114,7 +115,7 @@ class ArchiveReader {
 
   void ReadStateDict() {
     const PickleValue* dict = &graph_.values[graph_.root];
-    // Training programs put the state dict under a key of their own, sometimes two deep.
+    // Training programs store the state dict under their own key, sometimes two levels deep.
     for (int level = 0; level < 3; ++level) {
       const PickleValue* inner = nullptr;
       for (std::string_view key : {"params_ema", "params", "state_dict", "model", "module"}) {
@@ -134,7 +135,7 @@ class ArchiveReader {
     }
   }
 
-  // Attributes of a TorchScript module: tensors are taken, modules followed.
+  // Collects tensors of a TorchScript module and visits its submodules.
   void ReadModule(uint32_t index, const std::string& prefix, int depth) {
     const PickleValue& module = graph_.values[index];
     if (module.kind != Kind::kObject || module.items.empty()) return;
@@ -192,7 +193,7 @@ class ArchiveReader {
     return Gather(values, tensor, count);
   }
 
-  // Many views of one storage, or views that repeat elements, must not multiply a file's size.
+  // Bounds the memory of repeated views and of views that repeat elements.
   void Spend(uint64_t elements) {
     if (elements > budget_) {
       throw source_.Refusal("its tensors would take more than 8 times the file's size");
@@ -206,7 +207,7 @@ class ArchiveReader {
   bool is_script_ = false;
   std::string pickle_;
   PickleGraph graph_;
-  uint64_t budget_ = 0;  // elements that may still be read
+  uint64_t budget_ = 0;  // remaining elements to read
   size_t visits_ = 0;
   WeightMap weights_;
 };

@@ -7,12 +7,12 @@
 
 namespace color3d {
 
-// A state dict, raw or under "params", "params_ema", "state_dict", "model" or "module"; or the
-// parameters and buffers of a TorchScript module, named by their attribute path. Float32 whatever
-// the stored type; views become contiguous. Values that are no tensors are left out.
+// Reads a state dict, top-level or under "params", "params_ema", "state_dict", "model" or "module";
+// or the parameters and buffers of a TorchScript module, named by attribute path. All become
+// contiguous float32. Values other than tensors are ignored.
 //
-// Throws Error{kInvalidArgument} as ReadWeightFile does. All arrays together may take 8 times the
-// file's size (an int8 array grows 4 times, and arrays may share a storage), not more.
+// Throws Error{kInvalidArgument} as ReadWeightFile does. All arrays together may take at most 8
+// times the size of the file (an int8 array grows 4 times, and arrays may share a storage).
 WeightMap ReadTorchArchive(const ByteSource& source);
 
 }  // namespace color3d

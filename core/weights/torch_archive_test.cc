@@ -67,7 +67,7 @@ void ExpectSame(const WeightMap& read, const WeightMap& expected, const std::str
   }
 }
 
-TEST(TorchArchiveTest, StateDictsOfAllLayoutsAndFormatsAreRead) {
+TEST(TorchArchiveTest, ReadsStateDictsOfAllLayouts) {
   for (const char* wrapper : {"", "params", "params_ema", "model", "state_dict"}) {
     for (bool with_metadata : {false, true}) {
       for (const char* type : {"FloatStorage", "HalfStorage", "BFloat16Storage", "DoubleStorage"}) {
@@ -81,7 +81,7 @@ TEST(TorchArchiveTest, StateDictsOfAllLayoutsAndFormatsAreRead) {
   ExpectSame(Parse(MakeStateDict(counters, {"", "LongStorage"})), counters, "int64");
 }
 
-TEST(TorchArchiveTest, Zip64ArchivesAreRead) {
+TEST(TorchArchiveTest, ReadsZip64Archives) {
   PickleWriter pickle;
   pickle.Op('}').Text("w").Tensor("FloatStorage", "0", 1, 0, {1}, {1}).Op('s');
   const std::string bytes =
@@ -101,7 +101,7 @@ TEST(TorchArchiveTest, ViewsBecomeContiguous) {
             (std::vector<int64_t>{2, 1, 3}));
 }
 
-TEST(TorchArchiveTest, TensorsMayShareAStorage) {
+TEST(TorchArchiveTest, ReadsTensorsThatShareStorage) {
   PickleWriter pickle;
   pickle.Op('}').Text("tied").Tensor("FloatStorage", "0", 6, 0, {6}, {1}).Raw("q\x01s");
   pickle.Text("tied2").Raw("h\x01s").Text("part");
@@ -112,7 +112,7 @@ TEST(TorchArchiveTest, TensorsMayShareAStorage) {
   EXPECT_EQ(read.at("part").values, (std::vector<float>{4, 5}));
 }
 
-TEST(TorchArchiveTest, NothingIsEverRun) {
+TEST(TorchArchiveTest, RunsNoCode) {
   // os.system("true"), and the same behind the other way to name a class.
   PickleWriter direct;
   direct.Global("os", "system").Text("true").Op('\x85').Op('R');
@@ -128,7 +128,7 @@ TEST(TorchArchiveTest, NothingIsEverRun) {
   EXPECT_THAT(RefusalOf(Archive(script.Finish())), HasSubstr("state dict"));
 }
 
-TEST(TorchArchiveTest, TensorsBeyondTheirStorageAreRefused) {
+TEST(TorchArchiveTest, RefusesTensorsBeyondTheirStorage) {
   constexpr int64_t kHuge = int64_t{1} << 62;
   EXPECT_THAT(RefusalOf(OneTensor(7, 0, {7}, {1})), HasSubstr("beyond the 6 elements"));
   EXPECT_THAT(RefusalOf(OneTensor(6, 1, {6}, {1})), HasSubstr("beyond"));
@@ -145,7 +145,7 @@ TEST(TorchArchiveTest, TensorsBeyondTheirStorageAreRefused) {
 }
 
 // 1000 views of one storage would take 1000 times the file.
-TEST(TorchArchiveTest, ViewsDoNotMultiplyTheFile) {
+TEST(TorchArchiveTest, BoundsMemoryOfViews) {
   PickleWriter pickle;
   pickle.Op('}').Op('(');
   for (int i = 0; i < 1000; ++i) {
@@ -154,7 +154,7 @@ TEST(TorchArchiveTest, ViewsDoNotMultiplyTheFile) {
   EXPECT_THAT(RefusalOf(Archive(pickle.Op('u').Finish(), 100000)), HasSubstr("8 times"));
 }
 
-TEST(TorchArchiveTest, BrokenPicklesAreRefused) {
+TEST(TorchArchiveTest, RefusesBrokenPickles) {
   const auto refusal = [](const std::string& body) {
     return RefusalOf(Archive("\x80\x02" + body));
   };
@@ -185,7 +185,7 @@ TEST(TorchArchiveTest, BrokenPicklesAreRefused) {
   EXPECT_THAT(RefusalOf(Archive("\x80\x09}.")), HasSubstr("later protocol"));
 }
 
-TEST(TorchArchiveTest, DeepEndlessAndCyclicPicklesEndQuickly) {
+TEST(TorchArchiveTest, EndsQuicklyForDeepAndCyclicPickles) {
   const std::string start = "\x80\x02";
   EXPECT_THAT(RefusalOf(Archive(start + ")" + std::string(400000, '\x85') + ".")),
               HasSubstr("does not hold"));
@@ -199,7 +199,7 @@ TEST(TorchArchiveTest, DeepEndlessAndCyclicPicklesEndQuickly) {
 
 // Modules that hold each other, and a chain of 60 modules that each hold the next twice (2^60
 // paths).
-TEST(TorchArchiveTest, ScriptModulesInCyclesAndDoublingChainsAreRefused) {
+TEST(TorchArchiveTest, RefusesCyclicAndDoublingModules) {
   const auto script = [](const std::string& pickle) {
     return RefusalOf(
         MakeZip({{"m/data.pkl", pickle}, {"m/code/x.py", ""}, {"m/constants.pkl", ""}}));
@@ -219,7 +219,7 @@ TEST(TorchArchiveTest, ScriptModulesInCyclesAndDoublingChainsAreRefused) {
   EXPECT_THAT(script(chain.Finish()), HasSubstr("too many attributes"));
 }
 
-TEST(ZipArchiveTest, HostileArchivesAreRefused) {
+TEST(ZipArchiveTest, RefusesHostileArchives) {
   const std::string pickle = PickleWriter().Op('}').Finish();
   EXPECT_THAT(RefusalOf(MakeZip({{"m/data.pkl", pickle}, {"../evil", "x"}})),
               HasSubstr("\"../evil\" is not a plain relative path"));
@@ -236,7 +236,7 @@ TEST(ZipArchiveTest, HostileArchivesAreRefused) {
 }
 
 // Two directory entries of different names for one range of the file.
-TEST(ZipArchiveTest, OverlappingRecordsAreRefused) {
+TEST(ZipArchiveTest, RefusesOverlappingRecords) {
   std::string inner = MakeZip({{"m/data/1", "content"}});
   inner.resize(inner.find("PK\x01\x02"));
   const std::string pickle = PickleWriter().Op('}').Finish();
@@ -255,7 +255,7 @@ TEST(TorchArchiveTest, AFileCutAnywhereIsRefused) {
   }
 }
 
-TEST(TorchArchiveTest, AnyFlippedBitIsReadOrRefused) {
+TEST(TorchArchiveTest, ReadsOrRefusesAnyFlippedBit) {
   const std::string bytes = MakeStateDict(SomeWeights(), {"params"});
   for (size_t bit = 0; bit < bytes.size() * 8; ++bit) {
     std::string damaged = bytes;
@@ -264,7 +264,7 @@ TEST(TorchArchiveTest, AnyFlippedBitIsReadOrRefused) {
   }
 }
 
-TEST(WeightFileTest, OtherKindsOfFilesAreToldApart) {
+TEST(WeightFileTest, DistinguishesOtherKindsOfFiles) {
   EXPECT_THAT(RefusalOf(std::string("\x80\x02\x8a\x0al\xfc\x9c"
                                     "F\xf9 j\xa8P\x19.",
                                     15)),
@@ -273,7 +273,7 @@ TEST(WeightFileTest, OtherKindsOfFilesAreToldApart) {
   EXPECT_THAT(RefusalOf(""), HasSubstr("no weight file"));
 }
 
-TEST(WeightFileTest, TheFourFormatsOfOneModelHoldTheSameValues) {
+TEST(WeightFileTest, FourFormatsHaveTheSameValues) {
   const std::filesystem::path folder = std::filesystem::path(COLOR3D_SHARED_DATA) / "golden";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no shared data";
   const WeightMap expected = ReadWeightFile(folder / "ddcolor_mini.safetensors");

@@ -19,9 +19,9 @@ WeightMap ReadWeights(const ByteSource& source, WeightMetadata* metadata) {
     if (head.size() > 8 && head[8] == '{') return ReadSafetensors(source, metadata);
   } catch (const std::bad_alloc&) {
     throw Error(ErrorCode::kResourceExhausted,
-                source.Refusal("there is not enough memory for its arrays").what());
+                source.Refusal("not enough memory for its arrays").what());
   }
-  // What torch.save wrote before version 1.6: a pickle that starts with a magic number of 10 bytes.
+  // Format of torch.save before version 1.6: a pickle that starts with a magic number of 10 bytes.
   if (head.starts_with("\x80\x02\x8a\x0a")) {
     throw source.Refusal(
         "it was saved by PyTorch before 1.6 (no zip archive); convert it with python -c \"import "

@@ -1,4 +1,4 @@
-// One door to all weight files. Reads only: no code in a file is ever executed.
+// Reads weight files of all kinds. Never executes code in a file.
 #pragma once
 
 #include <filesystem>
@@ -9,13 +9,13 @@
 
 namespace color3d {
 
-// All arrays of a weight file as float32, whatever the stored number format; the kind of file is
-// told from its bytes, not from its name. `metadata` (may be null) gets what a safetensors header
-// carries. Peak memory: the arrays and about a megabyte.
+// Returns all arrays of a weight file as float32, for any stored number format. Detects the kind of
+// file by its bytes, not its name. `metadata` (may be null) receives the metadata of a safetensors
+// header. Peak memory: the arrays plus about a megabyte.
 //
-// Throws Error{kInvalidArgument}, naming the file and the reason, when the file is of another kind,
-// damaged or hostile (memory then stays within a small multiple of its size); kNotFound when there
-// is none; kDataLoss when it cannot be read.
+// Throws Error{kInvalidArgument}, naming the file and the reason, if the file is of another kind,
+// damaged or hostile (memory is then within a small multiple of its size); kNotFound if it does not
+// exist; kDataLoss if it cannot be read.
 WeightMap ReadWeightFile(const std::filesystem::path& path, WeightMetadata* metadata = nullptr);
 WeightMap ReadWeights(const ByteSource& source, WeightMetadata* metadata = nullptr);
 

@@ -1,5 +1,5 @@
-// Named weights without torch: what a weight file holds, what random features make, and what the
-// digest is taken over. Plain values.
+// Named weights without torch: contents of weight files, random features, and input of digests.
+// Plain values.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ struct WeightArray {
   std::vector<float> values;  // row-major
 };
 
-// Ordered by name, so that iteration (and the digest) is the same everywhere.
+// Ordered by name, so that iteration and digest are deterministic.
 using WeightMap = std::map<std::string, WeightArray>;
 
 }  // namespace color3d

@@ -27,7 +27,7 @@ std::string Section(const char* title, const Names& names) {
 }
 
 bool AllFinite(const std::vector<float>& values) {
-  // Without a branch per value, so that hundreds of megabytes take milliseconds.
+  // No branch per value, so that hundreds of megabytes take milliseconds.
   uint32_t bad = 0;
   for (float value : values) {
     bad |= (std::bit_cast<uint32_t>(value) & 0x7f800000u) == 0x7f800000u ? 1u : 0u;
@@ -98,7 +98,7 @@ void WeightReader::Finish() const {
 
 void WeightReader::Report(bool complete) const {
   std::vector<std::string> unexpected;
-  // Before the end, arrays that would still have been asked for are in the map too.
+  // Before Finish(), the map also contains arrays that have not been taken yet.
   if (complete) {
     for (const auto& [name, array] : weights_) {
       unexpected.push_back(QuotedName(name) + " " + ShapeText(array.shape));

@@ -1,10 +1,10 @@
-// Hands the arrays of a weight file to a network, by name and with the shape that the network
-// expects, and in the end tells everything that does not fit in one message. Not thread-safe.
+// Moves the arrays of a weight file into a network, by name and expected shape, and reports all
+// mismatches in one message. Not thread-safe.
 //
-// How a network's constructor uses it: take the WeightMap by value, move it in, Take() every array
-// (each leaves the map, so no second copy of the model is ever held: hand `values` over to the
-// tensor, see core/encoder/weight_tensors.h), Ignore() what the format carries and the network does
-// not need, Finish().
+// Usage in the constructor of a network: accept the WeightMap by value and move it in; Take() every
+// array (each leaves the map, which avoids a second copy of the model; move `values` into the
+// tensor, see core/encoder/weight_tensors.h); Ignore() arrays that the network does not need;
+// Finish().
 #pragma once
 
 #include <cstdint>
@@ -23,21 +23,21 @@ class WeightReader {
   WeightReader(WeightMap weights, std::string what);
 
   bool Has(const std::string& name) const { return weights_.count(name) > 0; }
-  // The stored shape, empty when there is no such array: for reading sizes before Take().
+  // Returns the stored shape, empty if there is no such array. For sizes that are needed before
+  // Take().
   std::vector<int64_t> ShapeOf(const std::string& name) const;
 
-  // Moves the array out. When it is missing, misshapen or holds a value that is not finite, that is
-  // remembered for Finish() and zeros of the expected shape are returned. Throws what Finish()
-  // throws at once when the zeros would need more memory than the file itself (plus 64 MB): then it
-  // is not this network's file at all.
+  // Moves the array out. If it is missing, misshapen or not finite, records this for Finish() and
+  // returns zeros of the expected shape. Throws the error of Finish() at once if the zeros would
+  // take more memory than the file plus 64 MB, since the file is then of another network.
   WeightArray Take(const std::string& name, const std::vector<int64_t>& shape);
 
   // Drops the arrays whose names end in `suffix` or (IgnorePrefix) start with `prefix`.
   void Ignore(std::string_view suffix);
   void IgnorePrefix(std::string_view prefix);
 
-  // Throws Error{kInvalidArgument} with the missing, misshapen, unexpected (never taken nor
-  // ignored) and non-finite arrays: the counts, and the first ten names of each with shapes.
+  // Throws Error{kInvalidArgument} with the missing, misshapen, unexpected (neither taken nor
+  // ignored) and non-finite arrays: their number, and the first ten names of each with shapes.
   void Finish() const;
 
  private:
@@ -52,7 +52,7 @@ class WeightReader {
   std::vector<std::string> not_finite_;
 };
 
-// "[96,3,4,4]".
+// Returns the shape as "[96,3,4,4]".
 std::string ShapeText(const std::vector<int64_t>& shape);
 
 }  // namespace color3d

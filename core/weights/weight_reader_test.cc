@@ -18,7 +18,7 @@ WeightArray Ones(std::vector<int64_t> shape, size_t count) {
   return {std::move(shape), std::vector<float>(count, 1.0f)};
 }
 
-TEST(WeightReaderTest, HandsOutWhatFitsWithoutACopy) {
+TEST(WeightReaderTest, TakesMatchingArraysWithoutCopy) {
   WeightMap weights{{"a", Ones({2, 2}, 4)}, {"b.num_batches_tracked", Ones({}, 1)}};
   const float* memory = weights.at("a").values.data();
   WeightReader reader(std::move(weights), "the test weights");
@@ -29,7 +29,7 @@ TEST(WeightReaderTest, HandsOutWhatFitsWithoutACopy) {
   EXPECT_NO_THROW(reader.Finish());
 }
 
-TEST(WeightReaderTest, OneMessageTellsEverythingThatDoesNotFit) {
+TEST(WeightReaderTest, ReportsAllProblemsInOneMessage) {
   WeightMap weights{{"fits", Ones({1}, 1)},
                     {"misshapen", Ones({2, 3}, 6)},
                     {"nan", Ones({1}, 1)},
@@ -59,7 +59,7 @@ TEST(WeightReaderTest, OneMessageTellsEverythingThatDoesNotFit) {
 }
 
 // A hostile file with one long vector makes a network expect a matrix of its square.
-TEST(WeightReaderTest, MissingArraysDoNotTakeMoreMemoryThanTheFileWarrants) {
+TEST(WeightReaderTest, BoundsMemoryForMissingArrays) {
   WeightReader reader({{"norm", Ones({1000}, 1000)}}, "the test weights");
   reader.Take("norm", {1000});
   EXPECT_THROW(reader.Take("linear", {int64_t{1} << 40, int64_t{1} << 40}), Error);

@@ -9,7 +9,7 @@
 
 #include "core/base/files.h"
 
-// Field offsets are those of the .ZIP File Format Specification (APPNOTE.TXT 6.3.10), 4.3.
+// Field offsets as in the .ZIP File Format Specification (APPNOTE.TXT 6.3.10), 4.3.
 namespace color3d {
 namespace {
 
@@ -33,7 +33,7 @@ Number Field(std::string_view bytes, uint64_t offset) {
   return value;
 }
 
-// Where the list of records lies.
+// Location of the list of records.
 struct Central {
   uint64_t offset = 0;
   uint64_t size = 0;
@@ -60,7 +60,7 @@ Central FindCentral(const ByteSource& source) {
   for (uint64_t back = kEndBytes; back <= tail_bytes; ++back) {
     const std::string_view end = std::string_view(tail).substr(tail_bytes - back);
     if (Field<uint32_t>(end, 0) != kEndSignature) continue;
-    if (Field<uint16_t>(end, 20) != back - kEndBytes) continue;  // chance bytes in a comment
+    if (Field<uint16_t>(end, 20) != back - kEndBytes) continue;  // coincidence in a comment
     const Central central{
         Field<uint32_t>(end, 16), Field<uint32_t>(end, 12), Field<uint16_t>(end, 10)};
     const bool is_zip64 =
@@ -70,7 +70,7 @@ Central FindCentral(const ByteSource& source) {
   throw source.Refusal("its zip directory is missing; the file is cut short or damaged");
 }
 
-// One record as the directory describes it.
+// Entry of a record in the directory.
 struct Listed {
   std::string name;
   uint64_t local_offset = 0;
@@ -78,8 +78,8 @@ struct Listed {
   bool compressed = false;
 };
 
-// The zip64 extra field holds, in this order, those of (size, stored size, offset) whose 32-bit
-// field is all ones.
+// Reads the zip64 extra field: those of size, stored size and offset, in this order, whose 32-bit
+// fields are all ones.
 void ApplyZip64(const ByteSource& source,
                 std::string_view extra,
                 uint64_t& size,
@@ -102,7 +102,7 @@ void ApplyZip64(const ByteSource& source,
   throw source.Refusal("its zip64 fields are missing");
 }
 
-// Reads the record at `bytes` and returns its length in the directory.
+// Reads the entry at `bytes`. Returns its length in the directory.
 uint64_t ReadListed(const ByteSource& source, std::string_view bytes, Listed& listed) {
   if (bytes.size() < kCentralBytes || Field<uint32_t>(bytes, 0) != kCentralSignature) {
     throw source.Refusal("its zip directory is damaged");
@@ -111,7 +111,7 @@ uint64_t ReadListed(const ByteSource& source, std::string_view bytes, Listed& li
   const uint64_t length = kCentralBytes + name_bytes + extra_bytes + Field<uint16_t>(bytes, 32);
   if (bytes.size() < length) throw source.Refusal("its zip directory is damaged");
   listed.name = bytes.substr(kCentralBytes, name_bytes);
-  // A folder's own record ends in '/'.
+  // Records of folders end in '/'.
   if (!IsSafeRelativePath(listed.name.substr(0, listed.name.find_last_not_of('/') + 1))) {
     throw source.Refusal("the record name {} is not a plain relative path",
                          QuotedName(listed.name));
@@ -136,7 +136,7 @@ uint64_t ReadListed(const ByteSource& source, std::string_view bytes, Listed& li
   return length;
 }
 
-// Where the record's content begins, checked against its local header.
+// Returns the start of the record's content, checked against its local header.
 ZipRecord Locate(const ByteSource& source, const Listed& listed) {
   const std::string local = source.ReadString(listed.local_offset, kLocalBytes);
   const uint64_t name_bytes = Field<uint16_t>(local, 26);

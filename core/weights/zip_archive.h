@@ -1,6 +1,6 @@
-// The directory of a zip archive as PyTorch writes it. Arrays are stored, not compressed, so each
-// is a range of the file; the source code in TorchScript archives is compressed, and never looked
-// at. Zip64 is read. For this folder only.
+// Reads the directory of a zip archive that PyTorch wrote. Arrays are stored uncompressed, so that
+// each is a range of the file; the source code in TorchScript archives is compressed and never
+// read. Supports Zip64. For this folder only.
 #pragma once
 
 #include <cstdint>
@@ -19,14 +19,14 @@ struct ZipRecord {
 
 using ZipDirectory = std::map<std::string, ZipRecord>;
 
-// Throws Error{kInvalidArgument} when the archive is cut short or damaged, when records
-// are encrypted, lie over each other, have the same name, or a name that would lead out of a folder
-// ("../x", "/x"). Nothing is unpacked, so there are no zip bombs. Checksums are not looked at:
-// PyTorch can be told to leave them out.
+// Throws Error{kInvalidArgument} if the archive is truncated or damaged, or if records are
+// encrypted, overlap, have the same name, or a name that escapes the folder ("../x", "/x"). Nothing
+// is unpacked, so that zip bombs have no effect. Checksums are not verified, since PyTorch may omit
+// them.
 ZipDirectory ReadZipDirectory(const ByteSource& source);
 
-// The record of that name when there is one that can be read in place, or nullptr. Throws
-// Error{kInvalidArgument} when it is compressed.
+// Returns the record of that name, or nullptr if there is none. Throws Error{kInvalidArgument} if
+// it is compressed.
 const ZipRecord* FindStored(const ZipDirectory& directory,
                             const std::string& name,
                             const ByteSource& source);

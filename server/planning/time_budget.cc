@@ -15,7 +15,7 @@
 namespace color3d {
 namespace {
 
-// Measured at 500 px on two cores (tests/bench/RESULTS.md "Scenes end to end").
+// Measured at 500 px on two cores (tests/bench/RESULTS.md "Still scenes").
 constexpr double kBaseSeconds = 6.0;
 constexpr double kSecondsPerPhoto = 1.7;  // carrying, colouring, rendering and scoring one view
 // Films are coloured along the optical flow: carrying 0.1, colouring 0.3, movie and metrics 0.1.

@@ -17,7 +17,7 @@ SuiteRun RunOf(const std::string& scene, const std::string& variant, double erro
            {"seconds_personalize", seconds / 2}}};
 }
 
-TEST(SuiteResults, SurviveBeingKilledInTheMiddleOfALine) {
+TEST(SuiteResults, SurviveKillInMiddleOfLine) {
   const ScratchFolder folder;
   const auto file = folder.path() / "results.jsonl";
   EXPECT_TRUE(ReadSuiteResults(file).empty());

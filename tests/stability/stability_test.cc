@@ -19,7 +19,7 @@ std::vector<StabilityCase> FastCases() {
 
 class StabilityTest : public testing::TestWithParam<StabilityCase> {};
 
-TEST_P(StabilityTest, IsFiniteAndWithinItsBounds) {
+TEST_P(StabilityTest, IsFiniteAndWithinBounds) {
   ThreadPool pool(2);
   const StabilityResult result = RunStabilityCase(GetParam(), pool);
   EXPECT_TRUE(result.held) << result.outcome;
@@ -66,7 +66,7 @@ RasterCase SmallCase() {
   return r;
 }
 
-TEST(ReferenceTest, GradientAgreesWithItsOwnFiniteDifferences) {
+TEST(ReferenceTest, GradientAgreesWithFiniteDifferences) {
   const RasterCase r = SmallCase();
   ReferenceParameters p = ReferenceParameters::From(r.parameters);
   const std::vector<double> background = {0.2};
@@ -103,7 +103,7 @@ TEST(ReferenceTest, GradientAgreesWithItsOwnFiniteDifferences) {
   }
 }
 
-TEST(CompareRasterTest, SeesAWrongValueAndAWrongGradient) {
+TEST(CompareRasterTest, FindsWrongValueAndGradient) {
   ThreadPool pool(2);
   RasterCase r = SmallCase();
   EXPECT_TRUE(CompareRaster(r, pool).Passed());
@@ -115,7 +115,7 @@ TEST(CompareRasterTest, SeesAWrongValueAndAWrongGradient) {
   EXPECT_GT(result.gradient_error, result.gradient_bound);
 }
 
-TEST(CompareRasterTest, CountsWhatIsNotFinite) {
+TEST(CompareRasterTest, CountsNonFiniteValues) {
   ThreadPool pool(2);
   RasterCase r = SmallCase();
   r.parameters.Row(kColorRow)[3] = std::numeric_limits<float>::infinity();

@@ -1,4 +1,4 @@
-// What lies at a path; nothing is thrown where there is nothing. Thread-safe.
+// Kind of the file at a path; missing files are no error. Thread-safe.
 #pragma once
 
 #include <filesystem>

@@ -17,8 +17,8 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kDeepest = 3;          // folders below the one that is given
-constexpr size_t kMostFiles = 5000;  // that are looked at
+constexpr int kDeepest = 3;          // levels below the given folder
+constexpr size_t kMostFiles = 5000;  // examined
 
 enum class Kind { kNone, kAnimation, kFrame, kCameraRaw, kList, kContainer };
 
@@ -95,7 +95,7 @@ std::string Quoted(const std::string& name) {
   return quoted + "'";
 }
 
-// What FFmpeg takes for all frames of which `file` is the first one.
+// Returns FFmpeg's input pattern for all frames of which `file` is the first.
 std::string FramesInput(const fs::path& file) {
   const std::string stem = file.stem().string();
   const auto is_digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
@@ -112,7 +112,7 @@ std::string FramesInput(const fs::path& file) {
   return fmt::format("-start_number {} -i {}", number, Quoted(pattern.string()));
 }
 
-// How to make a film of it.
+// Returns how to convert it to a film.
 std::string Remedy(const fs::path& file, Kind kind) {
   switch (kind) {
     case Kind::kAnimation:
@@ -154,7 +154,7 @@ std::string What(const Ending& ending) {
 
 bool IsHidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
 
-// Files in the order of their names, those of a folder before those of its folders.
+// Files in order of names, those of a folder before those of its subfolders.
 std::vector<fs::path> FilesBelow(const fs::path& folder, int depth) {
   std::vector<fs::path> files, folders;
   std::error_code none;
@@ -203,7 +203,7 @@ std::string FolderAdvice(const fs::path& folder) {
                        count > 1 ? fmt::format(", as {} more are", count - 1) : "",
                        Remedy(*first, ending->kind));
   }
-  // What lies in the folder itself was looked at: to name that folder again would be no advice.
+  // Files in the folder itself were checked before; advice to use the same folder would not help.
   const auto below = std::find_if(files.begin(), files.end(), [&](const fs::path& file) {
     if (file.parent_path() == folder) return false;
     return HasImageExtension(file.string()) || HasFilmExtension(file.string());

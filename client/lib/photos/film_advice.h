@@ -1,5 +1,5 @@
-// What to do with files that people bring as films and that are not read: animated pictures,
-// pictures of cinema scanners, other containers. Reads names only.
+// Advice for films in formats that are not read: animated pictures, pictures of cinema scanners,
+// other containers. Reads names only.
 #pragma once
 
 #include <filesystem>
@@ -7,13 +7,12 @@
 
 namespace color3d::client {
 
-// A line that says what the file is and how to make a film of it; empty for other files, by their
-// ending.
+// Returns one line that names the format, judged by the extension, and says how to convert the file
+// to a film; empty for other files.
 std::string FilmAdvice(const std::filesystem::path& file);
 
-// The same of the first such file in `folder` or below it, and how many there are of its kind; else
-// of pictures or films that lie in a folder deeper down. Begins with "; ", empty where there is
-// neither.
+// As FilmAdvice for the first such file in `folder` or below it, with the number of files of its
+// kind; else for pictures or films in deeper folders. Begins with "; "; empty if there are neither.
 std::string FolderAdvice(const std::filesystem::path& folder);
 
 }  // namespace color3d::client

@@ -33,7 +33,7 @@ class FilmAdviceTest : public testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(FilmAdviceTest, AFileSaysWhatItIsAndHowToConvertIt) {
+TEST_F(FilmAdviceTest, NamesFormatAndConversion) {
   Write("a.gif");
   EXPECT_THAT(Complaint("a.gif"),
               AllOf(HasSubstr("a.gif is an animated picture (GIF)"), HasSubstr("ffmpeg -i ")));
@@ -52,7 +52,7 @@ TEST_F(FilmAdviceTest, AFileSaysWhatItIsAndHowToConvertIt) {
   EXPECT_THAT(Complaint("notes.txt"), HasSubstr("is not a folder; give the folder"));
 }
 
-TEST_F(FilmAdviceTest, AFolderNamesTheFirstOfItsKind) {
+TEST_F(FilmAdviceTest, FolderNamesFirstFileOfKind) {
   for (const int i : {9, 10, 11}) Write("reel/scan" + std::to_string(i) + ".dpx");
   for (const bool as_frames : {false, true}) {
     EXPECT_THAT(Complaint("reel", as_frames),
@@ -66,7 +66,7 @@ TEST_F(FilmAdviceTest, AFolderNamesTheFirstOfItsKind) {
   EXPECT_THAT(Complaint("clips"), HasSubstr("clips/b.gif is an animated picture (GIF)"));
 }
 
-TEST_F(FilmAdviceTest, PicturesDeeperDownAreNamed) {
+TEST_F(FilmAdviceTest, NamesPicturesInSubfolders) {
   Write("film/reel 1/frames/0001.png");
   Write("film/reel 1/frames/0002.png");
   EXPECT_THAT(Complaint("film"),
@@ -79,7 +79,7 @@ TEST_F(FilmAdviceTest, PicturesDeeperDownAreNamed) {
   EXPECT_THAT(Complaint("nothing"), testing::EndsWith("(" + ReadableImageFormats() + ")"));
 }
 
-TEST_F(FilmAdviceTest, TheFolderItselfIsNotNamedAgain) {
+TEST_F(FilmAdviceTest, DoesNotNameFolderItself) {
   Write("given/x.avif");
   fs::create_symlink("/nowhere", folder_.path() / "given/y.jpg");
   EXPECT_THAT(Complaint("given"), testing::Not(HasSubstr("give that folder")));

@@ -18,7 +18,7 @@ namespace {
 constexpr int kFramesToLookAt = 5;
 constexpr size_t kFewestFrames = 3;
 
-// A frame that can be decoded; none: it is damaged.
+// Returns a decodable frame; nullopt if it is damaged.
 std::optional<Image> ReadWhole(FilmReader* film, int frame) {
   try {
     return film->Read(frame);
@@ -28,7 +28,7 @@ std::optional<Image> ReadWhole(FilmReader* film, int frame) {
   }
 }
 
-// Before all frames are decoded in vain.
+// Checked before all frames are decoded.
 void RequireColor(FilmReader* film, int frames, const std::string& name) {
   int looked_at = 0, in_color = 0;
   for (int i = 0; i < kFramesToLookAt; ++i) {
@@ -49,7 +49,7 @@ void RequireColor(FilmReader* film, int frames, const std::string& name) {
 
 }  // namespace
 
-FilmAsFrames TakeFramesOfFilm(const PhotoFolder& folder,
+FilmAsFrames DecodeFilmFrames(const PhotoFolder& folder,
                               std::optional<double> end_s,
                               const fs::path& scratch,
                               const CancellationToken& cancel,

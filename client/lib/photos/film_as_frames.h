@@ -1,4 +1,4 @@
-// A film's frames as pictures in a folder: what --benchmark takes.
+// Decodes a film's frames into a folder of pictures, for --benchmark.
 #pragma once
 
 #include <filesystem>
@@ -19,11 +19,11 @@ struct FilmAsFrames {
   double frames_per_second = 0.0;
 };
 
-// Decodes the frames of `folder.film` that are shown before `end_s` (none: all) into `scratch`, in
-// colour, as the server would. Frames that are damaged are left out, with a note; so are uneven
-// times. `on_frame`: frames done, of so many. Throws Error{kInvalidArgument}: what FilmReader
-// throws; more frames than kMostBenchmarkFrames; monochrome frames; fewer than three.
-FilmAsFrames TakeFramesOfFilm(const PhotoFolder& folder,
+// Decodes the frames of `folder.film` before `end_s` (unset: all) into `scratch`, in colour, as the
+// server would. Damaged frames are left out, with a note; so are irregular times. `on_frame`:
+// frames done, of the total. Throws Error{kInvalidArgument} as FilmReader, for more than
+// kMostBenchmarkFrames frames, for monochrome frames, and for fewer than three.
+FilmAsFrames DecodeFilmFrames(const PhotoFolder& folder,
                               std::optional<double> end_s,
                               const std::filesystem::path& scratch,
                               const CancellationToken& cancel,

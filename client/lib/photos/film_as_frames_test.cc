@@ -41,7 +41,7 @@ class FilmAsFramesTest : public testing::Test {
     return file;
   }
   FilmAsFrames Take(std::optional<double> end_s = std::nullopt) {
-    return TakeFramesOfFilm(CollectPhotos(folder_.path() / "film.mp4"),
+    return DecodeFilmFrames(CollectPhotos(folder_.path() / "film.mp4"),
                             end_s,
                             scratch_.path(),
                             CancellationToken(),
@@ -59,7 +59,7 @@ class FilmAsFramesTest : public testing::Test {
   ScratchFolder folder_, scratch_;
 };
 
-TEST_F(FilmAsFramesTest, FramesArePicturesInColour) {
+TEST_F(FilmAsFramesTest, WritesFramesInColor) {
   Write(10, true);
   const FilmAsFrames film = Take();
   EXPECT_NEAR(film.frames_per_second, 12.0, 1e-6);
@@ -73,7 +73,7 @@ TEST_F(FilmAsFramesTest, FramesArePicturesInColour) {
   EXPECT_EQ(Take(0.5).folder.photos.size(), 6u);
 }
 
-TEST_F(FilmAsFramesTest, WhatCannotBeScoredIsRefused) {
+TEST_F(FilmAsFramesTest, RefusesFilmsThatCannotBeScored) {
   Write(10, false);
   EXPECT_THAT(Complaint(), HasSubstr("film.mp4 is monochrome (5 of 5 frames looked at)"));
   Write(10, true);

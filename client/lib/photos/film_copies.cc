@@ -9,7 +9,7 @@
 
 namespace color3d::client {
 
-void LeaveOutCopies(std::vector<LocalFile>* films, std::vector<std::string>* notes) {
+void RemoveCopies(std::vector<LocalFile>* films, std::vector<std::string>* notes) {
   std::vector<LocalFile> by_length = *films;
   std::stable_sort(by_length.begin(), by_length.end(), [](const LocalFile& x, const LocalFile& y) {
     return std::tuple(x.path.size(), x.path) < std::tuple(y.path.size(), y.path);

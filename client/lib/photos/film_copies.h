@@ -1,4 +1,4 @@
-// Films that are copies of each other, as downloads leave them ("film (1).mp4").
+// Removes duplicate films, e.g. repeated downloads ("film (1).mp4").
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace color3d::client {
 
-// Keeps one of files that are equal byte for byte, the one with the shortest name, and adds a note
-// for each that is left out. The order stays.
-void LeaveOutCopies(std::vector<LocalFile>* films, std::vector<std::string>* notes);
+// Of files that are equal byte for byte, keeps the one with the shortest name and adds a note for
+// each other one. Keeps the order.
+void RemoveCopies(std::vector<LocalFile>* films, std::vector<std::string>* notes);
 
 }  // namespace color3d::client

@@ -22,7 +22,7 @@ class FilmCopiesTest : public testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(FilmCopiesTest, AFilmAndItsCopiesAreOneFilm) {
+TEST_F(FilmCopiesTest, MergesCopiesOfFilm) {
   Write("film.mp4", "moving");
   Write("film (1).mp4", "moving");
   Write("Copy of film.mp4", "moving");
@@ -37,7 +37,7 @@ TEST_F(FilmCopiesTest, AFilmAndItsCopiesAreOneFilm) {
   }
 }
 
-TEST_F(FilmCopiesTest, OtherFilmsStay) {
+TEST_F(FilmCopiesTest, KeepsOtherFilms) {
   Write("left.mp4", "moving");
   Write("left2.mp4", "moving");
   Write("right.mp4", "movinG");
@@ -50,7 +50,7 @@ TEST_F(FilmCopiesTest, OtherFilmsStay) {
 }
 
 // What a file of poses counts or names is not changed behind its back.
-TEST_F(FilmCopiesTest, FilmsWithPosesAllStay) {
+TEST_F(FilmCopiesTest, KeepsAllFilmsWithPoses) {
   Write("a.mp4", "moving");
   Write("b.mp4", "moving");
   Write("transforms.json", R"({"frames": [{"file_path": "a.mp4"}, {"file_path": "b.mp4"}]})");

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int kJpegQuality = 97;
-constexpr int kLookSidePx = 64;  // more than colour is judged at
+constexpr int kLookSidePx = 64;  // larger than the size at which colour is judged
 
 std::string EncodeGray(const Image& srgb, ImageFormat format) {
   Image gray = LuminanceFromSrgb(srgb);
@@ -27,7 +27,7 @@ std::string EncodeGray(const Image& srgb, ImageFormat format) {
   return format == ImageFormat::kJpeg ? EncodeJpeg(gray, kJpegQuality) : EncodePng16(gray);
 }
 
-// The photo, its luminance and what is encoded, bytes a pixel.
+// Bytes per pixel: the photo, its luminance and the encoded picture.
 constexpr int64_t kBytesPerPixel = 40;
 
 }  // namespace
@@ -82,7 +82,7 @@ GrayCopies MakeGrayCopies(const PhotoFolder& folder,
                           const CancellationToken& cancel) {
   GrayCopies copies{folder, {}};
   std::vector<char> in_color(folder.photos.size(), 0);
-  // Grey copies have no alpha; where the user gives masks, they win anyway.
+  // Grey copies have no alpha; masks from the user take precedence anyway.
   std::vector<std::optional<LocalFile>> alpha(folder.photos.size());
   ThreadPool pool(2);
   pool.ForEach(static_cast<int64_t>(folder.photos.size()), [&](int64_t i, int) {

@@ -1,4 +1,4 @@
-// What --benchmark and inspect need to know about colour: is it there, and photos without it.
+// Colour check and grey copies of photos, for --benchmark and inspect.
 #pragma once
 
 #include <filesystem>
@@ -16,13 +16,13 @@ struct ColorCount {
   int unsure = 0;  // photos that may be either (ColorVerdict)
   int photos = 0;
 
-  // True when most of those looked at are.
+  // Returns true if most of the photos checked are in colour.
   bool MostlyColor() const { return 2 * in_color > looked_at; }
-  // False when at least half of those looked at may be either.
+  // Returns false if at least half of the photos checked are ambiguous.
   bool IsSure() const { return 2 * unsure < looked_at; }
 };
-// Decodes up to `max_photos` (>= 1) of them, evenly spread. Throws Error{kInvalidArgument} on one
-// that cannot be decoded.
+// Decodes up to `max_photos` (>= 1) photos, evenly spread. Throws Error{kInvalidArgument} if one
+// cannot be decoded.
 ColorCount CountColorPhotos(const PhotoFolder& folder,
                             int max_photos,
                             const CancellationToken& cancel);
@@ -31,9 +31,9 @@ struct GrayCopies {
   PhotoFolder folder;              // the same scene paths, with grey bytes
   std::set<std::string> in_color;  // scene paths of the photos that had colour
 };
-// Grey copies of the photos below `scratch`, one channel, whose L* (CIE) equals the colour photo's:
-// JPEG stays JPEG (quality 97), others become 16-bit PNG under the same name, so that names in
-// models stay valid. EXIF is not copied; its orientation is applied.
+// Writes grey copies of the photos below `scratch`, one channel, with the L* (CIE) of the colour
+// photo: JPEG stays JPEG (quality 97), other formats become 16-bit PNG under the same name, so that
+// names in models stay valid. EXIF orientation is applied; other EXIF data is dropped.
 GrayCopies MakeGrayCopies(const PhotoFolder& folder,
                           const std::filesystem::path& scratch,
                           const CancellationToken& cancel);

@@ -17,7 +17,7 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-// Names that the mask of a photo may have, relative to the folder of masks.
+// Possible names of the mask of a photo, relative to the folder of masks.
 std::vector<std::string> MaskNames(std::string photo) {
   if (photo.starts_with("images/")) photo.erase(0, 7);
   return {photo + ".png", fs::path(photo).replace_extension(".png").generic_string()};

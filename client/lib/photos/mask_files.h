@@ -1,4 +1,4 @@
-// Masks of photos, from a folder of their own.
+// Adds masks from a folder of their own.
 #pragma once
 
 #include <filesystem>
@@ -7,11 +7,11 @@
 
 namespace color3d::client {
 
-// Adds the masks in `masks` (any depth) to the folder's files, as masks/ of the scene: for
-// images/a.jpg the file a.png or a.jpg.png, and a note of how many. Photos without one count as a
-// whole. Masks of no photo are left out, with a note. Throws Error: no such folder, no mask of a
-// photo in it, a mask that is no PNG, two masks of one photo, a mask of another size than its photo
-// (with both sizes), too many files.
+// Adds the masks in `masks` (any depth) to the folder's files, as masks/ of the scene, and a note
+// with their number. The mask of images/a.jpg is a.png or a.jpg.png. Photos without a mask are used
+// whole. Masks without a photo are left out, with a note. Throws Error if there is no such folder,
+// no mask belongs to a photo, a mask is no PNG, a photo has two masks, a mask differs in size from
+// its photo (with both sizes), or there are too many files.
 void AddMasks(const std::filesystem::path& masks, PhotoFolder* folder);
 
 }  // namespace color3d::client

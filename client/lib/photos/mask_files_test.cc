@@ -45,7 +45,7 @@ class MaskFilesTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(MaskFilesTest, GoAlongUnderEitherName) {
+TEST_F(MaskFilesTest, AcceptsEitherName) {
   WriteMask("a.png");
   WriteMask("sub/b.jpg.png");
   PhotoFolder folder = CollectPhotos(root());
@@ -58,7 +58,7 @@ TEST_F(MaskFilesTest, GoAlongUnderEitherName) {
   EXPECT_THAT(folder.notes, ::testing::Contains("2 of 3 photos have masks"));
 }
 
-TEST_F(MaskFilesTest, MasksOfPhotosThatWereThrownAwayAreLeftOutWithANote) {
+TEST_F(MaskFilesTest, LeavesOutMasksOfDeletedPhotosWithNote) {
   WriteMask("A.PNG");
   WriteMask("gone.png");
   PhotoFolder folder = CollectPhotos(root());
@@ -68,7 +68,7 @@ TEST_F(MaskFilesTest, MasksOfPhotosThatWereThrownAwayAreLeftOutWithANote) {
   EXPECT_THAT(folder.notes, ::testing::Contains(HasSubstr("1 of 2 masks are of no photo")));
 }
 
-TEST_F(MaskFilesTest, WhatIsNoMaskOfAPhotoIsRefusedByName) {
+TEST_F(MaskFilesTest, NamesFilesThatAreNoMasks) {
   EXPECT_THAT(ErrorOf(), HasSubstr("no such folder"));
   fs::create_directories(masks());
   EXPECT_THAT(ErrorOf(), HasSubstr("no mask in it"));
@@ -87,7 +87,7 @@ TEST_F(MaskFilesTest, WhatIsNoMaskOfAPhotoIsRefusedByName) {
 }
 
 // The benchmark uploads grey copies, which have no alpha.
-TEST_F(MaskFilesTest, AlphaOfPhotosSurvivesDroppingTheirColour) {
+TEST_F(MaskFilesTest, GrayCopiesKeepAlpha) {
   Image photo(24, 16, 4, 1.0f);
   photo.At(3, 5, 7) = 0.0f;
   Write(root() / "images/d.png", EncodePng8(photo));

@@ -26,10 +26,10 @@ using nlohmann::json;
 
 constexpr const char* kNerfiesFiles[] = {
     "metadata.json", "dataset.json", "scene.json", "points.npy"};
-constexpr int kDeepestModel = 5;       // folders below the user's
-constexpr int kMostEntries = 200'000;  // that are looked at for models
+constexpr int kDeepestModel = 5;       // levels below the user's folder
+constexpr int kMostEntries = 200'000;  // examined for models
 
-// Poses that other programs write and that are not read.
+// Unsupported pose files of other programs.
 struct UnreadPoses {
   const char* ending;
   const char* program;
@@ -41,14 +41,14 @@ constexpr UnreadPoses kUnreadPoses[] = {{"cameras.xml", "Agisoft Metashape"},
                                         {"cameras.sfm", "Meshroom"},
                                         {"sfm.json", "Meshroom"}};
 
-// A path as somebody's file has it, with our separators.
+// Normalises the separators of a path from a user's file.
 std::string OurPath(std::string path) {
   std::replace(path.begin(), path.end(), '\\', '/');
   while (path.starts_with("./")) path.erase(0, 2);
   return path;
 }
 
-// Names of folders in `root`, sorted.
+// Returns names of folders in `root`, sorted.
 std::vector<std::string> FoldersIn(const fs::path& root) {
   std::vector<std::string> folders;
   std::error_code none;
@@ -61,7 +61,7 @@ std::vector<std::string> FoldersIn(const fs::path& root) {
   return folders;
 }
 
-// transforms.json, else those of Blender's.
+// Returns transforms.json, or else Blender's files.
 std::vector<std::string> TransformsIn(const fs::path& root) {
   if (IsFile(root / kTransformsFile)) return {std::string(kTransformsFile)};
   std::vector<std::string> files;
@@ -79,7 +79,7 @@ json ReadTransforms(const fs::path& file) {
   return root;
 }
 
-// Files below `root` whose names are those of a COLMAP model's.
+// Returns files below `root` with the names of a COLMAP model's files.
 std::vector<std::string> FilesOfModels(const fs::path& root) {
   std::vector<std::string> files;
   std::error_code error;
@@ -110,7 +110,7 @@ std::vector<std::string> FilesOfColmap(const fs::path& root) {
   return files;
 }
 
-// The file of points that goes with transforms; empty where there is none.
+// Returns the file of points of transforms; empty if there is none.
 std::string FileOfPoints(const fs::path& root, const std::string& transforms) {
   const json named = ReadTransforms(root / transforms).value("ply_file_path", json());
   if (named.is_string()) {
@@ -168,7 +168,7 @@ void AddNerfiesFiles(const fs::path& root, std::vector<LocalFile>* files) {
   }
 }
 
-std::set<std::string> FoldersThatTransformsNames(const fs::path& root) {
+std::set<std::string> FoldersInTransforms(const fs::path& root) {
   std::set<std::string> folders;
   for (const std::string& file : TransformsIn(root)) {
     const json transforms = ReadTransforms(root / file);

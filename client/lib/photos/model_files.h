@@ -1,6 +1,6 @@
-// The files beside a user's photos that tell poses, times and points, and where photos lie that
-// they name. Reads names, and of transforms.json what it names; never writes. Pure functions of the
-// file system, thread-safe.
+// Files beside a user's photos with poses, times and points, and the folders of photos that they
+// name. Reads names, and the contents of transforms.json; never writes. Pure functions of the file
+// system, thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -12,30 +12,31 @@
 
 namespace color3d::client {
 
-// True for a folder as Nerfies and HyperNeRF have it: metadata.json, camera/ and rgb/.
+// Returns true for the layout of Nerfies and HyperNeRF: metadata.json, camera/ and rgb/.
 bool IsNerfiesFolder(const std::filesystem::path& root);
-// Its files other than pictures.
+// Adds its files other than pictures.
 void AddNerfiesFiles(const std::filesystem::path& root, std::vector<LocalFile>* files);
 
-// Folders below `root` that transforms.json, or Blender's transforms_train.json and its like, name.
-// Empty without such a file. Throws Error{kInvalidArgument} that names a file that is not JSON or
-// has no frames.
-std::set<std::string> FoldersThatTransformsNames(const std::filesystem::path& root);
+// Returns the folders below `root` that transforms.json, or Blender's transforms_train.json and the
+// like, names. Empty without such a file. Throws Error{kInvalidArgument} that names a file that is
+// not JSON or has no frames.
+std::set<std::string> FoldersInTransforms(const std::filesystem::path& root);
 
-// The folder of photos that is images/ of the scene: images in any case of letters; empty where
-// there is none.
+// Returns the folder that becomes images/ of the scene: `images`, ignoring case; empty if there is
+// none.
 std::string ImagesFolder(const std::filesystem::path& root);
-// Whether files in `root` tell poses.
+// Returns true if files in `root` have poses.
 bool HasPoses(const std::filesystem::path& root);
-// The file or folder in `root`, which holds the folder of photos that the user gave, that tells
-// poses; empty where there is none.
+// Returns the file or folder with poses in `root`, the parent of the user's folder of photos; empty
+// if there is none.
 std::string PosesBeside(const std::filesystem::path& root);
-// The only folder in `root` with photos of its own; empty where there are none or several.
+// Returns the only folder in `root` that directly contains photos; empty if there is none, or more
+// than one.
 std::string OnlyFolderOfPhotos(const std::filesystem::path& root);
 
-// Adds what belongs to the photos or films in `folder`: COLMAP models (catalogue/pose_files.h says
-// which) and times.txt, transforms.json or its like with the file of points that it names,
-// poses_bounds.npy; and notes of poses that are not used.
+// Adds the files that belong to the photos or films in `folder`: COLMAP models (those of
+// catalogue/pose_files.h) and times.txt, transforms.json or the like with its file of points,
+// poses_bounds.npy; and notes on poses that are not used.
 void CollectModelFiles(const std::filesystem::path& root, PhotoFolder* folder);
 
 }  // namespace color3d::client

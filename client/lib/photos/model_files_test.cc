@@ -50,7 +50,7 @@ class ModelFilesTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(ModelFilesTest, AllModelsGoToTheServerWhichChooses) {
+TEST_F(ModelFilesTest, SendsAllCompleteModels) {
   WritePhotos("images/");
   WriteModel("sparse/0");
   WriteModel("sparse/1");
@@ -64,7 +64,7 @@ TEST_F(ModelFilesTest, AllModelsGoToTheServerWhichChooses) {
                           "sparse/1/points3D.bin"));
 }
 
-TEST_F(ModelFilesTest, AModelIsFoundWhereverProgramsPutIt) {
+TEST_F(ModelFilesTest, FindsModelInAnyUsualPlace) {
   WritePhotos("images/");
   for (const std::string place :
        {"sparse/1", "colmap/sparse/0", "colmap/sparse/2", "dense/sparse", "mine"}) {
@@ -82,7 +82,7 @@ TEST_F(ModelFilesTest, AModelIsFoundWhereverProgramsPutIt) {
   EXPECT_EQ(CollectPhotos(root()).model_files.size(), 3u);
 }
 
-TEST_F(ModelFilesTest, PosesOfPhotosThatAreNotReadAreNamed) {
+TEST_F(ModelFilesTest, NamesUnsupportedPoses) {
   WritePhotos("");
   EXPECT_THAT(CollectPhotos(root()).notes, IsEmpty());
   Write("Cameras.xml");
@@ -93,7 +93,7 @@ TEST_F(ModelFilesTest, PosesOfPhotosThatAreNotReadAreNamed) {
   EXPECT_THAT(CollectPhotos(root()).notes, IsEmpty());
 }
 
-TEST_F(ModelFilesTest, PosesBoundsGoWithPhotos) {
+TEST_F(ModelFilesTest, SendsPosesBoundsWithPhotos) {
   WritePhotos("images/");
   Write("poses_bounds.npy");
   EXPECT_THAT(Paths(CollectPhotos(root()).model_files), ElementsAre("poses_bounds.npy"));
@@ -101,7 +101,7 @@ TEST_F(ModelFilesTest, PosesBoundsGoWithPhotos) {
   EXPECT_EQ(CollectPhotos(root()).model_files.size(), 3u);
 }
 
-TEST_F(ModelFilesTest, PointsGoWithTransforms) {
+TEST_F(ModelFilesTest, SendsPointsWithTransforms) {
   WritePhotos("images/");
   Write("sparse_pc.ply");
   EXPECT_THAT(CollectPhotos(root()).model_files, IsEmpty());
@@ -123,7 +123,7 @@ TEST_F(ModelFilesTest, PointsGoWithTransforms) {
               ElementsAre("sparse_pc.ply", "transforms.json"));
 }
 
-TEST_F(ModelFilesTest, BlendersTransformsNameTheirPhotos) {
+TEST_F(ModelFilesTest, FindsPhotosOfBlenderTransforms) {
   WritePhotos("train/");
   Write("test/c.png");
   Write("transforms_train.json", R"({"frames": [{"file_path": "./train/a"}]})");
@@ -138,7 +138,7 @@ TEST_F(ModelFilesTest, BlendersTransformsNameTheirPhotos) {
                                 HasSubstr("give " + root().string()))));
 }
 
-TEST_F(ModelFilesTest, AdviceDoesNotLeadAwayFromPoses) {
+TEST_F(ModelFilesTest, AdviceKeepsPoses) {
   WritePhotos("Images/");
   WriteModel("sparse/0");
   PhotoFolder folder = CollectPhotos(root());

@@ -46,9 +46,9 @@ constexpr std::string_view kSystemFolders[] = {"@eadir",
 constexpr std::string_view kSystemFiles[] = {
     "thumbs.db", "ehthumbs.db", "desktop.ini", "picasa.ini", "icon\r", "zbthumbnail.info"};
 
-// Kinds of pictures that we do not read, and what to do with them.
+// Unsupported formats of pictures, and remedies.
 struct Kind {
-  std::string_view endings;  // each between spaces
+  std::string_view endings;  // each enclosed in spaces
   const char* name;
   const char* remedy;
 };
@@ -78,7 +78,7 @@ constexpr Kind kKinds[] = {
      "pictures of other formats",
      "convert them to PNG, e.g. `mogrify -format png *`"}};
 
-// Results that show that a folder was given with -o.
+// Results that identify a folder of -o.
 constexpr const char* kResultRecords[] = {artifact::kKeyView,
                                           artifact::kKeyColorFacts,
                                           artifact::kMetrics,
@@ -110,7 +110,7 @@ bool IsHeic(std::string_view name) {
   return ending == "heic" || ending == "heif" || ending == "hif";
 }
 
-// Formats that photographs are often kept in beside a copy in another one.
+// Formats that often have a copy in another format beside them.
 bool IsCopyFormat(std::string_view name) {
   const std::string ending = EndingOf(name);
   return IsHeic(name) || ending == "webp" || ending == "bmp";
@@ -123,7 +123,7 @@ bool HasResultRecord(const fs::path& folder) {
   });
 }
 
-// In `folder` itself, by their names alone; 0 where it cannot be read.
+// Counts files in `folder` itself, by names only; 0 if it cannot be read.
 size_t CountPictures(const fs::path& folder) {
   size_t count = 0;
   std::error_code none;
@@ -160,7 +160,7 @@ class Lister {
     if (passed_over_ != nullptr) passed_over_->Add(kind, path);
   }
 
-  // `below`: empty, or the folder's path below the root with a '/' at the end.
+  // `below`: empty, or the folder's path below the root with a trailing '/'.
   void ListFolder(const std::string& below) {
     std::error_code error;
     fs::directory_iterator entries(root_ / below, error);
@@ -205,7 +205,7 @@ class Lister {
     }
   }
 
-  // True for what may be a photograph.
+  // Returns true for files that may be photos.
   bool LookAtFile(const fs::directory_entry& entry,
                   const std::string& path,
                   const std::string& name) {
@@ -231,7 +231,7 @@ class Lister {
     return false;
   }
 
-  // Phones' exports leave stubs, whose pictures are elsewhere; the others are photographs still.
+  // Exports from phones leave HEIC stubs without a picture; the other files are photos.
   bool IsGoodHeic(const fs::path& file, const std::string& path) {
     try {
       ProbeImage(ReadFile(file), path);
@@ -243,7 +243,7 @@ class Lister {
     }
   }
 
-  // Of "a.heic" beside "a.jpg" the latter, of "a.heic" beside "a.webp" one.
+  // Keeps "a.jpg" of "a.heic" and "a.jpg", and one of "a.heic" and "a.webp".
   void AddWithoutCopies(const std::string& below, std::vector<std::string> pictures) {
     std::sort(pictures.begin(), pictures.end());
     std::set<std::string> stems;
@@ -270,7 +270,7 @@ class Lister {
 void PassedOver::Add(const std::string& kind, const std::string& name, size_t count) {
   const size_t bar = kind.find('|');
   Files& files = kinds_[kind.substr(0, bar)];
-  // Of remedies that differ by the file the first one's is told.
+  // If remedies differ by file, gives that of the first one.
   if (files.count == 0 && bar != std::string::npos) files.remedy = kind.substr(bar + 1);
   files.count += count;
   files.first.push_back(name);
@@ -333,7 +333,7 @@ void AddUnusedNeighbors(const fs::path& root,
     if (IsSystemFile(name)) continue;
     if (HasFilmExtension(name) && entry.is_regular_file(none)) {
       if (IsResultFile(entry.path())) continue;
-      // Beside a photo of its name it is what a phone keeps with it.
+      // A companion file that a phone stores beside the photo of the same name.
       if (stems.contains(LowerCase(fs::path(name).stem().string()))) continue;
       passed_over->Add("films|give the film itself to colour it", name);
     } else if (entry.is_directory(none) && !IsSystemFolder(name) && !Holds(kOurs, name) &&

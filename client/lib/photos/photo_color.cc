@@ -11,20 +11,20 @@
 namespace color3d::client {
 namespace {
 
-// Noise of single pixels averages out at this size, hues of things do not.
+// At this size pixel noise averages out, but hues of objects do not.
 constexpr int kSidePx = 32;
 constexpr size_t kTones = 12;
-// Lab units: what compression and uneven toning make.
+// Lab units: differences caused by compression and uneven toning.
 constexpr double kOtherColor = 6.0;
-// A tone of less chroma has no hue of its own.
+// A tone with less chroma has no hue.
 constexpr double kNeutral = 3.0;
 const double kSameHue = std::tan(30.0 * M_PI / 180.0);
-// Chroma of a stain that still is the tone's: three times as much, and a little.
+// Maximum chroma of a stain that still counts as tone: three times as much, plus a constant.
 constexpr double kStainGain = 3.0, kStainMore = 10.0;
 
-// Measured: prints in sepia, stained ones among them, and old film have at most 2 % and 0.7 Lab
-// units; photographs of scenes in colour 5 % and more, and 1.5 Lab units, but for yellow fruit on a
-// grey carpet with 0.4.
+// Measured: sepia prints, also stained ones, and old film have at most 2 % and 0.7 Lab units;
+// colour photos have at least 5 % and 1.5 Lab units, except for yellow fruit on a grey carpet with
+// 0.4.
 constexpr double kSecondHueOfColor = 0.04;
 constexpr double kSecondHueOfPrint = 0.01;
 constexpr double kScatterOfColor = 1.2;
@@ -42,7 +42,8 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// The median chroma of pixels of like luminance, as a curve over L: of equally many pixels each.
+// Median chroma of pixels of similar luminance, as a curve over L with equally many pixels in each
+// bin.
 class Tone {
  public:
   explicit Tone(const Image& lab) {

@@ -1,32 +1,31 @@
-// Is a photograph in colour, or a monochrome one that is toned, faded, stained or noisy? Not the
-// question whether a picture holds any colour at all, which core/keycolor/picture_checks.h answers.
-// Pure functions, thread-safe.
+// Tells photos in colour from monochrome ones that are toned, faded, stained or noisy.
+// core/keycolor/picture_checks.h answers another question: whether a picture has any colour. Pure
+// functions, thread-safe.
 #pragma once
 
 #include "core/base/image.h"
 
 namespace color3d::client {
 
-// How the chroma of a picture differs from its tone: the hue and chroma that it mostly has at each
-// luminance. A monochrome print has that and nothing else, whatever its toning; a stain or fading
-// of the same hue is no second one.
+// Deviation of a picture's chroma from its tone: the prevailing hue and chroma at each luminance. A
+// monochrome print has only its tone; stains or fading of the same hue count as tone.
 struct HueSpread {
   double second_hue = 0.0;  // share of the picture that differs from its tone in hue, 0..1
   double scatter = 0.0;     // how far half of the picture differs from its tone, Lab units
 };
 
-// Of a 3-channel picture, sRGB in 0..1; zero for 1 channel.
+// Requires: 3 channels, sRGB in 0..1, or 1 channel, for which the result is zero.
 HueSpread MeasureHues(const Image& srgb);
 
 struct ColorVerdict {
   bool in_color = false;
-  // False for what may be either: a print with a stain or tint of another hue, or a photograph in
-  // colour most of which has one hue.
+  // False for ambiguous pictures: a print with a stain or tint of another hue, or a photo in colour
+  // most of which has one hue.
   bool is_sure = true;
 };
 ColorVerdict JudgeColor(const HueSpread& hues);
 
-// JudgeColor's answer for a picture.
+// Returns JudgeColor's answer for a picture.
 bool HasColor(const Image& srgb);
 
 }  // namespace color3d::client

@@ -77,7 +77,7 @@ TEST(PhotoColor, NoiseIsNoColor) {
   ExpectSurelyMonochrome("sepia with noise", Print(Sepia, 0.15));
 }
 
-TEST(PhotoColor, StainsAndFadingOfTheSameHueAreNoSecondHue) {
+TEST(PhotoColor, StainsOfSameHueAreMonochrome) {
   const auto stained = [](double x, double y, double l) {
     return Add(Sepia(x, y, l), Spot(x, y, 0.7, 0.4, 0.4), {6.0, 22.0});
   };
@@ -105,7 +105,7 @@ TEST(PhotoColor, TintsOfOtherHuesAreColorButUnsure) {
   }
 }
 
-TEST(PhotoColor, ThingsOfManyHuesAreSurelyColor) {
+TEST(PhotoColor, ManyHuesAreSurelyColor) {
   const Image picture = Print([](double x, double y, double) {
     return Ab{20.0 * std::sin(8.0 * y), 20.0 * std::cos(11.0 * x)};
   });
@@ -115,7 +115,7 @@ TEST(PhotoColor, ThingsOfManyHuesAreSurelyColor) {
 }
 
 // Bananas on a grey carpet: one hue, but most of the picture has none.
-TEST(PhotoColor, OneColoredThingOnANeutralGroundIsColor) {
+TEST(PhotoColor, OneColoredObjectIsColor) {
   EXPECT_TRUE(HasColor(Print([](double x, double y, double) {
     return Spot(x, y, 0.5, 0.5, 0.25) > 0.0 ? Ab{2.0, 55.0} : Ab{0.3, 1.5};
   })));

@@ -51,7 +51,7 @@ void AddPhotos(const fs::path& root,
   }
 }
 
-// The photos below `root`/`folder`, if there is such a folder, as images/ of the scene.
+// Returns the photos below `root`/`folder`, if the folder exists, as images/ of the scene.
 void AddPhotosAsImages(const fs::path& root,
                        const std::string& folder,
                        PhotoFolder* result,
@@ -72,11 +72,11 @@ void CollectNerfies(const fs::path& root, PhotoFolder* result, PassedOver* passe
   AddNerfiesFiles(root, &result->model_files);
 }
 
-// Films directly in `root` and in the folders that transforms.json names, and the file that tells
-// where their cameras stand, if there is one. Nothing when there is only one film.
+// Returns films directly in `root` and in the folders that transforms.json names, and the file with
+// the poses of their cameras, if there is one. Empty if there is only one film.
 void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
   std::set<std::string> folders = {""};
-  folders.merge(FoldersThatTransformsNames(root));
+  folders.merge(FoldersInTransforms(root));
   std::vector<LocalFile> films;
   std::error_code none;
   for (const std::string& folder : folders) {
@@ -89,14 +89,14 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
   }
   if (films.size() < 2) return;
   std::ranges::sort(films, {}, &LocalFile::path);
-  // What names or counts the films decides itself: of those the server says which are copies.
+  // If a file names or counts the films, the server reports copies.
   const bool are_named = IsFile(root / kTransformsFile) || IsFile(root / kPosesBoundsFile);
-  if (!are_named) LeaveOutCopies(&films, &result->notes);
+  if (!are_named) RemoveCopies(&films, &result->notes);
   if (films.size() == 1) result->film = films[0];
   if (films.size() > 1) result->camera_films = std::move(films);
 }
 
-// Folders of pictures in `root`, two or more: each camera's frames.
+// Returns two or more folders of pictures in `root`: the frames of one camera each.
 void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
   std::error_code none;
   PhotoFolder folders;
@@ -118,7 +118,7 @@ void CollectImages(const fs::path& root, PhotoFolder* result, PassedOver* passed
   if (!result->photos.empty()) return;
   AddPhotos(root, "", /*with_subfolders=*/false, result, passed_over);
   std::vector<std::string> used;
-  for (const std::string& folder : FoldersThatTransformsNames(root)) {
+  for (const std::string& folder : FoldersInTransforms(root)) {
     used.push_back(folder.substr(0, folder.find('/')));
     if (IsFolder(root / folder)) {
       AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);
@@ -128,7 +128,7 @@ void CollectImages(const fs::path& root, PhotoFolder* result, PassedOver* passed
   if (HasPoses(root)) AddPhotosAsImages(root, OnlyFolderOfPhotos(root), result, passed_over);
 }
 
-// All files, so that one of the wrong kind is refused by name instead of being passed over.
+// Includes all files, so that one of the wrong kind is refused by name instead of being skipped.
 void CollectAugmentFiles(const fs::path& root, PhotoFolder* result) {
   if (!IsFolder(root / kAugment)) return;
   for (const std::string& file : ListFiles(root / kAugment)) {
@@ -145,7 +145,7 @@ void CollectAugmentFiles(const fs::path& root, PhotoFolder* result) {
   }
 }
 
-// The only splat or film in a folder without photos.
+// Returns the only splat or film in a folder without photos.
 std::optional<LocalFile> FindOnly(const fs::path& root,
                                   bool (*is_one)(std::string_view path),
                                   const char* what) {
@@ -250,7 +250,7 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
     return result;
   }
   RequireFolder(root);
-  // "photos/." and "photos/" are "photos".
+  // "photos/." and "photos/" become "photos".
   result.root = root.lexically_normal();
   if (!result.root.has_filename() && result.root.has_relative_path()) {
     result.root = result.root.parent_path();

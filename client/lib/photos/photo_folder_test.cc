@@ -40,7 +40,7 @@ class PhotoFolderTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(PhotoFolderTest, TakesPhotosOfTheFolderAndNothingElse) {
+TEST_F(PhotoFolderTest, TakesPhotosOnly) {
   for (const char* name : {"b.JPG", "a.jpg", "c.tiff", "notes.txt", ".hidden.jpg", "sub/d.jpg"}) {
     Write(name);
   }
@@ -52,13 +52,13 @@ TEST_F(PhotoFolderTest, TakesPhotosOfTheFolderAndNothingElse) {
                           HasSubstr("pictures in subfolders passed over: 1 (sub/)")));
 }
 
-TEST_F(PhotoFolderTest, ImagesFolderWinsAndIsReadAtAnyDepth) {
+TEST_F(PhotoFolderTest, PrefersImagesFolderAtAnyDepth) {
   for (const char* name : {"preview.jpg", "images/a.jpg", "images/left/b.png"}) Write(name);
   EXPECT_THAT(Paths(CollectPhotos(root()).photos),
               ElementsAre("images/a.jpg", "images/left/b.png"));
 }
 
-TEST_F(PhotoFolderTest, PicturesInAugmentGoAlongAndAreNoPhotos) {
+TEST_F(PhotoFolderTest, AugmentPicturesAreNoPhotos) {
   for (const char* name : {"a.jpg", "b.jpg", "augment/x.png", "augment/deep/y.jpg"}) Write(name);
   const PhotoFolder folder = CollectPhotos(root());
   EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.jpg"));
@@ -68,7 +68,7 @@ TEST_F(PhotoFolderTest, PicturesInAugmentGoAlongAndAreNoPhotos) {
   EXPECT_THAT(ErrorOf(root()), HasSubstr("augment/notes.txt is no picture"));
 }
 
-TEST_F(PhotoFolderTest, ASplatStandsForPhotos) {
+TEST_F(PhotoFolderTest, TakesSplatInsteadOfPhotos) {
   Write("bust.ply");
   Write("notes.txt");
   for (const fs::path& path : {root() / "bust.ply", root()}) {
@@ -87,7 +87,7 @@ TEST_F(PhotoFolderTest, ASplatStandsForPhotos) {
   EXPECT_FALSE(CollectPhotos(root()).splat.has_value());
 }
 
-TEST_F(PhotoFolderTest, AFilmStandsForPhotosAndPhotosForAFilm) {
+TEST_F(PhotoFolderTest, TakesFilmOrPhotosAsFrames) {
   Write("walk.MOV");
   Write("notes.txt");
   for (const fs::path& path : {root() / "walk.MOV", root()}) {
@@ -122,7 +122,7 @@ TEST_F(PhotoFolderTest, AFilmStandsForPhotosAndPhotosForAFilm) {
   EXPECT_THROW(TakeAsFrames(&two), Error);
 }
 
-TEST_F(PhotoFolderTest, TakesOneWholeColmapModel) {
+TEST_F(PhotoFolderTest, TakesOneCompleteColmapModel) {
   for (const char* name : {"images/a.jpg", "images/b.jpg"}) Write(name);
   for (const char* stem : {"cameras", "images", "points3D"}) {
     Write(std::string("sparse/0/") + stem + ".txt");
@@ -139,7 +139,7 @@ TEST_F(PhotoFolderTest, TakesOneWholeColmapModel) {
   EXPECT_EQ(CollectPhotos(root()).model_files.size(), 4u);
 }
 
-TEST_F(PhotoFolderTest, TimesGoWithAColmapModel) {
+TEST_F(PhotoFolderTest, TakesTimesWithColmapModel) {
   for (const char* name : {"images/a.jpg", "images/b.jpg", "times.txt"}) Write(name);
   PhotoFolder folder = CollectPhotos(root());
   EXPECT_THAT(folder.model_files, IsEmpty());
@@ -161,7 +161,7 @@ TEST_F(PhotoFolderTest, TimesGoWithAColmapModel) {
   EXPECT_THAT(folder.notes, IsEmpty());
 }
 
-TEST_F(PhotoFolderTest, TransformsNamesItsSubfolders) {
+TEST_F(PhotoFolderTest, TakesSubfoldersThatTransformsNames) {
   for (const char* name : {"train/a.png", "train/b.png", "other/c.png"}) Write(name);
   Write("transforms.json", R"({"frames": [{"file_path": "./train/a"}, {"file_path": "../x/y"}]})");
   const PhotoFolder folder = CollectPhotos(root());
@@ -169,7 +169,7 @@ TEST_F(PhotoFolderTest, TransformsNamesItsSubfolders) {
   EXPECT_THAT(Paths(folder.model_files), ElementsAre("transforms.json"));
 }
 
-TEST_F(PhotoFolderTest, CamerasOfARigAreSubfolders) {
+TEST_F(PhotoFolderTest, TakesSubfoldersOfRig) {
   for (const char* name : {"images/cam01/0001.jpg", "images/cam02/0001.jpg"}) Write(name);
   Write("transforms.json", R"({"frames": []})");
   EXPECT_THAT(Paths(CollectPhotos(root()).photos),
@@ -181,7 +181,7 @@ TEST_F(PhotoFolderTest, CamerasOfARigAreSubfolders) {
   EXPECT_THAT(Paths(CollectPhotos(root()).photos), ElementsAre("cam01/0001.jpg", "cam02/0001.jpg"));
 }
 
-TEST_F(PhotoFolderTest, FoldersOfFramesAreOfOneCameraEach) {
+TEST_F(PhotoFolderTest, FoldersOfFramesAreCameras) {
   for (const char* name : {"right/10.png", "right/9.png", "left/9.png", "notes/a.txt"}) Write(name);
   EXPECT_THAT(ErrorOf(root()), HasSubstr("no photographs"));
   PhotoFolder folder = CollectPhotos(root(), /*as_frames=*/true);
@@ -193,7 +193,7 @@ TEST_F(PhotoFolderTest, FoldersOfFramesAreOfOneCameraEach) {
   EXPECT_THAT(ErrorOf(root(), /*as_frames=*/true), HasSubstr("did you mean"));
 }
 
-TEST_F(PhotoFolderTest, FilmsOfCamerasWithPosesStandForPhotos) {
+TEST_F(PhotoFolderTest, TakesPosedFilmsInsteadOfPhotos) {
   for (const char* name : {"cam01.mp4", "cam00.mp4", "poses_bounds.npy", "notes.txt"}) Write(name);
   PhotoFolder folder = CollectPhotos(root());
   EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("cam00.mp4", "cam01.mp4", "poses_bounds.npy"));
@@ -208,7 +208,7 @@ TEST_F(PhotoFolderTest, FilmsOfCamerasWithPosesStandForPhotos) {
   EXPECT_TRUE(CollectPhotos(root()).film.has_value());  // one film has no use for poses
 }
 
-TEST_F(PhotoFolderTest, FoldersOfNerfiesGoAsTheyAre) {
+TEST_F(PhotoFolderTest, TakesNerfiesFolderUnchanged) {
   for (const char* name : {"metadata.json",
                            "dataset.json",
                            "points.npy",
@@ -231,7 +231,7 @@ TEST_F(PhotoFolderTest, FoldersOfNerfiesGoAsTheyAre) {
                           "points.npy"));
 }
 
-TEST_F(PhotoFolderTest, SaysThatPosesBesideThePhotosAreNotUsed) {
+TEST_F(PhotoFolderTest, NotesUnusedPosesBesidePhotos) {
   for (const char* name : {"images/a.jpg", "images/b.jpg", "sparse/0/cameras.bin"}) Write(name);
   const PhotoFolder folder = CollectPhotos(root() / "images/");
   EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.jpg"));
@@ -240,7 +240,7 @@ TEST_F(PhotoFolderTest, SaysThatPosesBesideThePhotosAreNotUsed) {
   EXPECT_THAT(folder.notes[0], HasSubstr("sparse are not used"));
 }
 
-TEST_F(PhotoFolderTest, ErrorsNameTheFolder) {
+TEST_F(PhotoFolderTest, ErrorsNameFolder) {
   EXPECT_THAT(ErrorOf(root()), HasSubstr("there is no folder"));
   Write("deep/a.jpg");
   EXPECT_THAT(ErrorOf(root()), HasSubstr("contains no photographs (JPEG, PNG, TIFF, "));
@@ -254,18 +254,18 @@ TEST_F(PhotoFolderTest, ErrorsNameTheFolder) {
   EXPECT_THAT(ErrorOf(root()), HasSubstr("is not JSON"));
 }
 
-TEST_F(PhotoFolderTest, OnePictureIsNoFilm) {
+TEST_F(PhotoFolderTest, RefusesFilmOfOnePicture) {
   Write("one.jpg");
   EXPECT_THAT(ErrorOf(root(), /*as_frames=*/true),
               HasSubstr("contains one picture (one.jpg), and one frame is no film"));
 }
 
-TEST_F(PhotoFolderTest, RefusesNamesThatAreNotText) {
+TEST_F(PhotoFolderTest, RefusesNamesThatAreNotUtf8) {
   for (const char* name : {"a.jpg", "b\xe9.jpg"}) Write(name);
   EXPECT_THAT(ErrorOf(root()), HasSubstr("not UTF-8"));
 }
 
-TEST_F(PhotoFolderTest, FindsThePhotoOfAColoredCopy) {
+TEST_F(PhotoFolderTest, FindsPhotoOfColoredCopy) {
   for (const char* name : {"images/a.jpg", "images/b.jpg", "images/x/b.jpg"}) Write(name);
   const PhotoFolder folder = CollectPhotos(root());
   EXPECT_EQ(PhotoOfSameStem(folder, "/elsewhere/a.png"), "a.jpg");

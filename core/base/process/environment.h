@@ -1,5 +1,5 @@
-// What programs that we start learn from our environment. Reads it; thread-safe as long as nobody
-// changes it.
+// Environment variables passed to child programs. Thread-safe unless another thread changes the
+// environment.
 #pragma once
 
 #include <string>
@@ -8,12 +8,12 @@
 
 namespace color3d {
 
-// Whether "NAME=value" may be handed on to another program: where things are, which language is
-// spoken, and how libraries compute. No name that is not listed is handed on, so that no token, key
-// or password is.
+// Returns true if "NAME=value" may be passed to a child program: variables of paths, language and
+// numeric libraries. Names that are not listed are not passed, so that no token, key or password
+// leaks.
 bool IsHandedOn(std::string_view variable);
 
-// The variables of this process that may be handed on, as "NAME=value".
+// Variables of this process that may be passed on, as "NAME=value".
 std::vector<std::string> EnvironmentToHandOn();
 
 }  // namespace color3d

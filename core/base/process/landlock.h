@@ -1,19 +1,18 @@
-// What a sandbox may reach of the file system, as the kernel's Landlock takes it. For sandbox.cc
-// only.
+// Landlock rules for the parts of the file system that a sandbox may access. For sandbox.cc only.
 #pragma once
 
 #include "core/base/process/sandbox.h"
 
 namespace color3d {
 
-// The first that lets files be linked and renamed from one folder to another (Linux 5.19).
+// First version that allows linking and renaming files between folders (Linux 5.19).
 constexpr int kLeastLandlockAbi = 2;
 
-// 0: the kernel has no Landlock, or it is switched off.
+// 0 if the kernel has no Landlock or it is disabled.
 int LandlockAbi();
 
-// A ruleset for landlock_restrict_self with all that this version knows, closed on exec; the caller
-// closes it. Throws Error{kInternal}.
+// Creates a ruleset for landlock_restrict_self with all access rights of this version, closed on
+// exec. The caller closes it. Throws Error{kInternal}.
 int OpenLandlockRuleset(const SandboxRules& rules, int abi);
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// What a process may take of the machine. The kernel ends or refuses what goes beyond.
+// Resource limits of a process. The kernel ends a process or refuses a call beyond them.
 #pragma once
 
 #include <cstdint>
@@ -6,25 +6,25 @@
 
 namespace color3d {
 
-// 0: as it is. No limit is ever raised; core dumps are always off.
+// 0: unchanged. No limit is ever raised; core dumps are always off.
 struct ProcessLimits {
-  int64_t memory_bytes = 0;  // its own writable memory, what files are mapped to not counted
-  int64_t file_bytes = 0;    // of each file that it writes; more is SIGXFSZ
-  int64_t cpu_seconds = 0;   // of all its threads together; more is SIGXCPU
+  int64_t memory_bytes = 0;  // private writable memory, without mapped files
+  int64_t file_bytes = 0;    // of each file written; SIGXFSZ beyond
+  int64_t cpu_seconds = 0;   // of all threads together; SIGXCPU beyond
   int64_t descriptors = 0;
-  int64_t processes = 0;  // and threads, of the user's in all; root's are not counted
+  int64_t processes = 0;  // and threads, of the whole user; not counted for root
 };
 
-// For the calling process and all that it starts. Async-signal-safe; false with errno when the
-// kernel refuses.
+// Applies to the calling process and its children. Async-signal-safe; returns false with errno set
+// if the kernel refuses.
 bool LimitProcess(const ProcessLimits& limits) noexcept;
 
-// When the machine's memory runs out, the kernel ends this process and what it starts before others
-// of its user's. False when the kernel does not take it.
+// Makes the kernel end this process and its children before others of the same user when the
+// machine runs out of memory. Returns false if the kernel refuses.
 bool BeEndedFirstWhenMemoryRunsOut() noexcept;
 
-// What a process that was ended by `signal` most likely ran into, as a part of a sentence:
-// "it wrote a file of more than 64 MiB".
+// Most likely limit exceeded by a process that was ended by `signal`, as a part of a sentence: "it
+// wrote a file of more than 64 MiB".
 std::string LikelyCause(int signal, const ProcessLimits& limits);
 
 }  // namespace color3d

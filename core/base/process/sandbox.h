@@ -1,5 +1,5 @@
-// Locks a process in for good, and all that it starts: what decodes strangers' files gets no more
-// of the machine than its work needs. By seccomp and Landlock; no rights are needed for it.
+// Irrevocable sandbox for a process and its children, by seccomp and Landlock: code that decodes
+// untrusted files gets access only to the resources that it needs. Requires no privileges.
 #pragma once
 
 #include <linux/filter.h>
@@ -11,37 +11,37 @@
 namespace color3d {
 
 enum class Sockets {
-  kNone,   // pairs and pipes only
+  kNone,   // socket pairs and pipes only
   kLocal,  // Unix sockets
-  kAll,    // and the internet's
+  kAll,    // and Internet sockets
 };
 
 struct SandboxRules {
-  // Folders, with all below them, and files; what does not exist is left out. The system's own
-  // programs, libraries and settings may be read besides; of /etc only what programs need.
+  // Folders (with their contents) and files; missing ones are skipped. Programs, libraries and
+  // settings of the system are readable in addition; of /etc only the files that programs need.
   std::vector<std::filesystem::path> readable;  // and executable
   std::vector<std::filesystem::path> writable;  // and readable
   Sockets sockets = Sockets::kNone;
-  bool may_start_processes = false;  // threads it may, always
+  bool may_start_processes = false;  // threads are always allowed
 };
 
-// What the kernel is told, prepared beforehand, because little is allowed between fork and exec.
+// Rules compiled in advance, because few calls are allowed between fork and exec.
 class Sandbox {
  public:
-  // What the machine does not have is left out and said in missing(). Throws Error{kInternal} when
-  // what it has does not take the rules.
+  // Features that the machine lacks are skipped and listed in missing(). Throws Error{kInternal} if
+  // the kernel rejects the rules.
   explicit Sandbox(const SandboxRules& rules);
   ~Sandbox();
   Sandbox(const Sandbox&) = delete;
   Sandbox& operator=(const Sandbox&) = delete;
 
-  // The calling thread and all that it starts from now on, programs too; there is no way back.
-  // Async-signal-safe; false with errno when the kernel refuses.
+  // Applies to the calling thread and everything it starts from then on, including programs; cannot
+  // be undone. Async-signal-safe; returns false with errno set if the kernel refuses.
   bool Enter() const noexcept;
 
-  // "seccomp, Landlock ABI 7"; empty when the machine has none.
+  // "seccomp, Landlock ABI 7"; empty if the machine has neither.
   const std::string& active() const { return active_; }
-  // "Landlock ABI 2 (Linux 5.19)"; empty when nothing is missing.
+  // "Landlock ABI 2 (Linux 5.19)"; empty if nothing is missing.
   const std::string& missing() const { return missing_; }
 
  private:
@@ -51,8 +51,8 @@ class Sandbox {
   std::string missing_;
 };
 
-// Whether programs that this process starts for strangers' files are locked in: yes, unless it was
-// switched off at the start.
+// True if programs that this process starts for untrusted files run in a sandbox: the default,
+// unless disabled at startup.
 void SetSandboxing(bool on);
 bool IsSandboxing();
 

@@ -79,7 +79,7 @@ class SandboxTest : public testing::Test {
   SandboxRules rules_;
 };
 
-TEST_F(SandboxTest, FilesOfOthersAreClosed) {
+TEST_F(SandboxTest, DeniesFilesOutsideRules) {
   const fs::path own = scratch_.path() / "own";
   EXPECT_EQ(InSandbox(rules_, [&] { return CanOpen(own / "new", O_WRONLY | O_CREAT); }), 0);
   EXPECT_EQ(InSandbox(rules_, [&] { return CanOpen(own / "new", O_RDONLY); }), 0);
@@ -108,7 +108,7 @@ TEST_F(SandboxTest, FilesOfOthersAreClosed) {
             EACCES);
 }
 
-TEST_F(SandboxTest, ProgramsThatWereMadeInsideDoNotRun) {
+TEST_F(SandboxTest, DoesNotRunProgramsCreatedInside) {
   const fs::path program = scratch_.path() / "own" / "program";
   fs::copy_file("/bin/true", program);
   EXPECT_EQ(InSandbox(rules_, [&] { return ::execl(program.c_str(), "true", nullptr) == 0; }),
@@ -116,7 +116,7 @@ TEST_F(SandboxTest, ProgramsThatWereMadeInsideDoNotRun) {
   EXPECT_EQ(InSandbox(rules_, [] { return ::execl("/bin/true", "true", nullptr) == 0; }), 0);
 }
 
-TEST_F(SandboxTest, SocketsAreAsSaid) {
+TEST_F(SandboxTest, FollowsSocketRules) {
   const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
@@ -144,7 +144,7 @@ TEST_F(SandboxTest, SocketsAreAsSaid) {
   ::close(listener);
 }
 
-TEST_F(SandboxTest, OtherProcessesAndTheKernelAreOutOfReach) {
+TEST_F(SandboxTest, DeniesOtherProcessesAndKernel) {
   rules_.may_start_processes = true;
   EXPECT_EQ(InSandbox(rules_, [] { return ::ptrace(PTRACE_TRACEME, 0, 0, 0) == 0; }), EPERM);
   EXPECT_EQ(InSandbox(rules_, [] { return ::mount("none", "/mnt", "tmpfs", 0, "") == 0; }), EPERM);
@@ -166,7 +166,7 @@ TEST_F(SandboxTest, OtherProcessesAndTheKernelAreOutOfReach) {
   EXPECT_EQ(InSandbox(rules_, [] { return CanFork(); }), 0);
 }
 
-TEST_F(SandboxTest, ThreadsButNoProcesses) {
+TEST_F(SandboxTest, AllowsThreadsButNoProcesses) {
   EXPECT_EQ(InSandbox(rules_, [] { return CanFork(); }), EPERM);
   const auto with_a_thread = [] {
     int answer = 0;
@@ -176,7 +176,7 @@ TEST_F(SandboxTest, ThreadsButNoProcesses) {
   EXPECT_EQ(InSandbox(rules_, with_a_thread), 0);
 }
 
-TEST_F(SandboxTest, OneInAnotherHasTheRightsOfBoth) {
+TEST_F(SandboxTest, NestedSandboxIntersectsRights) {
   SandboxRules inner;
   inner.writable = {scratch_.path()};
   const Sandbox outer(rules_);

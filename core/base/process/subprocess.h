@@ -1,5 +1,5 @@
-// Runs a child program with limits, a log file and cancellation, in a sandbox where one is given;
-// never leaves one behind.
+// Runs a child program with limits, a log file, cancellation and an optional sandbox. Never leaves
+// a child behind.
 #pragma once
 
 #include <chrono>
@@ -15,24 +15,25 @@
 namespace color3d {
 
 struct SubprocessOptions {
-  std::vector<std::string> arguments;    // arguments[0] is looked up on PATH
-  std::vector<std::string> environment;  // "NAME=value", besides what is handed on (environment.h)
-  std::filesystem::path log_path;        // stdout and stderr are appended here; empty: discarded
+  std::vector<std::string> arguments;  // arguments[0] is searched in PATH
+  std::vector<std::string>
+      environment;  // "NAME=value", in addition to the inherited ones (environment.h)
+  std::filesystem::path log_path;  // stdout and stderr are appended here; empty: discarded
   std::chrono::seconds timeout{3600};
   ProcessLimits limits;
-  std::optional<SandboxRules> sandbox;  // the program itself may be read besides
+  std::optional<SandboxRules> sandbox;  // the program itself is readable in addition
 };
 
 struct SubprocessResult {
   int exit_code = 0;  // 128 + signal when killed
-  int signal = 0;     // that killed it; 0: it ended by itself
+  int signal = 0;     // signal that ended the child; 0: it exited
   bool timed_out = false;
   double seconds = 0.0;
 };
 
 // Starts the child in its own process group, waits, and kills the whole group on time-out or
-// cancellation (then throws Error{kCancelled}). The child dies with us. Throws
-// Error{kFailedPrecondition} when the program is not installed.
+// cancellation (then throws Error{kCancelled}). The child dies with this process. Throws
+// Error{kFailedPrecondition} if the program is not installed.
 SubprocessResult RunSubprocess(const SubprocessOptions& options, const CancellationToken& cancel);
 
 }  // namespace color3d

@@ -53,7 +53,7 @@ SubprocessResult RunShell(const std::string& script,
   return RunSubprocess(options, CancellationToken());
 }
 
-TEST(Subprocess, LimitsEndWhatTakesWithoutEnd) {
+TEST(Subprocess, LimitsEndRunawayProcesses) {
   ScratchFolder scratch;
   const std::filesystem::path log = scratch.path() / "log", big = scratch.path() / "big";
   ProcessLimits limits;
@@ -82,7 +82,7 @@ TEST(Subprocess, LimitsEndWhatTakesWithoutEnd) {
   EXPECT_EQ(RunShell("test $(ulimit -n) = 64 && test $(ulimit -c) = 0", limits, log).exit_code, 0);
 }
 
-TEST(Subprocess, AForkBombInASandboxStartsNothing) {
+TEST(Subprocess, SandboxStopsForkBomb) {
   if (!Sandbox(SandboxRules()).missing().empty()) GTEST_SKIP() << "not on this machine";
   ScratchFolder scratch;
   SubprocessOptions options;
@@ -96,7 +96,7 @@ TEST(Subprocess, AForkBombInASandboxStartsNothing) {
   EXPECT_NE(ReadFile(options.log_path).find("Cannot fork"), std::string::npos);
 }
 
-TEST(Subprocess, ASandboxedProgramReachesItsFolderAlone) {
+TEST(Subprocess, SandboxedProgramReachesOwnFolderOnly) {
   if (!Sandbox(SandboxRules()).missing().empty()) GTEST_SKIP() << "not on this machine";
   ScratchFolder scratch, other;
   SubprocessOptions options;
@@ -113,7 +113,7 @@ TEST(Subprocess, ASandboxedProgramReachesItsFolderAlone) {
   EXPECT_NE(ReadFile(options.log_path).find("Permission denied"), std::string::npos);
 }
 
-TEST(Subprocess, TokensAreNotHandedOn) {
+TEST(Subprocess, DoesNotPassTokens) {
   ScratchFolder scratch;
   ::setenv("COLOR3D_TOKEN", "secret", 1);
   SubprocessOptions options;

@@ -1,4 +1,4 @@
-// The system calls that a sandbox refuses, as a program for the kernel. For sandbox.cc only.
+// The system call filter of a sandbox, as a BPF program. For sandbox.cc only.
 #pragma once
 
 #include <linux/filter.h>
@@ -11,8 +11,8 @@ namespace color3d {
 
 bool HasSyscallFilters();
 
-// Calls that neither decoding nor computing needs give EPERM. Throws Error{kInternal} when
-// libseccomp does not take a rule.
+// Calls that neither decoding nor computing needs return EPERM. Throws Error{kInternal} if
+// libseccomp rejects a rule.
 std::vector<sock_filter> CompileSyscallFilter(const SandboxRules& rules);
 
 }  // namespace color3d

@@ -17,7 +17,7 @@ std::string Refusal(const std::string& address) {
   }
 }
 
-TEST(CheckAddressForm, ASchemeIsNotNeeded) {
+TEST(CheckAddressForm, AcceptsAddressWithoutScheme) {
   EXPECT_EQ(Refusal("http://127.0.0.1:50551"),
             "--server http://127.0.0.1:50551: http:// is not needed; say --server 127.0.0.1:50551");
   EXPECT_EQ(Refusal("http://box:50551/x/"),
@@ -27,7 +27,7 @@ TEST(CheckAddressForm, ASchemeIsNotNeeded) {
   EXPECT_EQ(Refusal("[::1]:50551"), "");
 }
 
-TEST(CheckAddressForm, AUnixSocketsPathHasALimit) {
+TEST(CheckAddressForm, LimitsUnixSocketPath) {
   EXPECT_EQ(Refusal("unix:/tmp/a.sock"), "");
   EXPECT_EQ(Refusal("unix:///tmp/a.sock"), "");
   EXPECT_EQ(Refusal("unix:" + std::string(107, 'a')), "");

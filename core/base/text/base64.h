@@ -1,4 +1,4 @@
-// RFC 4648, for what stands inside of pages. Pure.
+// Base64 (RFC 4648), for data embedded in HTML pages. Pure.
 #pragma once
 
 #include <string>

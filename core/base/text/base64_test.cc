@@ -5,7 +5,7 @@
 namespace color3d {
 namespace {
 
-TEST(Base64Test, IsWhatTheStandardSays) {
+TEST(Base64Test, MatchesStandard) {
   EXPECT_EQ(Base64(""), "");
   EXPECT_EQ(Base64("f"), "Zg==");
   EXPECT_EQ(Base64("fo"), "Zm8=");
@@ -13,7 +13,7 @@ TEST(Base64Test, IsWhatTheStandardSays) {
   EXPECT_EQ(Base64(std::string("\xff\xfe\0", 3)), "//4A");
 }
 
-TEST(Base64Test, PiecesOfMuchJoin) {
+TEST(Base64Test, EncodesLargeInputInPieces) {
   const std::string text = Base64(std::string((size_t{3} << 24) + 4, 'o'));
   EXPECT_EQ(text.size(), (size_t{4} << 24) + 8);
   EXPECT_EQ(text.substr(text.size() - 12), "b29vb29vbw==");

@@ -1,4 +1,4 @@
-// JSON and plain text as other programs write them: with a byte order mark, NaN, Infinity and
+// JSON and plain text as written by other programs: with a byte order mark, NaN, Infinity and
 // trailing commas. Pure functions, thread-safe.
 #pragma once
 
@@ -10,14 +10,14 @@
 
 namespace color3d {
 
-// `text` without the UTF-8 byte order mark that editors put before it. Throws
-// Error{kInvalidArgument} that names the file for UTF-16, which such a mark tells.
+// Returns `text` without a leading UTF-8 byte order mark. Throws Error{kInvalidArgument} with the
+// file's name if the mark is that of UTF-16.
 std::string_view WithoutMark(std::string_view text, const std::string& file_name);
 
-// The characters of a JSON text, one after the other, without what JSON forbids and other programs
-// write: a comma before a closing bracket is left out; NaN, Infinity and numbers beyond a double
-// become strings, which readers of numbers refuse by name and everybody else passes over. Line
-// numbers stay. An input iterator; memory does not grow with the text, which must outlive it.
+// Iterates over the characters of a JSON text and repairs common violations of the standard: omits
+// commas before a closing bracket; turns NaN, Infinity and numbers beyond double into strings,
+// which number parsers reject by name and other readers ignore. Line numbers are preserved. An
+// input iterator; memory does not grow with the text, which must outlive it.
 class PlainJson {
  public:
   using iterator_category = std::input_iterator_tag;
@@ -37,7 +37,7 @@ class PlainJson {
  private:
   enum class Quoted { kNot, kOpening, kToken };
   bool AtEnd() const { return at_ >= text_.size() && quoted_ == Quoted::kNot; }
-  // At a character that was not there yet: skips commas, finds where tokens end.
+  // Called at each new character: skips commas, finds ends of tokens.
   void Arrive();
 
   std::string_view text_;
@@ -51,7 +51,7 @@ class PlainJson {
 // Throws Error{kInvalidArgument}: "NAME is not JSON: parse error at line 3, column 7: ...".
 nlohmann::json ParseJson(std::string_view text, const std::string& file_name);
 
-// What a JSON library says of an error, without its own number for it; in one line.
+// The message of a JSON library's error without the library's error number, in one line.
 std::string JsonErrorText(const std::string& what);
 
 }  // namespace color3d

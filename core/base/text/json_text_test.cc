@@ -27,7 +27,7 @@ std::string Said(std::string_view text) {
   return "";
 }
 
-TEST(JsonText, WhatJsonHasIsLeftAlone) {
+TEST(JsonText, KeepsValidJson) {
   for (const char* text : {"",
                            " \n",
                            "{}",
@@ -42,7 +42,7 @@ TEST(JsonText, WhatJsonHasIsLeftAlone) {
   }
 }
 
-TEST(JsonText, WhatOtherProgramsWriteBecomesJson) {
+TEST(JsonText, AcceptsJsonOfOtherPrograms) {
   EXPECT_EQ(Plain("\xef\xbb\xbf{}"), "{}");
   EXPECT_EQ(Plain("[1,\n]"), "[1\n]");
   EXPECT_EQ(Plain("{\"a\": 1 , }"), "{\"a\": 1  }");
@@ -62,7 +62,7 @@ TEST(JsonText, ErrorsNameFileAndLine) {
   EXPECT_EQ(Said(std::string_view("\xff\xfe{\0}\0", 6)), "a.json is UTF-16 text; save it as UTF-8");
 }
 
-TEST(JsonText, AMarkIsNoText) {
+TEST(JsonText, SkipsByteOrderMark) {
   EXPECT_EQ(WithoutMark("\xef\xbb\xbf# a", "a.txt"), "# a");
   EXPECT_EQ(WithoutMark("# a", "a.txt"), "# a");
   EXPECT_THROW(WithoutMark("\xfe\xff", "a.txt"), Error);

@@ -1,4 +1,4 @@
-// Names and file name endings in lower case. Pure function, thread-safe.
+// ASCII lower case for names and file extensions. Pure function, thread-safe.
 #pragma once
 
 #include <string>
@@ -6,7 +6,7 @@
 
 namespace color3d {
 
-// `text` with A-Z as a-z. All other bytes stay, those of UTF-8 too, whatever the locale.
+// Replaces A-Z by a-z. All other bytes, including UTF-8, are unchanged in every locale.
 inline std::string LowerCase(std::string_view text) {
   std::string lower(text);
   for (char& c : lower) {

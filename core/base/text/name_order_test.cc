@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST(NameOrder, NumbersCountAsNumbers) {
+TEST(NameOrder, SortsNumbersByValue) {
   std::vector<std::string> names{"f10.png", "f1.png", "f2.png", "f002.png", "e9.png", "f.png"};
   std::sort(names.begin(), names.end(), ComesBefore);
   EXPECT_EQ(
@@ -17,7 +17,7 @@ TEST(NameOrder, NumbersCountAsNumbers) {
       (std::vector<std::string>{"e9.png", "f.png", "f1.png", "f002.png", "f2.png", "f10.png"}));
 }
 
-TEST(NameOrder, NumbersLargerThanAnyWordAndEqualNames) {
+TEST(NameOrder, HandlesHugeNumbersAndEqualNames) {
   EXPECT_TRUE(ComesBefore("99999999999999999999998", "99999999999999999999999"));
   EXPECT_TRUE(ComesBefore("9", "10000000000000000000000"));
   EXPECT_FALSE(ComesBefore("a1", "a1"));

@@ -1,5 +1,5 @@
-// UTF-8 by RFC 3629. Protobuf strings must be valid, or nobody can parse the message; file names
-// and the output of other programs need not be.
+// UTF-8 by RFC 3629. Protobuf strings must be valid UTF-8 to be parsed; file names and the output
+// of other programs may not be.
 #pragma once
 
 #include <cstddef>
@@ -10,18 +10,18 @@ namespace color3d {
 
 bool IsUtf8(std::string_view text);
 
-// `text` with every byte that is no part of valid UTF-8 replaced by '?', cut to at most `max_bytes`
-// without splitting a character.
+// Replaces every byte that is not part of valid UTF-8 by '?' and cuts the text to at most
+// `max_bytes` without splitting a character.
 std::string CleanUtf8(std::string_view text, size_t max_bytes = 16384);
 
 enum class Lines {
-  kOne,   // line ends and tabs are escaped, too
-  kMany,  // line ends and tabs stay
+  kOne,   // escapes line ends and tabs, too
+  kMany,  // keeps line ends and tabs
 };
 
-// `text` as it may stand in a log or on a terminal: valid UTF-8 in which nothing ends a line, moves
-// the cursor, changes colours or turns the direction of writing. What would is written as "\n",
-// "\t", "\r", "\x1b" or "\u202e"; bytes that are no UTF-8 become '?'. Not cut.
+// Makes `text` safe for logs and terminals: valid UTF-8 without characters that end a line, move
+// the cursor, change colours or reverse the writing direction. These become "\n", "\t", "\r",
+// "\x1b" or "\u202e"; bytes that are not UTF-8 become '?'. Does not shorten the text.
 std::string EscapeControls(std::string_view text, Lines lines = Lines::kOne);
 
 }  // namespace color3d

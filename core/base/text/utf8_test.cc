@@ -5,7 +5,7 @@
 namespace color3d {
 namespace {
 
-TEST(IsUtf8, RefusesWhatRfc3629Refuses) {
+TEST(IsUtf8, FollowsRfc3629) {
   EXPECT_TRUE(IsUtf8(""));
   EXPECT_TRUE(IsUtf8("photo.jpg"));
   EXPECT_TRUE(IsUtf8("\xc3\xa9t\xc3\xa9.jpg"));
@@ -19,7 +19,7 @@ TEST(IsUtf8, RefusesWhatRfc3629Refuses) {
   EXPECT_FALSE(IsUtf8("\xe2\x82"));          // cut short
 }
 
-TEST(CleanUtf8, KeepsValidTextAndReplacesTheRest) {
+TEST(CleanUtf8, ReplacesInvalidBytesOnly) {
   EXPECT_EQ(CleanUtf8("plain"), "plain");
   EXPECT_EQ(CleanUtf8("stra\xc3\x9f"
                       "e \xe2\x82\xac \xf0\x9f\x98\x80"),
@@ -40,7 +40,7 @@ TEST(CleanUtf8, CutsBetweenCharacters) {
   EXPECT_EQ(CleanUtf8("a\xe2\x82\xac", 4), "a\xe2\x82\xac");
 }
 
-TEST(EscapeControls, NothingEndsALineOrReachesTheTerminal) {
+TEST(EscapeControls, EscapesLineEndsAndTerminalCodes) {
   EXPECT_EQ(EscapeControls("plain \xc3\xa9 \xf0\x9f\x98\x80"), "plain \xc3\xa9 \xf0\x9f\x98\x80");
   EXPECT_EQ(EscapeControls("a\nb\rc\td"), "a\\nb\\rc\\td");
   EXPECT_EQ(EscapeControls("\x1b[2J\x7f"), "\\x1b[2J\\x7f");

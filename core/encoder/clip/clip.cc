@@ -27,20 +27,19 @@ constexpr int64_t kMaxConfigBytes = 1 << 20;
 // [1,3,H,W] of a picture with 1 or 3 channels.
 torch::Tensor RgbTensor(const Image& srgb) {
   if (srgb.Empty() || (srgb.channels != 1 && srgb.channels != 3)) {
-    throw InvalidArgument("CLIP takes a picture with 1 or 3 channels, this one has {}",
-                          srgb.channels);
+    throw InvalidArgument("CLIP takes a picture with 1 or 3 channels, but got {}", srgb.channels);
   }
   return TensorFromImage(srgb).expand({1, 3, srgb.height, srgb.width}).contiguous();
 }
 
-// Bicubic with antialiasing, as the authors' preprocessing; overshoot is cut off as in their 8-bit
-// pictures.
+// Bicubic with antialiasing, as in the authors' preprocessing. Overshoot is clipped, as in their
+// 8-bit pictures.
 torch::Tensor ResizeBicubic(const torch::Tensor& rgb, int64_t height, int64_t width) {
   if (rgb.size(2) == height && rgb.size(3) == width) return rgb;
   return at::_upsample_bicubic2d_aa(rgb, {height, width}, /*align_corners=*/false).clamp(0.0, 1.0);
 }
 
-// Shorter side to `side`, then the middle square.
+// Scales the shorter side to `side`, then crops the central square.
 torch::Tensor CenterSquare(const torch::Tensor& rgb, int64_t side) {
   const int64_t height = rgb.size(2);
   const int64_t width = rgb.size(3);
@@ -59,7 +58,7 @@ std::vector<float> Values(const torch::Tensor& tensor) {
 
 Image GrayPicture(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the encoder takes a picture with 1 channel (L), this one has {}",
+    throw InvalidArgument("the encoder takes a picture with 1 channel (L), but got {} channels",
                           luminance.channels);
   }
   return SrgbFromLab(luminance);

@@ -13,8 +13,8 @@ namespace color3d {
 namespace {
 
 constexpr double kLayerNormEpsilon = 1e-5;
-// The weights do not tell the number of heads. 64 channels each in all published models; narrower
-// towers, which only tests have, get two heads.
+// The weights do not determine the number of heads. All published models have 64 channels per head;
+// narrower towers, in tests only, get two heads.
 constexpr int64_t kHeadChannels = 64;
 constexpr int64_t kHeadsOfNarrowTower = 2;
 
@@ -98,7 +98,7 @@ void ClipNetwork::TakeText(WeightReader& reader) {
   const int64_t context = SizeOf(reader, "positional_embedding", 0);
   if (context < 2) {
     throw InvalidArgument(
-        "the CLIP weights have a text tower of {} positions; two at least are needed", context);
+        "the CLIP weights have a text tower of {} positions, but at least two are needed", context);
   }
   token_embedding_ = TakeTensor(reader, "token_embedding.weight", {vocabulary, width});
   text_position_ = TakeTensor(reader, "positional_embedding", {context, width});
@@ -112,7 +112,7 @@ ClipNetwork::ClipNetwork(WeightMap weights, bool quick_gelu) : quick_gelu_(quick
   WeightReader reader(std::move(weights), "the CLIP weights");
   TakeVision(reader);
   if (reader.Has("token_embedding.weight")) TakeText(reader);
-  // The temperature of the training loss: scores here are cosines.
+  // Temperature of the training loss, unused since scores are cosines.
   reader.Ignore("logit_scale");
   reader.Ignore("logit_bias");
   reader.Finish();

@@ -1,5 +1,5 @@
 // The two towers of CLIP (Radford et al. 2021): a vision transformer for pictures, a causal
-// transformer for text, into one space. Torch in the interface. Immutable after construction,
+// transformer for text, with a common space of features. Torch in the interface. Immutable,
 // thread-safe. For this folder only.
 #pragma once
 
@@ -15,8 +15,8 @@ namespace color3d {
 class ClipNetwork {
  public:
   // `weights` under OpenAI's names. `quick_gelu`: x * sigmoid(1.702 x) in the feed-forward layers,
-  // else the exact GELU. A file without a text tower is taken too. Throws Error{kInvalidArgument}
-  // listing what is missing, unexpected or misshapen.
+  // else the exact GELU. The text tower is optional. Throws Error{kInvalidArgument} listing weights
+  // that are missing, unexpected or misshapen.
   ClipNetwork(WeightMap weights, bool quick_gelu);
 
   int input_side_px() const { return grid_ * patch_px_; }
@@ -26,14 +26,14 @@ class ClipNetwork {
   int context() const;
   std::string ToString() const;
 
-  // [B,E] of pictures [B,3,S,S] in 0..1, S = input_side_px().
+  // Returns [B,E] for pictures [B,3,S,S] in 0..1, S = input_side_px().
   torch::Tensor EncodeImages(const torch::Tensor& rgb) const;
-  // [B,E,grid,grid]: where in the picture. The last layer's attention is replaced by its value path
-  // alone, so that a patch keeps to what it shows itself (Zhou et al. 2022, "Extract free dense
-  // labels from CLIP").
+  // Returns dense features [B,E,grid,grid]. The last layer's attention is replaced by its value
+  // path, so that features stay local to each patch (Zhou et al. 2022, "Extract free dense labels
+  // from CLIP").
   torch::Tensor EncodePatches(const torch::Tensor& rgb) const;
-  // [B,E] of token numbers [B,T], T <= context(); the feature is read at the largest number, which
-  // is the end of text.
+  // Returns [B,E] for token numbers [B,T], T <= context(). The feature is that of the largest
+  // number, the end of text.
   torch::Tensor EncodeTokens(const torch::Tensor& tokens) const;
 
  private:
@@ -55,7 +55,7 @@ class ClipNetwork {
                          const Block& block,
                          const torch::Tensor& x,
                          bool causal) const;
-  // Tokens [B, 1 + grid^2, width] after all blocks but the last `left_out`.
+  // Returns tokens [B, 1 + grid^2, width] after all blocks but the last `left_out`.
   torch::Tensor RunVision(const torch::Tensor& rgb, int left_out) const;
 
   bool quick_gelu_;

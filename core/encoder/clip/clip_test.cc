@@ -40,7 +40,7 @@ Image RandomPicture(int width, int height) {
   return image;
 }
 
-TEST(ClipModelTest, WithoutVocabularyOnlyPictures) {
+TEST(ClipModelTest, EncodesOnlyPicturesWithoutVocabulary) {
   ClipModel model(SyntheticClipWeights({}, 7), true);
   EXPECT_EQ(model.ImageFeatures(RandomPicture(90, 50)).size(), 32u);
   EXPECT_THROW(model.TextFeatures("sky"), Error);
@@ -53,14 +53,14 @@ TEST(ClipModelTest, WithoutVocabularyOnlyPictures) {
   EXPECT_THROW(vision.LoadVocabulary("/nonexistent"), Error);
 }
 
-TEST(ClipModelTest, TheActivationIsPartOfTheModel) {
+TEST(ClipModelTest, DependsOnActivation) {
   const ClipModel quick(SyntheticClipWeights({}, 7), true);
   const ClipModel exact(SyntheticClipWeights({}, 7), false);
   EXPECT_NE(quick.digest(), exact.digest());
   EXPECT_NE(quick.ImageFeatures(RandomPicture(64, 64)), exact.ImageFeatures(RandomPicture(64, 64)));
 }
 
-TEST(ClipModelTest, PatchFeaturesSeeWherePartsAre) {
+TEST(ClipModelTest, PatchFeaturesLocateParts) {
   const ClipModel model(SyntheticClipWeights({}, 7), true);
   Image picture(64, 64, 3, 0.5f);
   const Image before = model.PatchFeatures(picture);
@@ -86,7 +86,7 @@ TEST(ClipModelTest, PatchFeaturesSeeWherePartsAre) {
   EXPECT_GT(changed_there, 2.0 * changed_elsewhere);
 }
 
-TEST(ClipModelTest, DescribesGreyPicturesOfAnySize) {
+TEST(ClipModelTest, DescribesGrayPicturesOfAnySize) {
   const ClipModel model(SyntheticClipWeights({}, 7), true);
   for (const auto& [width, height] : {std::pair{1, 1}, std::pair{200, 3}, std::pair{65, 64}}) {
     double sum = 0.0;
@@ -97,7 +97,7 @@ TEST(ClipModelTest, DescribesGreyPicturesOfAnySize) {
   EXPECT_THROW(model.ImageFeatures(Image(4, 4, 2)), Error);
 }
 
-TEST(ClipModelTest, TheActivationIsReadBesideTheWeights) {
+TEST(ClipModelTest, ReadsActivationBesideTheWeights) {
   const ScratchFolder folder;
   const auto path = folder.path() / "clip.safetensors";
   WriteFileAtomic(path, SerializeSafetensors(SyntheticClipWeights({}, 1), false));

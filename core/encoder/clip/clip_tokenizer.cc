@@ -17,8 +17,8 @@ namespace {
 
 constexpr int kBytes = 256;
 constexpr int kControlTokens = 2;
-constexpr size_t kMaxTextBytes = 2000;           // pair merging is quadratic in a word's length
-constexpr size_t kMaxVocabularyBytes = 1 << 24;  // the published one has 3.1 MB
+constexpr size_t kMaxTextBytes = 2000;           // merging is quadratic in the length of a word
+constexpr size_t kMaxVocabularyBytes = 1 << 24;  // published: 3.1 MB
 constexpr const char* kEndOfWord = "</w>";
 
 std::string Utf8(UChar32 code_point) {
@@ -27,8 +27,8 @@ std::string Utf8(UChar32 code_point) {
   return bytes;
 }
 
-// Printable stand-ins of all bytes, in the order in which the vocabulary numbers them: the bytes
-// that are printable in Latin-1 stand for themselves, the others follow as U+0100, U+0101, ...
+// Printable symbols of all bytes, in the order of the vocabulary: bytes that are printable in
+// Latin-1 represent themselves, the others follow as U+0100, U+0101, ...
 struct ByteSymbols {
   std::vector<std::string> by_byte{kBytes};
   std::vector<std::string> in_order;
@@ -83,8 +83,8 @@ icu::UnicodeString Clean(const std::string& text) {
 bool IsLetter(UChar32 c) { return (U_GET_GC_MASK(c) & U_GC_L_MASK) != 0; }
 bool IsNumber(UChar32 c) { return (U_GET_GC_MASK(c) & U_GC_N_MASK) != 0; }
 
-// Length of the word that starts at `begin`: a contraction's tail, a run of letters, one number, or
-// a run of anything else but white space. 0 at white space.
+// Returns the length of the word at `begin`: the tail of a contraction, a run of letters, one
+// digit, or a run of other characters but white space. 0 at white space.
 int WordLength(const icu::UnicodeString& text, int begin) {
   for (const char* tail : {"'s", "'t", "'re", "'ve", "'m", "'ll", "'d"}) {
     const icu::UnicodeString pattern(tail);
@@ -143,7 +143,7 @@ ClipTokenizer::ClipTokenizer(std::string_view merges,
 }
 
 ClipTokenizer ClipTokenizer::FromFile(const std::filesystem::path& path, int vocabulary_size) {
-  // gzread passes plain files through.
+  // gzread reads plain files, too.
   const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose);
   if (!file) throw Error(ErrorCode::kNotFound, "cannot open the vocabulary {}", path.string());
   std::string text;
@@ -152,7 +152,7 @@ ClipTokenizer ClipTokenizer::FromFile(const std::filesystem::path& path, int voc
   while ((count = gzread(file.get(), buffer.data(), static_cast<unsigned>(buffer.size()))) > 0) {
     text.append(buffer.data(), static_cast<size_t>(count));
     if (text.size() > kMaxVocabularyBytes) {
-      throw InvalidArgument("{} unpacks to more than 16 MB: it is no vocabulary", path.string());
+      throw InvalidArgument("{} unpacks to more than 16 MB and is not a vocabulary", path.string());
     }
   }
   if (count < 0) throw Error(ErrorCode::kDataLoss, "{} is damaged (gzip)", path.string());
@@ -188,8 +188,7 @@ void ClipTokenizer::AppendWord(std::string_view bytes, std::vector<int64_t>& tok
 
 std::vector<int64_t> ClipTokenizer::Tokens(const std::string& text, int context) const {
   if (text.size() > kMaxTextBytes) {
-    throw InvalidArgument("the text has {} bytes, at most 2000 are allowed; shorten it",
-                          text.size());
+    throw InvalidArgument("the text has {} bytes; shorten it to at most 2000", text.size());
   }
   const icu::UnicodeString clean = Clean(text);
   std::vector<int64_t> tokens{start_of_text_};

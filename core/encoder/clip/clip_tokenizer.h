@@ -1,5 +1,5 @@
-// CLIP's byte-level byte-pair encoder (Sennrich et al. 2016; Radford et al. 2021): text to token
-// numbers. No torch. Immutable after construction, thread-safe.
+// CLIP's byte-level byte-pair encoder (Sennrich et al. 2016; Radford et al. 2021): maps text to
+// token numbers. No torch. Immutable, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -17,15 +17,15 @@ class ClipTokenizer {
   // per line, best first (bpe_simple_vocab_16e6.txt, or merges.txt as other hubs call it).
   // `vocabulary_size` is the number of rows of the token embedding (49408 in all published models):
   // 2 * 256 bytes, the merges, start and end of text. Throws Error{kInvalidArgument} naming
-  // `source` when the text holds fewer merges, or a line that is no merge.
+  // `source` if the text has fewer merges, or a line that is not a merge.
   ClipTokenizer(std::string_view merges, int vocabulary_size, const std::string& source);
-  // The same from a file, plain or gzip.
+  // Reads the vocabulary from a file, plain or gzip.
   static ClipTokenizer FromFile(const std::filesystem::path& path, int vocabulary_size);
 
-  // Start of text, the text's tokens, end of text, zeros up to `context` numbers; what does not fit
-  // is cut off before the end of text. Lower-cased, NFC, curly quotes made straight (what the
-  // authors' clean-up does to ordinary text); invalid UTF-8 becomes U+FFFD. Control tokens written
-  // in the text count as text. Throws Error{kInvalidArgument} above 2000 bytes.
+  // Returns start of text, the tokens, end of text, and zeros up to `context` numbers. Excess
+  // tokens before the end of text are dropped. Text is lower-cased, NFC, with straight quotes (as
+  // by the authors' clean-up of ordinary text); invalid UTF-8 becomes U+FFFD. Control tokens in the
+  // text are plain text. Throws Error{kInvalidArgument} for more than 2000 bytes.
   std::vector<int64_t> Tokens(const std::string& text, int context = 77) const;
 
   int64_t start_of_text() const { return start_of_text_; }
@@ -34,7 +34,7 @@ class ClipTokenizer {
  private:
   void AppendWord(std::string_view bytes, std::vector<int64_t>& tokens) const;
 
-  std::vector<std::string> symbol_of_byte_;  // UTF-8 of the printable stand-in of each byte
+  std::vector<std::string> symbol_of_byte_;            // UTF-8 of the printable symbol of each byte
   std::unordered_map<std::string, int> rank_of_pair_;  // key "left right"
   std::unordered_map<std::string, int64_t> token_of_symbol_;
   int64_t start_of_text_ = 0;

@@ -41,7 +41,7 @@ TEST(ClipTokenizerTest, MergesTheBestPairsFirst) {
   EXPECT_EQ(Words("abab"), (std::vector<int64_t>{Merge(1), Inside('a'), AtEnd('b')}));
 }
 
-TEST(ClipTokenizerTest, LowersCaseAndSplitsContractionsDigitsAndSigns) {
+TEST(ClipTokenizerTest, SplitsContractionsDigitsAndSigns) {
   EXPECT_EQ(Words("  THE\n\tThe "), (std::vector<int64_t>{Merge(3), Merge(3)}));
   EXPECT_EQ(Words("x's"), (std::vector<int64_t>{AtEnd('x'), Inside('\''), AtEnd('s')}));
   EXPECT_EQ(Words("x\xe2\x80\x99s"), Words("x's"));
@@ -69,7 +69,7 @@ TEST(ClipTokenizerTest, CutsLongTextBeforeTheEndOfText) {
   EXPECT_THROW(tokenizer.Tokens(std::string(2001, 'a')), Error);
 }
 
-TEST(ClipTokenizerTest, RefusesWhatIsNoVocabulary) {
+TEST(ClipTokenizerTest, RefusesOtherFilesAsVocabulary) {
   EXPECT_THROW(ClipTokenizer(kText, kVocabulary + 1, "test"), Error);
   EXPECT_THROW(ClipTokenizer("header\na b c\n", 515, "test"), Error);
   EXPECT_THROW(ClipTokenizer("header\nab\n", 515, "test"), Error);

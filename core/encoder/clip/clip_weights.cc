@@ -15,7 +15,7 @@ struct Renaming {
   std::string_view to;
 };
 
-// Whole names, and starts of names that end in a dot.
+// Full names, or prefixes that end in a dot.
 constexpr Renaming kOutside[] = {
     {"vision_model.embeddings.class_embedding", "visual.class_embedding"},
     {"vision_model.embeddings.position_embedding.weight", "visual.positional_embedding"},
@@ -31,7 +31,7 @@ constexpr Renaming kTowers[] = {
     {"vision_model.encoder.layers.", "visual.transformer.resblocks."},
     {"text_model.encoder.layers.", "transformer.resblocks."},
 };
-// Behind "<tower><number>.".
+// Names after "<tower><number>.".
 constexpr Renaming kInBlock[] = {
     {"self_attn.out_proj.", "attn.out_proj."},
     {"layer_norm1.", "ln_1."},
@@ -47,7 +47,7 @@ bool Rename(const Renaming& rule, std::string_view name, std::string& renamed) {
   return true;
 }
 
-// "<number>." at the start of `rest`; its length, 0 when there is none.
+// Returns the length of "<number>." at the start of `rest`, or 0 if there is none.
 size_t NumberLength(std::string_view rest) {
   const size_t digits = rest.find_first_not_of("0123456789");
   return digits != std::string_view::npos && digits > 0 && rest[digits] == '.' ? digits + 1 : 0;
@@ -74,7 +74,7 @@ std::string OpenAiName(const std::string& name) {
   return name;
 }
 
-// x.T of a matrix.
+// Transposes a matrix.
 WeightArray Transposed(const WeightArray& array) {
   if (array.shape.size() != 2) return array;
   const size_t rows = static_cast<size_t>(array.shape[0]);
@@ -86,8 +86,8 @@ WeightArray Transposed(const WeightArray& array) {
   return out;
 }
 
-// Replaces "<prefix>self_attn.{q,k,v}_proj.<kind>" by "<prefix>attn.in_proj_<kind>" when all three
-// are there and alike; otherwise they stay, to be listed.
+// Replaces "<prefix>self_attn.{q,k,v}_proj.<kind>" by "<prefix>attn.in_proj_<kind>" if all three
+// exist with equal shapes. Otherwise they are kept, so that the network lists them.
 void StackAttention(const std::string& prefix, const std::string& kind, WeightMap& weights) {
   std::vector<WeightMap::iterator> parts;
   for (const char* part : {"q", "k", "v"}) {

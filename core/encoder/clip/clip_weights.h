@@ -1,17 +1,16 @@
-// CLIP's weights under OpenAI's names, whatever the file's own layout. No torch. For this folder
-// only.
+// Converts CLIP's weights from any known layout to OpenAI's names. No torch. For this folder only.
 #pragma once
 
 #include "core/weights/weight_map.h"
 
 namespace color3d {
 
-// True when the names are those of a CLIP in OpenAI's layout (also open_clip's) or Hugging Face's.
+// Whether the names are those of a CLIP in the layout of OpenAI (and open_clip) or Hugging Face.
 bool HoldsClip(const WeightMap& weights);
 
-// Hugging Face's names to OpenAI's: q, k and v are stacked, projections transposed, buffers
-// dropped; OpenAI's layout is only rid of its buffers. Arrays of unknown names stay as they are,
-// for the network to list. Throws Error{kInvalidArgument} when the image tower is a ResNet.
+// Converts Hugging Face's layout to OpenAI's: stacks q, k and v, transposes projections and drops
+// buffers. From OpenAI's layout it only drops buffers. Arrays of unknown names are kept, so that
+// the network lists them. Throws Error{kInvalidArgument} if the image tower is a ResNet.
 WeightMap OpenAiClipWeights(WeightMap weights);
 
 }  // namespace color3d

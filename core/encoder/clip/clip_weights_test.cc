@@ -86,7 +86,7 @@ WeightMap HuggingFaceLayout(const WeightMap& openai) {
   return out;
 }
 
-TEST(ClipWeightsTest, BothLayoutsAreTheSameModel) {
+TEST(ClipWeightsTest, ReadsBothLayoutsAsTheSameModel) {
   const WeightMap openai = SyntheticClipWeights({}, 7);
   const WeightMap other = HuggingFaceLayout(openai);
   ASSERT_TRUE(HoldsClip(openai));
@@ -99,7 +99,7 @@ TEST(ClipWeightsTest, BothLayoutsAreTheSameModel) {
   EXPECT_EQ(a.ImageFeatures(picture), b.ImageFeatures(picture));
 }
 
-TEST(ClipWeightsTest, NamesWhatDoesNotFit) {
+TEST(ClipWeightsTest, NamesArraysThatDoNotFit) {
   WeightMap missing = SyntheticClipWeights({}, 7);
   missing.erase("visual.ln_post.bias");
   missing["visual.odd"] = {{2}, {0.0f, 0.0f}};
@@ -118,7 +118,7 @@ TEST(ClipWeightsTest, NamesWhatDoesNotFit) {
 }
 
 // A transformer block is told from its neighbour by number, and q from k by place.
-TEST(ClipWeightsTest, AHalfStackIsListedNotGuessed) {
+TEST(ClipWeightsTest, ListsIncompleteAttentionStack) {
   WeightMap other = HuggingFaceLayout(SyntheticClipWeights({}, 7));
   other.erase("vision_model.encoder.layers.0.self_attn.k_proj.weight");
   try {

@@ -21,7 +21,7 @@ constexpr int kDescribeSidePx = 256;
 constexpr int kDeepSidePx = 384;
 constexpr int kDeepStridePx = 16;
 
-// Layer norm over the channels of [B,C,H,W]; free of copies when x is channels-last.
+// Layer norm over the channels of [B,C,H,W]. Copies nothing if x is channels-last.
 torch::Tensor ChannelNorm(const torch::Tensor& x,
                           const torch::Tensor& weight,
                           const torch::Tensor& bias) {
@@ -35,7 +35,7 @@ torch::Tensor ChannelNorm(const torch::Tensor& x,
 
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the encoder takes a picture with 1 channel (L), this one has {}",
+    throw InvalidArgument("the encoder takes a picture with 1 channel (L), but got {} channels",
                           luminance.channels);
   }
 }
@@ -242,7 +242,7 @@ torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px, int sta
   const int right = (stride - small.width % stride) % stride;
   const int bottom = (stride - small.height % stride) % stride;
   torch::Tensor tensor = TensorFromImage(small);
-  // Replication has no limit on the border's width, unlike reflection: 1x1 pictures are fine.
+  // Unlike reflection, replication pads pictures of any size, even 1x1.
   if (right > 0 || bottom > 0) tensor = torch::replication_pad2d(tensor, {0, right, 0, bottom});
   const torch::Tensor output = StageOutputs(Input(tensor), stage + 1).back();
   return ChannelNorm(output, stages_[stage].norm_weight, stages_[stage].norm_bias);
@@ -261,7 +261,7 @@ std::vector<double> ConvNext::Describe(const Image& luminance) const {
 }
 
 Image ConvNext::DeepFeatures(const Image& luminance) const {
-  // The published networks go on to stride 32, too coarse to tell which parts two views share.
+  // Stride 32 of the published networks is too coarse to find the common parts of two views.
   int stage = config_.StageCount() - 1;
   while (stage > 0 && config_.Stride(stage) > kDeepStridePx) --stage;
   return WithTorchErrors("encoder", [&] {

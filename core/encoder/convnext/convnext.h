@@ -1,5 +1,4 @@
-// ConvNeXt as frozen feature extractor, with torch in the interface.
-// Immutable after construction; Taps() may be called from any number of threads.
+// ConvNeXt as frozen feature extractor. Torch in the interface. Immutable, thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -17,32 +16,33 @@ namespace color3d {
 
 class ConvNext : public TapEncoder {
  public:
-  // Throws Error{kInvalidArgument} naming the weights that are missing, unexpected or have another
-  // shape than `config` asks for. Takes the weights' memory over.
+  // Takes over the memory of the weights. Throws Error{kInvalidArgument} naming weights that are
+  // missing, unexpected or not of the shape that `config` requires.
   ConvNext(const ConvNextConfig& config, WeightMap weights, std::string description);
 
   const ConvNextConfig& config() const override { return config_; }
-  // Every weight by its published name, in a fixed order; storage is shared. For pre-training only:
-  // whoever switches gradients on or changes a value owns the object alone, and its digest is that
-  // of the weights it was made from.
+  // All weights by published name, in a fixed order. Shares storage. For pre-training only: a
+  // caller that enables gradients or changes values must be the only user, and digest() remains
+  // that of the original weights.
   std::vector<std::pair<std::string, torch::Tensor>> Parameters() const;
   const std::string& digest() const override { return digest_; }
   const std::string& description() const override { return description_; }
   std::vector<double> Describe(const Image& luminance) const override;
   Image DeepFeatures(const Image& luminance) const override;
 
-  // Network input [B,3,H,W] of L [B,1,H,W] (0..100): the grey picture Lab(L,0,0) in sRGB,
-  // normalised with ImageNet's statistics.
+  // Returns the network input [B,3,H,W] for L [B,1,H,W] (0..100): the grey picture Lab(L,0,0) in
+  // sRGB, normalised with ImageNet's statistics.
   torch::Tensor Input(const torch::Tensor& luminance) const override;
-  // RGB in 0..1, [B,3,H,W], normalised with ImageNet's statistics, channels-last.
+  // Normalises RGB in 0..1, [B,3,H,W], with ImageNet's statistics. Channels-last.
   static torch::Tensor NormaliseInput(const torch::Tensor& rgb);
-  // norm0 .. norm3: taps [B, dims[i], H / Stride(i), W / Stride(i)], channels-last. H and W must be
-  // multiples of the last stride. Gradients flow to the adapter, never to the frozen weights.
+  // Returns norm0 .. norm3: taps [B, dims[i], H / Stride(i), W / Stride(i)], channels-last.
+  // Requires: H and W are multiples of the last stride. Gradients flow to the adapter, never to the
+  // weights.
   std::vector<torch::Tensor> Taps(const torch::Tensor& input,
                                   const BlockAdapter& adapter = {}) const override;
-  // The first call makes bfloat16 copies of the matrices (half the weights' memory again).
+  // The first call makes bfloat16 copies of the matrices (half of the weights' memory).
   std::vector<torch::Tensor> FastTaps(const torch::Tensor& input) const override;
-  // What the stages hand on, before the taps' norms; only the first `count` stages are run.
+  // Outputs of the first `count` stages, before the taps' norms.
   std::vector<torch::Tensor> StageOutputs(const torch::Tensor& input,
                                           int count,
                                           const BlockAdapter& adapter = {}) const;
@@ -57,7 +57,7 @@ class ConvNext : public TapEncoder {
     torch::Tensor norm_weight, norm_bias;
     std::vector<Block> blocks;
   };
-  // Weights of a block's two matrix products, in float32 or bfloat16.
+  // Weights of the two matrix products of a block, in float32 or bfloat16.
   using Products = std::pair<torch::Tensor, torch::Tensor>;
   torch::Tensor RunBlock(const Block& block,
                          const Products& products,

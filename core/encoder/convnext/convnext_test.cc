@@ -173,7 +173,7 @@ class Reference {
   const WeightMap& weights_;
 };
 
-TEST(ConvNextTest, AgreesWithTheFloat64Twin) {
+TEST(ConvNextTest, AgreesWithFloat64Reference) {
   const ConvNextConfig config = TinyConfig();
   const WeightMap weights = NoisyWeights(config);
   const ConvNext network(config, weights, "tiny");
@@ -232,7 +232,7 @@ TEST(ConvNextTest, TapsHaveTheirStridesAndAreNormalised) {
   }
 }
 
-TEST(ConvNextTest, AFlatPictureGivesFiniteTaps) {
+TEST(ConvNextTest, GivesFiniteTapsForFlatPicture) {
   const auto encoder = std::dynamic_pointer_cast<const ConvNext>(Encoder::Embedded());
   torch::NoGradGuard no_grad;
   for (float l : {0.0f, 50.0f, 100.0f}) {
@@ -243,7 +243,7 @@ TEST(ConvNextTest, AFlatPictureGivesFiniteTaps) {
   }
 }
 
-TEST(ConvNextTest, AnAdapterOfZerosOrNothingChangesNoBit) {
+TEST(ConvNextTest, ZeroOrNoAdapterGivesSameBytes) {
   const ConvNextConfig config = TinyConfig();
   const ConvNext network(config, NoisyWeights(config), "tiny");
   torch::NoGradGuard no_grad;

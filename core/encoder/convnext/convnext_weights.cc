@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-constexpr const char* kPrefixes[] = {"encoder.arch.", "encoder."};  // DDColor's, our own
+constexpr const char* kPrefixes[] = {"encoder.arch.", "encoder."};  // DDColor, our own
 constexpr int64_t kMaxChannels = 16384;
 constexpr const char* kStem = "downsample_layers.0.0.weight";
 
@@ -31,7 +31,7 @@ std::vector<int64_t> ShapeOf(const WeightMap& weights, const std::string& name) 
   return found == weights.end() ? std::vector<int64_t>{} : found->second.shape;
 }
 
-// The stem tells its kernel but not its stride: 4x4 is the published one, 8x8 our own.
+// The shape of the stem gives its kernel but not its stride: 4x4 is the published one, 8x8 our own.
 void ReadStem(const WeightMap& weights, ConvNextConfig& config) {
   const std::vector<int64_t> shape = ShapeOf(weights, kStem);
   const bool square = shape.size() == 4 && shape[1] == 3 && shape[2] == shape[3];
@@ -77,7 +77,7 @@ bool HoldsConvNext(const WeightMap& weights) {
 
 ConvNextWeights TakeConvNextWeights(WeightMap& weights) {
   if (!HoldsConvNext(weights)) {
-    throw InvalidArgument("the weights hold no ConvNeXt (no \"{}\")", kStem);
+    throw InvalidArgument("the weights have no ConvNeXt (no \"{}\")", kStem);
   }
   const std::string prefix = PrefixOf(weights);
   ConvNextWeights found;

@@ -1,4 +1,4 @@
-// Finds a ConvNeXt in a published state dict and reads its sizes from the shapes. No torch.
+// Finds a ConvNeXt in a published state dict and derives its sizes from the shapes. No torch.
 #pragma once
 
 #include <string>
@@ -10,19 +10,18 @@ namespace color3d {
 
 struct ConvNextWeights {
   ConvNextConfig config;
-  WeightMap weights;  // names without prefix, as ConvNext takes them
+  WeightMap weights;  // names without prefix, as ConvNext expects
   std::string description;
 };
 
-// True when the names are those of a ConvNeXt as its authors write them, plain or under
+// Whether the names are those of a ConvNeXt in its authors' layout, plain or under
 // "encoder.arch." (DDColor) or "encoder." (our own pre-trained files).
 bool HoldsConvNext(const WeightMap& weights);
 
 // Moves the ConvNeXt's arrays out of `weights`, drops its classifier ("head", "head_cls") and the
-// norm of the pooled output, and gives taps that have no norm of their own (norm0..norm3, which
-// only DDColor adds) one without scale and shift. What belongs to no ConvNeXt stays in `weights`
-// when there is a prefix. Throws Error{kInvalidArgument} when there is none or its stem is of an
-// unknown kind.
+// norm of the pooled output, and adds norms without scale and shift to taps that lack them
+// (norm0..norm3, which only DDColor has). With a prefix, other arrays stay in `weights`. Throws
+// Error{kInvalidArgument} if there is no ConvNeXt or its stem is of an unknown kind.
 ConvNextWeights TakeConvNextWeights(WeightMap& weights);
 
 }  // namespace color3d

@@ -30,7 +30,7 @@ TEST(ConvNextWeightsTest, ReadsTheSizesFromTheShapes) {
   EXPECT_TRUE(weights.empty());
 }
 
-TEST(ConvNextWeightsTest, APrefixIsTakenOffAndOtherArraysStay) {
+TEST(ConvNextWeightsTest, RemovesPrefixAndKeepsOtherArrays) {
   WeightMap weights;
   for (const auto& [name, array] : RandomFeatureWeights(PublishedStem(), 1)) {
     weights["encoder.arch." + name] = array;
@@ -42,7 +42,7 @@ TEST(ConvNextWeightsTest, APrefixIsTakenOffAndOtherArraysStay) {
   EXPECT_EQ(weights.size(), 2u);
 }
 
-TEST(ConvNextWeightsTest, TapsWithoutNormsGetPlainOnes) {
+TEST(ConvNextWeightsTest, AddsIdentityNormsToTaps) {
   WeightMap weights = RandomFeatureWeights(PublishedStem(), 1);
   std::erase_if(weights, [](const auto& item) { return item.first.starts_with("norm"); });
   const ConvNextWeights found = TakeConvNextWeights(weights);

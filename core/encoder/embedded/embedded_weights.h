@@ -1,5 +1,5 @@
-// The pre-trained weights that are part of the program; see CARD.md beside this file for what they
-// were trained on and how well they do.
+// Pre-trained weights that are part of the program. CARD.md beside this file describes their
+// training and accuracy.
 #pragma once
 
 #include <string_view>
@@ -8,11 +8,11 @@
 
 namespace color3d {
 
-// The bytes of weights.safetensors, for as long as the program runs.
+// Returns the bytes of weights.safetensors, valid until the program ends.
 std::string_view EmbeddedWeightFile();
 
-// The arrays whose names start with `prefix` ("encoder.", "color_"), under the rest of their names,
-// as float32; an empty prefix: all.
+// Returns the arrays with names that start with `prefix` ("encoder.", "color_"), without the
+// prefix, as float32. Empty prefix: all.
 WeightMap EmbeddedWeights(std::string_view prefix);
 
 }  // namespace color3d

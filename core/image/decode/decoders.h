@@ -1,4 +1,4 @@
-// Decoders of formats that OpenCV is not asked for, since it would choose one by itself. For
+// Decoders that are called directly rather than by OpenCV, which would choose one by itself. For
 // codec.cc only. Pure functions, thread-safe.
 #pragma once
 
@@ -10,12 +10,11 @@
 
 namespace color3d {
 
-// 8-bit, as OpenCV keeps it: B, G, R (and A when info.channels is 4). Empty when the data is
-// damaged.
+// 8-bit, in OpenCV's order: B, G, R (and A if info.channels is 4). Empty if the data is damaged.
 cv::Mat DecodeWebp(std::string_view bytes, const ImageInfo& info);
 
-// 8- or 16-bit B, G, R, turned as the file says. Throws Error{kInvalidArgument} naming `file_name`
-// when its data is damaged; such a file is refused before where the build has no libheif.
+// 8- or 16-bit B, G, R, with the file's rotation applied. Throws Error{kInvalidArgument} with
+// `file_name` if the data is damaged; builds without libheif refuse such files earlier.
 cv::Mat DecodeHeif(std::string_view bytes, const std::string& file_name, const ImageInfo& info);
 
 }  // namespace color3d

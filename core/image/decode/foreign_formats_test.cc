@@ -52,7 +52,7 @@ double WorstDifference(const Image& x, const Image& y) {
   return worst;
 }
 
-TEST(ForeignFormats, WebpAndBmpAreRead) {
+TEST(ForeignFormats, ReadsWebpAndBmp) {
   const Image image = Ramp(31, 20);
   EXPECT_LT(WorstDifference(DecodeImage(WebpFile(image), "a.webp"), image), 0.003);
   EXPECT_LT(WorstDifference(DecodeImage(BmpFile(image), "a.bmp"), image), 0.003);
@@ -60,7 +60,7 @@ TEST(ForeignFormats, WebpAndBmpAreRead) {
   EXPECT_EQ(ProbeImage(BmpFile(image), "a").format, ImageFormat::kBmp);
 }
 
-TEST(ForeignFormats, LossyWebpAndItsTransparency) {
+TEST(ForeignFormats, ReadsLossyWebpWithAlpha) {
   cv::Mat mat(20, 31, CV_8UC4, cv::Scalar(50, 120, 200, 255));
   mat(cv::Rect(0, 0, 8, 20)).setTo(cv::Scalar(50, 120, 200, 0));
   std::vector<uchar> bytes;
@@ -74,7 +74,7 @@ TEST(ForeignFormats, LossyWebpAndItsTransparency) {
   EXPECT_EQ(image.At(3, 10, 20), 1.0f);
 }
 
-TEST(ForeignFormats, BmpsOfAllHeaders) {
+TEST(ForeignFormats, ReadsBmpsOfAllHeaders) {
   const Image image = Ramp(5, 4);
   const std::string bmp = BmpFile(image);
   // Rows from top to bottom.
@@ -96,13 +96,13 @@ TEST(ForeignFormats, BmpsOfAllHeaders) {
   EXPECT_THAT(Refusal("BMX stands for bicycle motocross.", "a.bmp"), HasSubstr("not an image"));
 }
 
-TEST(ForeignFormats, AnimatedWebpIsRefused) {
+TEST(ForeignFormats, RejectsAnimatedWebp) {
   std::string file("RIFF\x1E\0\0\0WEBPVP8X\x0A\0\0\0\x02\0\0\0\x0F\0\0\x0F\0\0", 30);
   file += std::string("ANIM\0\0\0\0", 8);
   EXPECT_THAT(Refusal(file, "a.webp"), HasSubstr("a.webp is an animated WebP"));
 }
 
-TEST(ForeignFormats, HeicIsReadIn8And10Bits) {
+TEST(ForeignFormats, ReadsHeicOf8And10Bits) {
   const Image image = Ramp(64, 48);
   for (const int bits : {8, 10}) {
     const std::string heic = HeicFile(image, "", bits);
@@ -113,7 +113,7 @@ TEST(ForeignFormats, HeicIsReadIn8And10Bits) {
   }
 }
 
-TEST(ForeignFormats, EveryTruncationOfHeicIsRefusedAndDamageNeverCrashes) {
+TEST(ForeignFormats, RejectsTruncatedAndDamagedHeic) {
   const std::string heic = HeicFile(Ramp(64, 48), AdobeRgbProfile());
   if (heic.empty()) GTEST_SKIP() << "libheif or its encoder is missing";
   for (size_t length = 0; length < heic.size(); ++length) {
@@ -134,7 +134,7 @@ TEST(ForeignFormats, EveryTruncationOfHeicIsRefusedAndDamageNeverCrashes) {
   EXPECT_GT(refused, 30);
 }
 
-TEST(ForeignFormats, HeicsThatCannotBeReadSayWhatToDo) {
+TEST(ForeignFormats, UnreadableHeicNamesRemedy) {
   EXPECT_THAT(Refusal(std::string("\0\0\0\x18"
                                   "ftypheic\0\0\0\0mif1heic",
                                   24) +
@@ -156,14 +156,14 @@ TEST(ForeignFormats, HeicsThatCannotBeReadSayWhatToDo) {
   EXPECT_THAT(Refusal(outside, "a.heic"), HasSubstr("keeps its picture in another file"));
 }
 
-TEST(ForeignFormats, InksAreRefusedWithTheRemedy) {
+TEST(ForeignFormats, CmykIsRejectedWithRemedy) {
   const std::string cmyk(
       "\xFF\xD8\xFF\xC0\0\x14\x08\0\x10\0\x10\x04\1\x11\0\2\x11\0\3\x11\0\4\x11\0", 24);
   EXPECT_THAT(Refusal(cmyk, "print.jpg"), HasSubstr("print.jpg is in CMYK"));
 }
 
 // OpenCV, with GDAL and GDCM behind it, would look for a decoder by itself.
-TEST(ForeignFormats, FilesThatNameOthersNeverReachADecoder) {
+TEST(ForeignFormats, FilesWithReferencesReachNoDecoder) {
   const ScratchFolder folder;
   const std::string secret = (folder.path() / "secret.png").string();
   WriteFileAtomic(secret, EncodePng8(Image(8, 8, 3, 0.5f)));

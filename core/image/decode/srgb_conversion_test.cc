@@ -68,7 +68,7 @@ std::vector<Container> Containers() {
           {"BMP", &BmpFile, 1.0 / 255}};
 }
 
-TEST(SrgbConversion, PicturesInOtherSpacesLookLikeTheirSrgbCopies) {
+TEST(SrgbConversion, OtherColorSpacesMatchSrgbCopies) {
   const Image srgb = Colors(3);
   for (const Container& container : Containers()) {
     for (const auto& [name, profile, stretch] : {std::tuple{"Adobe RGB", AdobeRgbProfile(), 3.0},
@@ -83,7 +83,7 @@ TEST(SrgbConversion, PicturesInOtherSpacesLookLikeTheirSrgbCopies) {
   }
 }
 
-TEST(SrgbConversion, GreyPicturesKeepOneChannelAndGetTheTonesOfSrgb) {
+TEST(SrgbConversion, GrayPicturesKeepOneChannelWithSrgbTones) {
   const Image srgb = Colors(1);
   for (const Container& container : Containers()) {
     const std::string name = container.name;
@@ -99,7 +99,7 @@ TEST(SrgbConversion, GreyPicturesKeepOneChannelAndGetTheTonesOfSrgb) {
   }
 }
 
-TEST(SrgbConversion, GreyPictureWithAProfileOfColoursFollowsItsGreys) {
+TEST(SrgbConversion, GrayPictureFollowsColorProfile) {
   const Image srgb = Colors(1);
   Image three(srgb.width, srgb.height, 3);
   for (int c = 0; c < 3; ++c) std::copy(srgb.data.begin(), srgb.data.end(), three.Plane(c));
@@ -119,7 +119,7 @@ std::string UntaggedJpeg(const Image& image) {
   return jpeg.substr(0, at) + jpeg.substr(at + 2 + length);
 }
 
-TEST(SrgbConversion, ProfilesInPartsOfAJpegAreJoined) {
+TEST(SrgbConversion, JoinsProfileChunksOfJpeg) {
   Image srgb(16, 16, 3, 0.5f);
   std::fill_n(srgb.Plane(0), srgb.PlaneSize(), 0.8f);
   const std::string profile = AdobeRgbProfile();
@@ -135,7 +135,7 @@ TEST(SrgbConversion, ProfilesInPartsOfAJpegAreJoined) {
   EXPECT_GT(std::abs(at(plain, 0) - 0.8), 0.03);
 }
 
-TEST(SrgbConversion, HeicProfileIsFollowed) {
+TEST(SrgbConversion, AppliesHeicProfile) {
   Image srgb(64, 64, 3, 0.3f);
   std::fill_n(srgb.Plane(0), srgb.PlaneSize(), 0.7f);
   const std::string heic = HeicFile(InSpaceOf(srgb, AdobeRgbProfile()), AdobeRgbProfile());
@@ -146,7 +146,7 @@ TEST(SrgbConversion, HeicProfileIsFollowed) {
 }
 
 // sRGB's red is 219, 0, 0 in Adobe RGB (1998).
-TEST(SrgbConversion, KnownNumbers) {
+TEST(SrgbConversion, MatchesKnownValues) {
   Image adobe(2, 2, 3, 0.0f);
   std::fill_n(adobe.Plane(0), 4, 219.0f / 255.0f);
   const Image read = DecodeImage(WithPngProfile(EncodePng8(adobe), AdobeRgbProfile()), "a.png");
@@ -169,7 +169,7 @@ std::string Untagged(const Image& image) {
   return png.substr(0, 33) + png.substr(33 + 13);
 }
 
-TEST(SrgbConversion, ChunksOfPngsCountInTheirOrder) {
+TEST(SrgbConversion, PngChunksHavePrecedence) {
   const std::string linear = BigEndian({100'000}), usual = BigEndian({45'455});
   const std::string adobe = BigEndian({31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000});
   const Image image(4, 4, 3, 0.25f);
@@ -196,7 +196,7 @@ TEST(SrgbConversion, ChunksOfPngsCountInTheirOrder) {
 }
 
 // A camera's photo of the option "Adobe RGB" without a profile: Interoperability index "R03".
-TEST(SrgbConversion, CamerasSayAdobeRgbInExif) {
+TEST(SrgbConversion, RecognizesAdobeRgbInExif) {
   Image srgb(16, 16, 3, 0.5f);
   std::fill_n(srgb.Plane(0), srgb.PlaneSize(), 0.8f);
   const std::string silent = UntaggedJpeg(InSpaceOf(srgb, AdobeRgbProfile()));
@@ -219,7 +219,7 @@ TEST(SrgbConversion, CamerasSayAdobeRgbInExif) {
   }
 }
 
-TEST(SrgbConversion, WhatIsSrgbStaysBitForBit) {
+TEST(SrgbConversion, KeepsSrgbBitForBit) {
   const Image srgb = Colors(3), gray = Colors(1);
   const Image plain = DecodeImage(EncodePng16(srgb), "a.png");
   EXPECT_EQ(DecodeImage(WithPngProfile(EncodePng16(srgb), SrgbProfile()), "a.png").data,
@@ -228,7 +228,7 @@ TEST(SrgbConversion, WhatIsSrgbStaysBitForBit) {
             DecodeImage(EncodePng16(gray), "a.png").data);
 }
 
-TEST(SrgbConversion, AlphaAndLabelsAreNotColours) {
+TEST(SrgbConversion, KeepsAlphaAndLabels) {
   Image rgba = Colors(4);
   const std::string png = WithPngProfile(EncodePng16(rgba), ProPhotoProfile());
   const Image read = DecodeImage(png, "a.png", /*keep_alpha=*/true);
@@ -243,7 +243,7 @@ TEST(SrgbConversion, AlphaAndLabelsAreNotColours) {
   EXPECT_LT(WorstDifference(ReadStoredValues(folder.path() / "labels.png"), labels), 1e-5);
 }
 
-TEST(SrgbConversion, ProfilesThatAreOfNoUseAreToldAndLeftOut) {
+TEST(SrgbConversion, IgnoresUselessProfilesWithNote) {
   const Image srgb = Colors(3);
   const Image plain = DecodeImage(EncodePng16(srgb), "a.png");
   const std::string adobe = AdobeRgbProfile();
@@ -279,7 +279,7 @@ TEST(SrgbConversion, DamagedProfilesNeverCrash) {
   }
 }
 
-TEST(SrgbConversion, WhatWeWriteSaysThatItIsSrgb) {
+TEST(SrgbConversion, WrittenFilesAreTaggedSrgb) {
   for (const int channels : {1, 3}) {
     const Image image = Colors(channels);
     EXPECT_TRUE(ReadColorTag(EncodePng8(image)).is_srgb);

@@ -14,11 +14,11 @@ class ByteReader {
       : bytes_(bytes), big_endian_(big_endian) {}
 
   size_t size() const { return bytes_.size(); }
-  // True when [offset, offset + count) lies inside; never overflows.
+  // Returns true if [offset, offset + count) lies inside; never overflows.
   bool Has(size_t offset, size_t count) const {
     return offset <= bytes_.size() && count <= bytes_.size() - offset;
   }
-  // The caller has asked Has() before; outside the bytes these read as zero.
+  // The caller checks Has() first; reads zero outside the bytes.
   uint32_t U8(size_t offset) const {
     return offset < bytes_.size() ? static_cast<unsigned char>(bytes_[offset]) : 0u;
   }

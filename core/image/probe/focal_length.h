@@ -5,9 +5,10 @@
 
 namespace color3d {
 
-// In pixels of the picture as stored, which is `width` x `height`; 0 when the file does not say, or
-// says something outside of 0.2 to 8 times the longer side. Uses FocalLengthIn35mmFilm (equal
-// diagonals, CIPA DCG-001), else FocalLength with the sensor's resolution. Safe on hostile input.
+// Focal length in pixels of the picture as stored, which is `width` x `height`; 0 if the file does
+// not state it or the value is outside 0.2 to 8 times the longer side. Uses FocalLengthIn35mmFilm
+// (equal diagonals, CIPA DCG-001), else FocalLength with the sensor's resolution. Safe on hostile
+// input.
 double ReadFocalLengthPx(std::string_view bytes, int width, int height);
 
 }  // namespace color3d

@@ -15,14 +15,14 @@ std::string JpegWith(const std::vector<ExifTag>& tags) {
   return WithExif(EncodeJpeg(Image(8, 6, 1, 0.5f)), tags);
 }
 
-TEST(FocalLength, FilmEquivalentKeepsTheDiagonal) {
+TEST(FocalLength, FilmEquivalentKeepsDiagonal) {
   // 28 mm before 36 x 24 mm film.
   EXPECT_NEAR(ReadFocalLengthPx(JpegWith({{41989, 3, 28}}), 3600, 2400), 2800.0, 0.5);
   EXPECT_NEAR(
       ReadFocalLengthPx(JpegWith({{41989, 3, 28}}), 4000, 3000), 28.0 / 43.2666 * 5000.0, 0.5);
 }
 
-TEST(FocalLength, SensorResolutionOfAReducedCopy) {
+TEST(FocalLength, UsesSensorResolutionOfReducedCopy) {
   // 35 mm, 1000 px per cm when taken at 3000 px; the copy has 1500.
   const std::string jpeg =
       JpegWith({{37386, 5, 350, 10}, {40962, 4, 3000}, {41486, 5, 1000, 1}, {41488, 3, 3}});
@@ -30,7 +30,7 @@ TEST(FocalLength, SensorResolutionOfAReducedCopy) {
   EXPECT_NEAR(ReadFocalLengthPx(jpeg, 1500, 1000), 1750.0, 1e-6);
 }
 
-TEST(FocalLength, UnknownAndAbsurdAreZero) {
+TEST(FocalLength, UnknownAndAbsurdValuesAreZero) {
   EXPECT_EQ(ReadFocalLengthPx("", 100, 100), 0.0);
   EXPECT_EQ(ReadFocalLengthPx(EncodePng8(Image(8, 6, 1)), 8, 6), 0.0);
   EXPECT_EQ(ReadFocalLengthPx(JpegWith({}), 3600, 2400), 0.0);

@@ -7,14 +7,14 @@
 
 namespace color3d {
 
-// 1..8 as in EXIF 2.3 tag 274; 1 (as stored) when absent or nonsense, and of HEIC, whose size is
-// told as looked at. Of a TIFF's page that is read. Safe on hostile input.
+// 1..8 as in EXIF 2.3 tag 274; 1 (as stored) if absent or invalid, and for HEIC, whose size is
+// given after orientation. For TIFFs, that of the selected page. Safe on hostile input.
 int ReadOrientation(std::string_view bytes);
 
-// True for the four orientations that swap width and height.
+// Returns true for the four orientations that swap width and height.
 inline bool OrientationSwapsSides(int orientation) { return orientation >= 5; }
 
-// Size of the picture as it is looked at, after orientation.
+// Size of the picture after orientation.
 struct PictureSize {
   int width = 0;
   int height = 0;

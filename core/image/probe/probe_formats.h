@@ -1,4 +1,4 @@
-// The formats behind ProbeImage. For this folder only.
+// Readers of the formats of ProbeImage. For this folder only.
 #pragma once
 
 #include <fmt/core.h>
@@ -23,7 +23,7 @@ struct ProbeContext {
   // "a.jpg is truncated: ..." and "a.jpg is damaged: ...".
   Error Truncated(const std::string& what) const;
   Error Damaged(const std::string& what) const;
-  // With the parts of `what` put in as fmt does.
+  // Formats `what` with fmt.
   template <typename First, typename... Rest>
   Error Truncated(fmt::format_string<First, Rest...> what, First&& first, Rest&&... rest) const {
     return Truncated(fmt::format(what, std::forward<First>(first), std::forward<Rest>(rest)...));
@@ -32,9 +32,9 @@ struct ProbeContext {
   Error Damaged(fmt::format_string<First, Rest...> what, First&& first, Rest&&... rest) const {
     return Damaged(fmt::format(what, std::forward<First>(first), std::forward<Rest>(rest)...));
   }
-  // For pictures made of printing inks, whose colours depend on press and paper.
+  // Error for CMYK pictures, whose colours depend on press and paper.
   Error InCmyk() const;
-  // Refuses sizes of zero or above the limits.
+  // Throws for sizes of zero or above the limits.
   void CheckSize(int64_t width, int64_t height) const;
 };
 
@@ -50,12 +50,12 @@ bool IsPng(std::string_view bytes);
 bool IsTiff(std::string_view bytes);
 bool IsWebp(std::string_view bytes);
 bool IsBmp(std::string_view bytes);
-// Of the family (ISO 23008-12): HEIC, and AVIF, which ProbeHeif refuses.
+// HEIF family (ISO 23008-12): HEIC, and AVIF, which ProbeHeif refuses.
 bool IsHeif(std::string_view bytes);
 
-// Body of a WebP's first chunk of this type; empty when there is none.
+// Body of a WebP's first chunk of this type; empty if there is none.
 std::string_view FindWebpChunk(std::string_view bytes, std::string_view type);
-// The EXIF block of a HEIC picture, and its ICC profile; empty when there is none.
+// EXIF block and ICC profile of a HEIC picture; empty if there is none.
 std::string_view FindHeifExif(std::string_view bytes);
 std::string_view FindHeifProfile(std::string_view bytes);
 
@@ -64,7 +64,7 @@ struct TiffHeader {
   bool big_endian = false;
   size_t first_directory = 0;
 };
-// False when the bytes do not start as TIFF.
+// Returns false if the bytes do not start as TIFF.
 bool ReadTiffHeader(std::string_view bytes, TiffHeader* header);
 
 }  // namespace color3d::probe_internal

@@ -104,7 +104,7 @@ TEST(Probe, ReadsTheHeaderOfEveryFormat) {
   }
 }
 
-TEST(Probe, EveryTruncationIsRefusedByName) {
+TEST(Probe, NamesEveryTruncatedFile) {
   for (const Sample& sample : Samples()) {
     for (size_t length = 0; length < sample.bytes.size(); ++length) {
       // A heap copy of the exact size, so that an address sanitizer sees the first byte too many.
@@ -149,7 +149,7 @@ TEST(Probe, ByteFlipsNeverCrashProbeOrDecoder) {
   EXPECT_GT(refused, total / 4);
 }
 
-TEST(Probe, OtherFilesAreNotImages) {
+TEST(Probe, RejectsOtherFiles) {
   EXPECT_EQ(Refusal([] { ProbeImage("Buy milk.\n", "notes.jpg"); }),
             "notes.jpg is not an image (" + ReadableImageFormats() + ")");
   EXPECT_EQ(Refusal([] { ProbeImage("", "empty.png"); }),
@@ -178,7 +178,7 @@ std::string PngClaiming(uint32_t width, uint32_t height) {
   return bytes;
 }
 
-TEST(Probe, BombsAreRefusedFromTheirHeader) {
+TEST(Probe, RejectsBombsByHeader) {
   EXPECT_THAT(Refusal([] { ProbeImage(PngClaiming(60000, 60000), "bomb.png"); }),
               HasSubstr("bomb.png claims 60000 x 60000 px; the limit is 30000 px a side"));
   EXPECT_THAT(Refusal([] { ProbeImage(PngClaiming(20000, 20000), "bomb.png"); }),
@@ -196,7 +196,7 @@ TEST(Probe, BombsAreRefusedFromTheirHeader) {
               HasSubstr("holds no image data"));
 }
 
-TEST(Probe, BytesAfterTheEndAreAccepted) {
+TEST(Probe, AcceptsTrailingBytes) {
   for (const Sample& sample : Samples()) {
     const std::string more = sample.bytes + std::string(1000, '\xFF') + "trailer";
     EXPECT_NO_THROW(ProbeImage(more, sample.name)) << sample.name;
@@ -204,13 +204,13 @@ TEST(Probe, BytesAfterTheEndAreAccepted) {
   }
 }
 
-TEST(Probe, WrongChecksumIsDamage) {
+TEST(Probe, ReportsWrongChecksum) {
   std::string bytes = EncodePng8(Noise(23, 17, 3));
   bytes[bytes.size() / 2] ^= 0x10;
   EXPECT_THAT(Refusal([&] { ProbeImage(bytes, "a.png"); }), HasSubstr("checksum"));
 }
 
-TEST(Probe, Extensions) {
+TEST(Probe, KnowsExtensions) {
   EXPECT_EQ(HasImageExtension("a.HEIC"), ReadsHeif());
   EXPECT_EQ(ReadableImageFormats().find("HEIC") != std::string::npos, ReadsHeif());
   EXPECT_THAT(ReadableImageEndings(), HasSubstr(".jpg, .jpeg, "));

@@ -30,7 +30,7 @@ void ExpectThePicture(const std::string& tiff, const std::string& what) {
   EXPECT_NEAR(image.At(0, 15, 20), 0.8, 0.003) << what;
 }
 
-TEST(TiffPagesTest, TheLargestPageIsReadWhereverItIs) {
+TEST(TiffPagesTest, ReadsLargestPage) {
   for (const bool big_endian : {false, true}) {
     for (const int bits : {8, 16}) {
       const TiffPageToWrite picture{.image = Plain(40, 30, 0.8f), .bits = bits};
@@ -57,7 +57,7 @@ TEST(TiffPagesTest, TheLargestPageIsReadWhereverItIs) {
   }
 }
 
-TEST(TiffPagesTest, MasksAreNoPicturesAndOnePageIsNotWorthANote) {
+TEST(TiffPagesTest, SkipsMasksAndNotesSeveralPagesOnly) {
   const TiffPageToWrite picture{.image = Plain(40, 30, 0.8f)};
   const TiffPageToWrite mask{.image = Plain(80, 60, 1.0f), .subfile_type = 4, .photometric = 1};
   const std::string tiff = TiffFile({mask, picture});
@@ -65,7 +65,7 @@ TEST(TiffPagesTest, MasksAreNoPicturesAndOnePageIsNotWorthANote) {
   EXPECT_THAT(PictureNotes(tiff), IsEmpty());
 }
 
-TEST(TiffPagesTest, OfEqualPagesTheFirstIsReadAndToldOf) {
+TEST(TiffPagesTest, ReadsFirstOfEqualPagesWithNote) {
   const std::string tiff = TiffFile({{.image = Plain(40, 30, 0.8f)},
                                      {.image = Plain(40, 30, 0.1f)},
                                      {.image = Plain(40, 30, 0)}});
@@ -73,7 +73,7 @@ TEST(TiffPagesTest, OfEqualPagesTheFirstIsReadAndToldOf) {
   EXPECT_THAT(PictureNotes(tiff), ElementsAre(HasSubstr("has 3 pages of 40 x 30 px; the first")));
 }
 
-TEST(TiffPagesTest, OrientationAndProfileAreThoseOfThePage) {
+TEST(TiffPagesTest, UsesOrientationAndProfileOfPage) {
   const TiffPageToWrite preview{.image = Plain(10, 8, 0.2f), .orientation = 3};
   TiffPageToWrite picture{.image = Plain(40, 30, 0.5f), .orientation = 6};
   picture.profile = GrayGammaProfile(1.0);
@@ -85,7 +85,7 @@ TEST(TiffPagesTest, OrientationAndProfileAreThoseOfThePage) {
   EXPECT_NEAR(image.At(0, 9, 9), 0.735, 0.01);  // light of a half
 }
 
-TEST(TiffPagesTest, ChainsWithoutAnEndAndPointersIntoNothingEndTheList) {
+TEST(TiffPagesTest, CyclesAndBadPointersEndPageList) {
   const TiffPageToWrite page{.image = Plain(40, 30, 0.8f)};
   std::string tiff = TiffFile({page, page});
   const TiffPages pages = ListTiffPages(tiff);
@@ -103,7 +103,7 @@ TEST(TiffPagesTest, ChainsWithoutAnEndAndPointersIntoNothingEndTheList) {
   ExpectThePicture(nowhere, "nowhere");
 }
 
-TEST(TiffPagesTest, RawDataAndInksAreRefusedWithTheRemedy) {
+TEST(TiffPagesTest, RejectsRawAndCmykWithRemedy) {
   const auto refusal = [](const std::string& tiff) -> std::string {
     try {
       DecodeImage(tiff, "a.tif");

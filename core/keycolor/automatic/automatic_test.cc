@@ -57,7 +57,7 @@ TEST(AutomaticColorizerTest, ColorsExtremePictures) {
   }
 }
 
-TEST(AutomaticColorizerTest, GivesTheSameAnswerTwiceAndTheMirroredOneMirrored) {
+TEST(AutomaticColorizerTest, IsRepeatableAndMirrorSymmetric) {
   const auto colorizer = AutomaticColorizer::Embedded();
   const Image picture = Texture(128, 96);
   Image mirrored = picture;
@@ -97,7 +97,7 @@ TEST(AutomaticColorizerTest, NamesAMissingOrMisshapenWeight) {
   EXPECT_THROW(AutomaticColorizer::FromPretrained(weights), Error);
 }
 
-TEST(AutomaticColorizerTest, ColorsCountedTooOftenAreGuessedLess) {
+TEST(AutomaticColorizerTest, ColorWeightsLowerOvercountedColors) {
   WeightMap weights = EmbeddedWeights("");
   const auto bins = static_cast<size_t>(weights["color_bins"].shape[0]);
   std::vector<float> counted(bins, 1.0f);
@@ -121,7 +121,7 @@ TEST(EmbeddedWeightsTest, AreSmallEnoughToShip) {
 }
 
 // Held-out photographs: better than grey on the whole, and colourful, but not garish.
-TEST(AutomaticColorizerTest, ColorsHeldOutPhotographsBetterThanGray) {
+TEST(AutomaticColorizerTest, BeatsGrayOnHeldOutPhotos) {
   const std::filesystem::path folder =
       std::filesystem::path(COLOR3D_SHARED_DATA) / "photos/validate";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no photographs";

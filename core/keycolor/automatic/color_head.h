@@ -1,6 +1,6 @@
-// The colour head of the embedded automatic colourizer: from the frozen encoder's taps to a
-// distribution over colour bins. A feature pyramid (Lin et al. 2017): coarse taps say what a thing
-// is, fine ones where it ends. Torch in the interface; used by the automatic colourizer and its
+// Colour head of the embedded automatic colourizer: maps the frozen encoder's taps to a
+// distribution over colour bins. A feature pyramid (Lin et al. 2017): coarse taps identify things,
+// fine ones their outlines. Torch in the interface; used by the automatic colourizer and its
 // pre-training only. Forward is const and thread-safe.
 #pragma once
 
@@ -17,13 +17,14 @@ namespace color3d {
 
 class ColorHead {
  public:
-  // Random start. `encoder` has at least 3 taps; all but the finest are used.
+  // Initializes the parameters at random. Requires: `encoder` has at least 3 taps. All but the
+  // finest are used.
   ColorHead(const ConvNextConfig& encoder, int bin_count, Random& random);
 
-  // Logits [B,bins,h,w] at the second tap's stride, of the taps of ConvNext::Taps.
+  // Returns logits [B,bins,h,w] at the second tap's stride, from the taps of ConvNext::Taps.
   torch::Tensor Forward(const std::vector<torch::Tensor>& taps) const;
 
-  // By name, in a fixed order; storage is shared.
+  // Parameters by name, in a fixed order. Shares storage.
   const std::vector<std::pair<std::string, torch::Tensor>>& Parameters() const {
     return parameters_;
   }

@@ -12,7 +12,7 @@
 namespace color3d {
 namespace {
 
-constexpr int64_t kHeads = 8;  // of all published models; the weights do not tell
+constexpr int64_t kHeads = 8;  // as in all published models; not part of the weights
 constexpr double kLayerNormEpsilon = 1e-5;
 constexpr double kPositionEpsilon = 1e-6;
 constexpr double kPositionTemperature = 10000.0;

@@ -1,6 +1,6 @@
-// DDColor's colour decoder (Kang et al. 2023, section 3.3): learnt colour queries that look at the
-// picture's features in turn and at each other. Torch inside core/keycolor only. Immutable,
-// thread-safe.
+// DDColor's colour decoder (Kang et al. 2023, section 3.3): learnt colour queries with cross
+// attention to the picture's features and self attention. Torch in the interface; used inside
+// core/keycolor only. Immutable, thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -13,13 +13,14 @@ namespace color3d {
 
 class ColorQueries {
  public:
-  // Takes "decoder.color_decoder.*". `feature_channels`: of the decoder's levels, coarse to fine.
+  // Takes "decoder.color_decoder.*". `feature_channels`: channels of the decoder's levels, coarse
+  // to fine.
   ColorQueries(const std::vector<int64_t>& feature_channels, WeightReader& reader);
 
   int64_t query_count() const { return query_feat_.size(0); }
-  // Width of an answer, which is also that of the pixel features it is multiplied with.
+  // Width of a query's embedding and of the pixel features that it is multiplied with.
   int64_t embedding_channels() const { return embed_[2].weight.size(0); }
-  // [query_count, embedding_channels] from the decoder's levels [1,C,h,w], coarse to fine.
+  // Returns [query_count, embedding_channels] for the decoder's levels [1,C,h,w], coarse to fine.
   torch::Tensor Forward(const std::vector<torch::Tensor>& levels) const;
 
  private:

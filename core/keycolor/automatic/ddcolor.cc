@@ -26,14 +26,14 @@ constexpr int kNetworkSidePx = 512;
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
     throw InvalidArgument(
-        "the automatic colourizer takes a picture with 1 channel (L), this one has {}",
+        "the automatic colourizer takes a picture with 1 channel (L), but got {} channels",
         luminance.channels);
   }
   const bool finite = std::all_of(luminance.data.begin(), luminance.data.end(), [](float value) {
     return std::isfinite(value);
   });
   if (!finite) {
-    throw InvalidArgument("the luminance to be coloured holds a value that is not finite");
+    throw InvalidArgument("the luminance to colour has a value that is not finite");
   }
 }
 
@@ -55,7 +55,7 @@ Ddcolor::Ddcolor(WeightMap weights) : digest_(DigestOfWeights("DDColor", weights
                             encoder.config.ToString());
     }
     WeightReader reader(std::move(weights), "the DDColor weights");
-    reader.IgnorePrefix("mean");  // ImageNet's statistics, which Input() has
+    reader.IgnorePrefix("mean");  // ImageNet's statistics, applied by Input()
     reader.IgnorePrefix("std");
     decoder_ = std::make_unique<const DdcolorDecoder>(encoder.config.dims, reader);
   });

@@ -15,22 +15,23 @@ class DdcolorDecoder;
 
 class Ddcolor : public AutomaticColorizer {
  public:
-  // True when the names are those of a DDColor state dict.
+  // Whether the names are those of a DDColor state dict.
   static bool Recognises(const WeightMap& weights);
 
-  // Throws Error{kInvalidArgument} listing what is missing, unexpected or misshapen.
+  // Throws Error{kInvalidArgument} listing arrays that are missing, unexpected or misshapen.
   explicit Ddcolor(WeightMap weights);
   ~Ddcolor() override;
 
-  // The published pipeline: grey RGB of L at 512x512, ab brought back to the picture's size, here
-  // along the edges of L instead of by nearest neighbours. The network says nothing about how sure
-  // it is, so the confidence is 1 everywhere.
+  // The published pipeline: grey RGB of L at 512x512, ab upsampled to the picture's size, here
+  // guided by L instead of by nearest neighbours. The network has no confidence, so it is 1
+  // everywhere.
   AutomaticColor Colorize(const Image& luminance) const override;
   const std::string& description() const override { return description_; }
   const std::string& digest() const override { return digest_; }
 
   const ConvNext& encoder() const { return *encoder_; }
-  // The bare network: ab of grey RGB in 0..1 (3 channels, sides multiples of 32), same size.
+  // The network alone: returns ab for grey RGB in 0..1 (3 channels, sides multiples of 32), same
+  // size.
   Image Predict(const Image& gray_rgb) const;
 
  private:

@@ -23,15 +23,15 @@ torch::Tensor Apply(const ChannelAffine& affine, const torch::Tensor& x) {
   return torch::addcmul(affine.shift.view({1, c, 1, 1}), x, affine.scale.view({1, c, 1, 1}));
 }
 
-// Blur against the checkerboard of the pixel shuffle (Sugawara et al. 2018): mean over 2x2, the
-// border repeated to the left and above.
+// Blur that removes the checkerboard of the pixel shuffle (Sugawara et al. 2018): mean over 2x2,
+// with replication at the left and upper borders.
 torch::Tensor Blur(const torch::Tensor& x) {
   return torch::avg_pool2d(torch::replication_pad2d(x, {1, 0, 1, 0}), {2, 2}, {1, 1});
 }
 
 }  // namespace
 
-// What only shows when norms are folded; told after the list of what is missing.
+// Problems found while folding norms. Reported after missing arrays.
 struct DdcolorDecoder::Problems {
   std::string first;
 
@@ -136,9 +136,9 @@ torch::Tensor DdcolorDecoder::RunUpBlock(const UpBlock& block,
                torch::conv2d(both, block.conv_weight, {}, /*stride=*/1, /*padding=*/1).relu_());
 }
 
-// The published graph shuffles 256 channels to full size, multiplies them with the queries' answers
-// to 100 maps and mixes those to ab. All of it after the rectifier is linear and the same at every
-// pixel, so the mixture comes first: 2 channels instead of 256 and 100 at full size.
+// The published graph shuffles 256 channels to full size, multiplies them with the embeddings of
+// the queries to 100 maps and mixes these to ab. All operations after the rectifier are linear and
+// equal at every pixel, so the mixture comes first: 2 channels at full size instead of 256 and 100.
 torch::Tensor DdcolorDecoder::Forward(const std::vector<torch::Tensor>& taps,
                                       const torch::Tensor& input) const {
   std::vector<torch::Tensor> levels;

@@ -1,5 +1,5 @@
 // DDColor's pixel decoder and output layer (Kang et al. 2023), on the taps of its ConvNeXt. Torch
-// inside core/keycolor only. Immutable after construction, thread-safe.
+// in the interface; used inside core/keycolor only. Immutable, thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -21,8 +21,8 @@ class DdcolorDecoder {
   DdcolorDecoder(const std::vector<int>& dims, WeightReader& reader);
 
   int64_t query_count() const { return queries_->query_count(); }
-  // ab [1,2,H,W] in Lab units, of the encoder's four taps (strides 4..32) and the network input
-  // [1,3,H,W] (grey RGB, ImageNet-normalised). H and W are multiples of 32.
+  // Returns ab [1,2,H,W] in Lab units for the encoder's four taps (strides 4..32) and the network
+  // input [1,3,H,W] (grey RGB, ImageNet-normalised). Requires: H and W are multiples of 32.
   torch::Tensor Forward(const std::vector<torch::Tensor>& taps, const torch::Tensor& input) const;
 
  private:

@@ -113,7 +113,7 @@ TEST(DdcolorTest, ColorsPicturesOfAnySize) {
   EXPECT_THROW(network.Predict(Image(33, 32, 3)), Error);
 }
 
-TEST(DdcolorTest, TheSyntheticTinyHasThePublishedKeys) {
+TEST(DdcolorTest, SyntheticModelHasPublishedKeys) {
   const std::filesystem::path list =
       std::filesystem::path(COLOR3D_SHARED_DATA) / "../reference/keys/ddcolor_tiny.tsv";
   std::ifstream file(list);

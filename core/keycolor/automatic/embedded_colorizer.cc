@@ -1,5 +1,5 @@
-// The automatic colourizer that is part of the program: the frozen encoder and a colour head that
-// answers with a distribution over colour bins.
+// The embedded automatic colourizer: the frozen encoder and a colour head that predicts a
+// distribution over colour bins.
 #include <fmt/format.h>
 #include <torch/types.h>
 
@@ -21,11 +21,11 @@
 namespace color3d {
 namespace {
 
-// The network saw things at about these sizes in training; a bigger picture is coloured small and
-// brought to its size along the edges of L. Falling.
+// Sizes of pictures in training, descending. Larger pictures are coloured at these sizes and
+// upsampled, guided by L.
 constexpr int kWorkingSidesPx[] = {320, 224};
-// Below the guided filter's default, so that contrasts of 2 L units are edges: this grid is the
-// picture at its working size, not cells of several px. Not measured against the default.
+// Below the guided filter's default, so that contrasts of 2 L units are edges: the grid here has a
+// cell per pixel of the working size. Not measured against the default.
 constexpr float kFineGridVarianceFloor = 4.0f;
 // Expected distance to the true colour (Lab units) at which the confidence is one half.
 constexpr double kHalfConfidenceDistance = 20.0;
@@ -45,9 +45,9 @@ int RoundTo(double value, int multiple) {
   return std::max(1, static_cast<int>(std::lround(value / multiple))) * multiple;
 }
 
-// Of rows [n,K] of probabilities of the colours `bins` [K,2]: the answer with the least expected
-// distance to the truth (Weiszfeld). Unlike the mean it is one of the
-// colours in question, or near one, and grey where grey is the likeliest.
+// Geometric median (Weiszfeld) of the colours `bins` [K,2] for rows of probabilities [n,K]: the
+// colour of least expected distance to the truth. Unlike the mean, it is near one of the likely
+// colours.
 torch::Tensor MedianColors(const torch::Tensor& rows, const torch::Tensor& bins) {
   torch::Tensor colors = torch::mm(rows, bins);
   for (int i = 0; i < kMedianSteps; ++i) {
@@ -110,14 +110,14 @@ class EmbeddedColorizer : public AutomaticColorizer {
   }
 
  private:
-  // Training counted rare colours more often than they are; color_weights takes part of that back.
+  // Training overcounted rare colours; color_weights undoes a part of that.
   torch::Tensor Probabilities(const torch::Tensor& luminance) const {
     const torch::Tensor logits = head_->Forward(encoder_.Taps(encoder_.Input(luminance)));
     return torch::softmax((logits - log_weights_) / temperature_, 1);
   }
 
-  // The mean over sizes and mirror images: a thing has one colour however near it is and whichever
-  // way it looks. [1,K,h,w] on the finest grid.
+  // Mean over sizes and mirror images, since colours depend on neither. [1,K,h,w] on the finest
+  // grid.
   torch::Tensor MeanProbabilities(const Image& luminance) const {
     const int stride = encoder_.config().Stride(encoder_.config().StageCount() - 1);
     torch::Tensor sum;

@@ -1,5 +1,5 @@
-// Normalisations of a trained network, folded into plain weights when it is loaded. Torch inside
-// core/keycolor only.
+// Folds the normalisations of a trained network into its weights at load time. Torch in the
+// interface; used inside core/keycolor only.
 #pragma once
 
 #include <torch/types.h>
@@ -7,8 +7,8 @@
 namespace color3d {
 
 // Spectral normalisation as PyTorch stores it (Miyato et al. 2018): weight_orig / (u^T W v) with W
-// of [out, everything else]. u and v are taken as stored, without a power iteration: that is what
-// the trained network computes in evaluation.
+// of [out, everything else]. Uses u and v as stored, without power iteration, as the trained
+// network does in evaluation.
 torch::Tensor FoldSpectralNorm(const torch::Tensor& weight_orig,
                                const torch::Tensor& u,
                                const torch::Tensor& v);

@@ -14,9 +14,10 @@
 namespace color3d {
 namespace {
 
-constexpr int64_t kMinPixels = 64 * 64;       // nothing useful can be coloured below
-constexpr double kMaxAspectDeviation = 0.02;  // of the sides' ratio, beyond the rounding to px
-constexpr double kNotableDifference = 5.0;    // mean |dL| that is worth a warning
+constexpr int64_t kMinPixels = 64 * 64;  // minimum size of a picture
+constexpr double kMaxAspectDeviation =
+    0.02;  // maximum deviation of the aspect ratio, beyond rounding to px
+constexpr double kNotableDifference = 5.0;  // mean |dL| above which a warning is given
 
 [[noreturn]] void Refuse(const RemoteOptions& options, const std::string& why) {
   throw Error(ErrorCode::kFailedPrecondition, "the backend '{}' {}", options.name, why);
@@ -45,16 +46,16 @@ void RequireCapabilities(const RemoteOptions& options, const RemoteInfo& info) {
   }
 }
 
-// The photo as large as the backend takes it.
+// The photo, reduced to the maximum size of the backend.
 Image PictureToSend(const Image& luminance, const RemoteOptions& options, const RemoteInfo& info) {
   const auto pixels = static_cast<int64_t>(luminance.PlaneSize());
   Image gray = luminance;
   if (info.max_pixels > 0 && pixels > info.max_pixels) {
     if (info.max_pixels < kMinPixels) {
-      Refuse(
-          options,
-          fmt::format(
-              "takes pictures of {} pixels at most; {} are needed", info.max_pixels, kMinPixels));
+      Refuse(options,
+             fmt::format("accepts at most {} pixels a picture, but {} are needed",
+                         info.max_pixels,
+                         kMinPixels));
     }
     const double scale =
         std::sqrt(static_cast<double>(info.max_pixels) / static_cast<double>(pixels));
@@ -74,7 +75,7 @@ std::string HexOf(const ColorHint& hint, double l) {
   return text;
 }
 
-// Points in the coordinates of the picture that is sent, in colours of the photo's luminance there.
+// Points in coordinates of the picture that is sent, with the photo's luminance.
 std::vector<RemotePoint> PointsToSend(const Image& luminance,
                                       const std::vector<ColorHint>& hints,
                                       double scale_x,
@@ -119,11 +120,11 @@ RemoteRequest MakeRequest(const Image& luminance,
   return request;
 }
 
-// Decoded and found to be a PNG of the sent picture's shape.
+// Decodes the answer and checks that it is a PNG of the sent picture's shape.
 Image ReadAnswer(const std::string& bytes, const Image& sent, const RemoteOptions& options) {
   const std::string what = "the answer";
   ImageLimits limits;
-  // It may come back enlarged, but not without bound.
+  // The answer may be larger, up to a bound.
   limits.max_pixels = std::max<int64_t>(kMinPixels, 4 * static_cast<int64_t>(sent.PlaneSize()));
   Image answer;
   try {
@@ -141,7 +142,7 @@ Image ReadAnswer(const std::string& bytes, const Image& sent, const RemoteOption
            "answered with " + SizeText(answer) + " px to a picture of " + SizeText(sent) +
                " px; the shape must be the same");
   }
-  if (answer.channels != 3) Refuse(options, "answered with a grey picture, without any colour");
+  if (answer.channels != 3) Refuse(options, "answered with a grey picture");
   return answer;
 }
 

@@ -1,5 +1,5 @@
-// The key view coloured by a model server of the user's: what it is asked, and how its answer is
-// judged. Knows no transport; server/backends speaks the protocol.
+// Colours the key view by a model server of the user: requests and validation of answers.
+// Independent of the transport, which is in server/backends.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +16,7 @@
 
 namespace color3d {
 
-// Names of what a remote colourizer may claim to take, as in color3d.backend.v1.Capability.
+// Names of the capabilities of remote colourizers, as in color3d.backend.v1.Capability.
 namespace capability {
 inline constexpr char kAutomatic[] = "automatic";
 inline constexpr char kTextPrompt[] = "text_prompt";
@@ -30,9 +30,9 @@ inline constexpr char kNovelView[] = "novel_view";
 }  // namespace capability
 
 struct RemoteInfo {
-  std::string description;  // "name version (licence)", as it calls itself
+  std::string description;  // "name version (licence)", as given by the server
   std::set<std::string> capabilities;
-  int64_t max_pixels = 0;  // largest picture it takes; <= 0: it does not say
+  int64_t max_pixels = 0;  // maximum size of a picture; <= 0: unknown
   bool deterministic = false;
 };
 
@@ -43,7 +43,7 @@ struct RemotePoint {
 };
 
 struct RemoteRequest {
-  std::string idempotency_key;  // the same key may be answered from a cache
+  std::string idempotency_key;  // the server may cache answers by this key
   std::string image_png;        // grey, 16 bits
   std::string prompt;
   std::string reference_image;  // PNG; empty: none
@@ -52,7 +52,7 @@ struct RemoteRequest {
   uint64_t seed = 0;     // 0: none
 };
 
-// Pictures of the same scene made from one coloured picture.
+// Request of pictures of the same scene, made from one coloured picture.
 struct RemoteGenerateRequest {
   std::string idempotency_key;
   std::string image_png;  // RGB, 8 bits
@@ -61,20 +61,20 @@ struct RemoteGenerateRequest {
   uint64_t seed = 0;      // 0: none
 };
 
-// One model server. Used by one thread at a time. All calls return or throw within their time
-// limit, and soon after `cancel` is set (Error{kCancelled}); Error{kUnavailable} when the server
-// cannot be reached or is not ready, kDeadlineExceeded, or kFailedPrecondition for what it refuses.
+// A model server. Not thread-safe. All calls end within their time limit, and soon after `cancel`
+// is set (Error{kCancelled}). They throw Error{kUnavailable} if the server cannot be reached or is
+// not ready, kDeadlineExceeded, and kFailedPrecondition if it refuses.
 class RemoteColorizer {
  public:
   virtual ~RemoteColorizer() = default;
   // Waits until the server is ready.
   virtual RemoteInfo GetInfo(ProgressObserver& progress, const CancellationToken& cancel) = 0;
-  // The bytes of its picture, unchecked but for their number.
+  // Returns the bytes of the picture. Only their number has been checked.
   virtual std::string Colorize(const RemoteRequest& request,
                                ProgressObserver& progress,
                                const CancellationToken& cancel) = 0;
-  // The bytes of 1..samples pictures, unchecked but for their number and size. Defined here, by
-  // default as Error{kUnimplemented}, because those who implement this link no library of ours.
+  // Returns the bytes of 1..samples pictures. Only number and sizes have been checked. Throws
+  // Error{kUnimplemented} by default. Inline, because implementations do not link this library.
   virtual std::vector<std::string> Generate(const RemoteGenerateRequest& request,
                                             ProgressObserver&,
                                             const CancellationToken&) {
@@ -82,7 +82,8 @@ class RemoteColorizer {
                 "this backend generates no " + request.kind + " pictures");
   }
 };
-// By the name in the server's configuration. Throws Error{kFailedPrecondition} for an unknown one.
+// Returns a backend by its name in the server's configuration. Throws Error{kFailedPrecondition} if
+// it is unknown.
 using RemoteColorizerFactory =
     std::function<std::unique_ptr<RemoteColorizer>(const std::string& name)>;
 
@@ -99,20 +100,20 @@ struct RemoteOptions {
 struct RemoteSolution {
   Image ab;  // 2 channels, Lab units, the photo's size; 0 outside the mask
   RemoteInfo info;
-  int sent_width = 0;  // smaller than the photo when the backend takes no larger one
+  int sent_width = 0;  // smaller than the photo if the backend limits the size
   int sent_height = 0;
   int answer_width = 0;
   int answer_height = 0;
-  // Of the answer's luminance from ours, which replaces it.
+  // Difference of the answer's luminance from the photo's, which replaces it.
   double mean_luminance_difference = 0.0;  // mean |dL|, 0..100
   double luminance_correlation = 0.0;
   std::vector<std::string> warnings;
 };
 
-// `luminance`: 1 channel, L 0..100. Throws what RemoteColorizer throws; Error{kInvalidArgument} for
-// options that do not fit the photo; Error{kFailedPrecondition} when the backend does not claim
-// what the options need (both are named), or when its answer is not a PNG of the right shape, shows
-// something else or has no colour.
+// `luminance`: 1 channel, L 0..100. Throws the errors of RemoteColorizer, Error{kInvalidArgument}
+// for options that do not fit the photo, and Error{kFailedPrecondition} if the backend lacks a
+// capability that the options need (it is named), or if its answer is no PNG of the right shape,
+// shows something else or has no colour.
 RemoteSolution KeyColorFromRemote(const Image& luminance,
                                   const RemoteOptions& options,
                                   RemoteColorizer& remote,

@@ -73,7 +73,7 @@ class RemoteTest : public ::testing::Test {
   ErrorCode code_ = ErrorCode::kInternal;
 };
 
-TEST_F(RemoteTest, ChromaIsTakenAndTheFactsAreTold) {
+TEST_F(RemoteTest, ReturnsChromaAndFacts) {
   options_.seed = 7;
   options_.idempotency_key = "jobs/1/2";
   const RemoteSolution solution = Solve();
@@ -102,7 +102,7 @@ TEST_F(RemoteTest, ChangedLuminanceIsReportedAndReplaced) {
   EXPECT_THAT(solution.warnings[0], HasSubstr("changed the luminance"));
 }
 
-TEST_F(RemoteTest, APhotoThatIsTooLargeIsSentSmallerWithItsPointsAndMask) {
+TEST_F(RemoteTest, ScalesLargePhotoWithItsPointsAndMask) {
   remote_.info.max_pixels = 72 * 64;
   remote_.info.capabilities = {capability::kColorPoints, capability::kMask};
   options_.points = {{48.0, 32.0, 2.0, 30.0, 30.0}};
@@ -126,7 +126,7 @@ TEST_F(RemoteTest, APhotoThatIsTooLargeIsSentSmallerWithItsPointsAndMask) {
   EXPECT_THAT(solution.warnings[0], HasSubstr("83x55"));
 }
 
-TEST_F(RemoteTest, WhatItDoesNotClaimIsNotSent) {
+TEST_F(RemoteTest, SendsOnlyClaimedInputs) {
   options_.prompt = "red";
   EXPECT_THAT(
       Complaint(),
@@ -138,7 +138,7 @@ TEST_F(RemoteTest, WhatItDoesNotClaimIsNotSent) {
   EXPECT_TRUE(remote_.request.image_png.empty()) << "nothing was sent";
 }
 
-TEST_F(RemoteTest, UselessAnswersAreRefused) {
+TEST_F(RemoteTest, RefusesUnusableAnswers) {
   const auto complaint = [&](std::string bytes) {
     remote_.answer = [bytes](const RemoteRequest&) { return bytes; };
     const std::string text = Complaint();
@@ -165,7 +165,7 @@ TEST_F(RemoteTest, UselessAnswersAreRefused) {
               HasSubstr("something else"));
 }
 
-TEST_F(RemoteTest, InputThatDoesNotFitThePhotoIsRefusedBeforeItIsSent) {
+TEST_F(RemoteTest, RefusesBadInputBeforeSending) {
   remote_.info.capabilities = {capability::kColorPoints, capability::kMask};
   options_.points = {{96.0, 3.0, 2.0, 0.0, 0.0}};
   EXPECT_THAT(Complaint(), HasSubstr("outside the key view of 96x64"));

@@ -28,12 +28,12 @@ Error Refused(const std::filesystem::path& file, const std::string& why) {
   return InvalidArgument("the TorchScript file {} {}", file.filename().string(), why);
 }
 
-// First line of what torch or the script says, without the backtrace.
+// First line of an error message of torch or the script, without backtrace.
 std::string FirstLine(const std::exception& error) {
   const std::string text = error.what();
   const size_t begin = text.find_first_not_of(" \n");
   if (begin == std::string::npos) return "no message";
-  // TorchScript puts what was raised last: "AssertionError: ...".
+  // TorchScript puts the exception last: "AssertionError: ...".
   const size_t raised = text.rfind("Error: ");
   const size_t from = raised == std::string::npos ? begin : text.rfind('\n', raised) + 1;
   return text.substr(from, std::min<size_t>(text.find('\n', from) - from, 200));
@@ -61,7 +61,7 @@ torch::Tensor FirstTensor(const torch::IValue& answer, const std::filesystem::pa
       answer.toTuple()->elements()[0].isTensor()) {
     return answer.toTuple()->elements()[0].toTensor();
   }
-  throw Refused(file, "returned a " + answer.tagKind() + ", it must return a tensor");
+  throw Refused(file, "returned a " + answer.tagKind() + ", but must return a tensor");
 }
 
 Image CheckedAnswer(const torch::Tensor& answer, const std::filesystem::path& file) {
@@ -74,7 +74,7 @@ Image CheckedAnswer(const torch::Tensor& answer, const std::filesystem::path& fi
   if (!fits || !answer.is_floating_point()) {
     throw Refused(
         file,
-        fmt::format("returned a tensor of shape {} and type {}, it must be [1,2,h,w] (ab) "
+        fmt::format("returned a tensor of shape {} and type {}, but must return [1,2,h,w] (ab) "
                     "or [1,3,h,w] (sRGB) of floats",
                     shape.str(),
                     std::string(answer.dtype().name())));
@@ -89,7 +89,7 @@ Image CheckedAnswer(const torch::Tensor& answer, const std::filesystem::path& fi
   for (float value : image.data) {
     if (value >= low && value <= high) continue;
     throw Refused(file,
-                  fmt::format("returned the value {}, allowed are {} to {}", value, low, high));
+                  fmt::format("returned the value {}; allowed are {} to {}", value, low, high));
   }
   return image;
 }
@@ -112,7 +112,7 @@ Image Run(const Image& luminance, const std::filesystem::path& file) {
   return CheckedAnswer(FirstTensor(answer, file), file);
 }
 
-// Without the padding: the answer covers the padded input.
+// Removes the padding; the answer covers the padded input.
 Image Cropped(const Image& answer, const Image& luminance) {
   const auto part = [](int answer_px, int px) {
     const int padded = (px + kMultiple - 1) / kMultiple * kMultiple;
@@ -132,7 +132,7 @@ Image Cropped(const Image& answer, const Image& luminance) {
 
 ScriptColor KeyColorFromScript(const Image& luminance, const std::filesystem::path& torchscript) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+    throw InvalidArgument("the key view's luminance must have 1 channel, but has {}",
                           luminance.channels);
   }
   const Image small = FitWithin(luminance, kMaxSidePx);

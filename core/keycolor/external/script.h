@@ -1,4 +1,4 @@
-// Colouring by the user's own TorchScript file.
+// Colours the key view by a TorchScript file of the user.
 #pragma once
 
 #include <filesystem>
@@ -9,7 +9,7 @@ namespace color3d {
 
 struct ScriptColor {
   Image ab;  // 2 channels, Lab units, size of the luminance
-  // Mean |dL| of an answer in sRGB to the photo, whose own L is kept; 0 of an answer in ab.
+  // Mean |dL| between an answer in sRGB and the photo, whose L is kept; 0 for answers in ab.
   double luminance_deviation = 0.0;
 };
 
@@ -19,13 +19,12 @@ struct ScriptColor {
 // (or a tuple or list that begins with one), either
 //   [1,2,h,w]  a, b in Lab units, or
 //   [1,3,h,w]  sRGB in 0..1,
-// of any size that covers the padded input; it is brought to the photo's size along the edges of
-// its L.
-// A TorchScript file is a program: whoever names one here has its code run with the rights of this
-// process, and no time limit but the caller's. Take files only from people you trust.
-// Throws Error{kInvalidArgument} naming the file and what came: a file that cannot be loaded or
-// raises, another shape or type, values that are not finite or out of range (|a|, |b| > 150, sRGB
-// beyond -0.1..1.1).
+// of any size that covers the padded input; it is resampled to the photo's size, guided by its L.
+// Security: a TorchScript file is a program. It runs with the rights of this process, and no time
+// limit but the caller's. Use files from trusted sources only.
+// Throws Error{kInvalidArgument} naming the file and the fault: it cannot be loaded or raises an
+// exception, or it returns another shape or type, or values that are not finite or out of range
+// (|a|, |b| > 150, sRGB beyond -0.1..1.1).
 ScriptColor KeyColorFromScript(const Image& luminance, const std::filesystem::path& torchscript);
 
 }  // namespace color3d

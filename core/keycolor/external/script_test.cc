@@ -44,7 +44,7 @@ class ScriptTest : public testing::Test {
   Image luminance_ = Image(50, 37, 1, 60.0f);
 };
 
-TEST_F(ScriptTest, AnswersInAbAreTakenAsTheyAre) {
+TEST_F(ScriptTest, ReturnsAbUnchanged) {
   for (int y = 0; y < 37; ++y) luminance_.At(0, y, 7) = 20.0f;
   Save("  return torch.cat([x * 0.5, -x * 0.25], 1)\n");
   const ScriptColor color = KeyColorFromScript(luminance_, file_);
@@ -56,7 +56,7 @@ TEST_F(ScriptTest, AnswersInAbAreTakenAsTheyAre) {
   EXPECT_EQ(color.luminance_deviation, 0.0);
 }
 
-TEST_F(ScriptTest, AnswersInSrgbKeepOurLuminance) {
+TEST_F(ScriptTest, KeepsLuminanceOfPhotoForSrgb) {
   // The sRGB picture's own L is about 53 (red) everywhere.
   Save("  z = x * 0.0\n  return (torch.cat([z + 1.0, z, z], 1), z)\n");
   const ScriptColor color = KeyColorFromScript(luminance_, file_);
@@ -64,14 +64,14 @@ TEST_F(ScriptTest, AnswersInSrgbKeepOurLuminance) {
   EXPECT_NEAR(color.luminance_deviation, 60.0 - 53.24, 0.1);
 }
 
-TEST_F(ScriptTest, SmallAnswersAreUpsampled) {
+TEST_F(ScriptTest, UpsamplesSmallOutput) {
   Save("  return torch.cat([x, x], 1)[:, :, ::4, ::4] * 0.1\n");
   const ScriptColor color = KeyColorFromScript(luminance_, file_);
   ASSERT_EQ(color.ab.width, 50);
   EXPECT_NEAR(color.ab.At(0, 36, 49), 6.0f, 1e-3f);
 }
 
-TEST_F(ScriptTest, WhatCannotBeUsedIsNamed) {
+TEST_F(ScriptTest, NamesUnusableOutput) {
   const auto expect = [&](const std::string& body, const char* say) {
     const std::string message = MessageOf(body);
     EXPECT_NE(message.find(say), std::string::npos) << message;
@@ -88,7 +88,7 @@ TEST_F(ScriptTest, WhatCannotBeUsedIsNamed) {
   expect("  return torch.cat([x, torch.ones(1)], 1)\n", "failed");
 }
 
-TEST_F(ScriptTest, FilesThatAreNoScriptAreRefused) {
+TEST_F(ScriptTest, RefusesFilesThatAreNoScript) {
   WriteFileAtomic(file_, "this is not a zip archive");
   EXPECT_THROW(KeyColorFromScript(luminance_, file_), Error);
   std::filesystem::remove(file_);

@@ -16,12 +16,12 @@ namespace {
 
 constexpr float kAlphaOfHint = 0.5f;
 constexpr float kChromaOfHint = 6.0f;
-// Colours of overlapping hints that are further apart (Lab units) contradict each other.
+// Distance of colours (Lab units) above which overlapping hints contradict each other.
 constexpr float kSameColor = 3.0f;
 
 using Point = std::array<double, 2>;
 
-// Squared distance of a point to the segment p q.
+// Squared distance from a point to the segment p q.
 double SquaredDistance(double x, double y, const Point& p, const Point& q) {
   const double dx = q[0] - p[0], dy = q[1] - p[1];
   const double length = dx * dx + dy * dy;
@@ -65,7 +65,7 @@ class HintDrawer {
   void WarnOfContradictions(ProgressObserver& progress) const {
     if (contradictions_ == 0) return;
     progress.OnWarning(
-        fmt::format("colour hints: {} pixels are given two different colours, the later entry wins "
+        fmt::format("colour hints: {} pixels have two different colours; the later entry wins "
                     "(first by {} and {})",
                     contradictions_,
                     first_pair_[0],
@@ -78,7 +78,7 @@ class HintDrawer {
 
   void CheckColor() const {
     if (!(std::abs(hint_->a) <= 128.0) || !(std::abs(hint_->b) <= 128.0)) {
-      throw InvalidArgument("{} has a colour outside of -128..128 Lab units", Name());
+      throw InvalidArgument("{} has a colour outside -128..128 Lab units", Name());
     }
     if (hint_->fill == ColorHint::Fill::kAutomatic && pictures_.automatic_ab == nullptr) {
       throw InvalidArgument("{} keeps the automatic colours, but no automatic colourizer was run",
@@ -91,12 +91,12 @@ class HintDrawer {
                                          : x >= 0.0 && x < width_ && y >= 0.0 && y < height_;
     if (inside) return;
     throw InvalidArgument(
-        "{} at ({}, {}) lies outside of the photo of {}x{} px", Name(), x, y, width_, height_);
+        "{} at ({}, {}) lies outside the photo of {}x{} px", Name(), x, y, width_, height_);
   }
 
   void CheckRadius() const {
     if (!(hint_->radius_px >= 0.0) || !std::isfinite(hint_->radius_px)) {
-      throw InvalidArgument("{} has the radius {} px, it must be >= 0", Name(), hint_->radius_px);
+      throw InvalidArgument("{} has the radius {} px; it must be >= 0", Name(), hint_->radius_px);
     }
   }
 
@@ -120,7 +120,7 @@ class HintDrawer {
     ++drawn_;
   }
 
-  // The capsule around a segment, and at least the pixels under its ends.
+  // Capsule around a segment, at least the pixels at its ends.
   void DrawSegment(const Point& p, const Point& q) {
     const double radius = hint_->radius_px;
     const auto low = [&](double v, int side) {
@@ -159,12 +159,12 @@ class HintDrawer {
     if (points.size() == 1) DrawSegment(points[0], points[0]);
   }
 
-  // Pixels whose centres lie inside, by the even-odd rule.
+  // Pixels with centres inside, by the even-odd rule.
   void DrawRegion() {
     const std::vector<Point>& points = hint_->points_px;
     if (points.size() < 3) {
       throw InvalidArgument(
-          "{} is a region of {} points, it needs 3 at least", Name(), points.size());
+          "{} is a region of {} points, but needs 3 at least", Name(), points.size());
     }
     for (const Point& point : points) CheckPoint(point[0], point[1], /*border_is_inside=*/true);
     std::vector<double> crossings;
@@ -231,7 +231,7 @@ HintMap DrawHints(const std::vector<ColorHint>& hints,
                   int height,
                   ProgressObserver& progress,
                   const CancellationToken& cancel) {
-  if (hints.empty()) throw InvalidArgument("there is no colour hint; give at least one");
+  if (hints.empty()) throw InvalidArgument("no colour hint; give at least one");
   CheckPicture(pictures.labels, "the label picture", 1, width, height);
   CheckPicture(pictures.automatic_ab, "the automatic colouring", 2, width, height);
   HintDrawer drawer(pictures, width, height);

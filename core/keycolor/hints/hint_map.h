@@ -1,4 +1,4 @@
-// Hints drawn onto a photo's pixels. Pure functions.
+// Rasterizes hints onto the pixels of a photo. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -12,18 +12,18 @@ namespace color3d {
 
 struct HintMap {
   std::vector<uint8_t> hinted;  // 1 where the colour is given
-  Image ab;                     // 2 channels; read where hinted
+  Image ab;                     // 2 channels; valid where hinted
 };
 
-// Throws Error{kInvalidArgument} naming the entry that lies outside of the picture of this size or
-// is malformed. Contradicting hints are reported as one warning.
+// Throws Error{kInvalidArgument} naming an entry that is malformed or lies outside the picture of
+// this size. Reports contradicting hints as one warning.
 HintMap DrawHints(const std::vector<ColorHint>& hints,
                   const HintPictures& pictures,
                   int width,
                   int height,
                   ProgressObserver& progress,
                   const CancellationToken& cancel);
-// Strokes as KeyColorFromStrokes takes them.
+// Hints from a strokes picture, as in KeyColorFromStrokes.
 HintMap HintsOfStrokes(const Image& strokes);
 
 }  // namespace color3d

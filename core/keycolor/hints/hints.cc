@@ -20,18 +20,18 @@ namespace {
 
 void CheckLuminance(const Image& luminance) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+    throw InvalidArgument("the key view's luminance must have 1 channel, but has {}",
                           luminance.channels);
   }
   for (float value : luminance.data) {
     if (!std::isfinite(value)) {
-      throw InvalidArgument("the key view's luminance holds a value that is not finite");
+      throw InvalidArgument("the key view's luminance has a value that is not finite");
     }
   }
 }
 
-// The hints on a smaller grid: mean colour of the hinted pixels in a cell; a cell with any is
-// hinted, so that thin strokes survive.
+// The hints on a smaller grid. A cell with any hinted pixel is hinted, so that thin strokes
+// survive, and has their mean colour.
 HintMap Reduce(const HintMap& full, int width, int height) {
   Image weighted(full.ab.width, full.ab.height, 3);
   for (size_t i = 0; i < full.hinted.size(); ++i) {
@@ -52,7 +52,7 @@ HintMap Reduce(const HintMap& full, int width, int height) {
   return small;
 }
 
-// Spreads hints over a picture of the same size; fills all of the solution but hinted_pixels.
+// Propagates hints over a picture of the same size. Sets all of the solution but hinted_pixels.
 HintSolution SolveAtSize(const Image& luminance,
                          HintMap hints,
                          const HintOptions& options,
@@ -124,22 +124,22 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
   options.Validate();
   CheckLuminance(luminance);
   if (strokes.width != luminance.width || strokes.height != luminance.height) {
-    throw InvalidArgument("the strokes picture is {}x{} px, the key view {}x{}",
+    throw InvalidArgument("the strokes picture is {}x{} px, but the key view {}x{}",
                           strokes.width,
                           strokes.height,
                           luminance.width,
                           luminance.height);
   }
   if (strokes.channels != 3 && strokes.channels != 4) {
-    throw InvalidArgument("the strokes picture has {} channels, it must have 3 (RGB) or 4 (RGBA)",
+    throw InvalidArgument("the strokes picture has {} channels, but must have 3 (RGB) or 4 (RGBA)",
                           strokes.channels);
   }
   HintMap hints = HintsOfStrokes(strokes);
   if (std::find(hints.hinted.begin(), hints.hinted.end(), 1) == hints.hinted.end()) {
     throw InvalidArgument(
         strokes.channels == 4
-            ? "the strokes picture hints no pixel (nowhere is alpha above 0.5)"
-            : "the strokes picture hints no pixel (nowhere does chroma exceed 6 Lab units)");
+            ? "the strokes picture has no hint (alpha is nowhere above 0.5)"
+            : "the strokes picture has no hint (chroma nowhere exceeds 6 Lab units)");
   }
   return Solve(luminance, std::move(hints), options, control);
 }

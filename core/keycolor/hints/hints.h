@@ -1,6 +1,6 @@
 // Colours of the key view from hints (STILL.md "Stage 1b"): strokes, points, lines and regions,
-// spread along the luminance. All pictures have the key photo's size as captured; the result is the
-// same for any number of threads.
+// propagated along the luminance. All pictures have the size of the key photo as captured. The
+// result does not depend on the number of threads.
 #pragma once
 
 #include <array>
@@ -13,16 +13,16 @@
 
 namespace color3d {
 
-// Pixels whose colour is given: a disc, a line, a polygon, or a label of a label picture.
+// Pixels of given colour: a disc, a line, a polygon, or a label of a label picture.
 struct ColorHint {
   double x_px = 0.0;  // centre of a disc, px from the upper left corner of the photo
   double y_px = 0.0;
-  double radius_px = 2.0;  // of a disc; half the width of a line
+  double radius_px = 2.0;  // radius of a disc, half the width of a line
   double a = 0.0;          // Lab units
   double b = 0.0;
 
   enum class Shape { kDisc, kLine, kRegion, kLabel };
-  // kNeutral: no colour (a = b = 0). kAutomatic: what the automatic colourizer says there.
+  // kNeutral: no colour (a = b = 0). kAutomatic: colours of the automatic colourizer.
   enum class Fill { kColor, kNeutral, kAutomatic };
   Shape shape = Shape::kDisc;
   Fill fill = Fill::kColor;
@@ -31,8 +31,8 @@ struct ColorHint {
 };
 
 struct HintOptions {
-  double sigma = 0.5;       // L difference (0..100) at which two neighbours half agree, 0.1..50
-  int max_side_px = 8192;   // larger photos are solved at this size, then upsampled guided by L
+  double sigma = 0.5;       // L difference (0..100) that halves the coupling of neighbours, 0.1..50
+  int max_side_px = 8192;   // larger photos are solved at this size and upsampled, guided by L
   double tolerance = 5e-4;  // relative residual of the conjugate gradients
   int max_iterations = 200;
   void Validate() const;
@@ -42,7 +42,7 @@ struct HintOptions {
 struct HintSolution {
   Image ab;  // 2 channels, Lab units, size of `luminance`; hinted pixels hold their hint exactly
   int iterations = 0;
-  double relative_residual = 0.0;  // of the system without the hinted pixels
+  double relative_residual = 0.0;  // residual of the system without the hinted pixels
   int64_t hinted_pixels = 0;
 };
 
@@ -53,24 +53,25 @@ struct HintPictures {
 };
 
 // Strokes as a picture of the key photo's size: 4 channels (pixels with alpha > 0.5 are hints), or
-// 3 channels (pixels whose chroma exceeds 6 Lab units are hints). Throws Error{kInvalidArgument}
-// when no pixel is hinted or the size is another.
+// 3 channels (pixels whose chroma exceeds 6 Lab units are hints). Throws Error{kInvalidArgument} if
+// no pixel is hinted or the size differs.
 HintSolution KeyColorFromStrokes(const Image& luminance,
                                  const Image& strokes,
                                  const HintOptions& options,
                                  const RunControl& control);
 
-// A JSON list of entries, each one of
-//   {"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}     a disc; radius 2 when left out
-//   {"line": [[10, 20], [80, 25]], "width": 4, "color": "#a0522d"}   width 4 when left out
+// Parses a JSON list of entries, each one of
+//   {"x": 120, "y": 80, "radius": 3, "color": "#a0522d"}     a disc; radius 2 by default
+//   {"line": [[10, 20], [80, 25]], "width": 4, "color": "#a0522d"}   width 4 by default
 //   {"region": [[10, 20], [80, 25], [40, 90]], "color": "#a0522d"}   a polygon (even-odd)
 //   {"label": 3, "color": "#a0522d"}                         all pixels of that label
-// in px of the key photo. Instead of "color", "keep": "neutral" takes the colour away, and
-// "keep": "auto" keeps the automatic colourizer's. Throws Error{kInvalidArgument} naming the entry.
+// in px of the key photo. Instead of "color", "keep": "neutral" removes the colour, and
+// "keep": "auto" keeps that of the automatic colourizer. Throws Error{kInvalidArgument} naming the
+// entry.
 std::vector<ColorHint> ParseHintsJson(const std::string& json);
 
-// Hints outside the picture, or that hold no pixel, are an error naming the entry. Where several
-// overlap, the last one wins; that they contradict each other is a warning.
+// Propagates the hints. Throws an error naming a hint that lies outside the picture or covers no
+// pixel. Where hints overlap, the last one wins; warns if they contradict each other.
 HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,

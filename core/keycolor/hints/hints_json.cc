@@ -27,7 +27,7 @@ double Number(const Json& entry, const char* field, const std::string& name) {
   return entry[field].get<double>();
 }
 
-// "#rrggbb" -> Lab; only a and b are used, L stays the photo's.
+// "#rrggbb" to Lab. Only a and b are used; L remains that of the photo.
 LabColor ParseHexColor(const std::string& text, const std::string& name) {
   bool valid = text.size() == 7 && text[0] == '#';
   for (size_t i = 1; valid && i < 7; ++i) {
@@ -35,7 +35,7 @@ LabColor ParseHexColor(const std::string& text, const std::string& name) {
   }
   if (!valid) {
     throw InvalidArgument(
-        "{} has the color \"{}\", it must look like \"#a0522d\"", name, text.substr(0, 32));
+        "{} has the color \"{}\"; it must look like \"#a0522d\"", name, text.substr(0, 32));
   }
   const unsigned long value = std::stoul(text.substr(1), nullptr, 16);
   return LabFromSrgb(RgbColor{static_cast<double>(value >> 16 & 255) / 255.0,
@@ -51,14 +51,14 @@ std::vector<std::array<double, 2>> Points(const Json& points, const std::string&
   std::vector<std::array<double, 2>> result;
   for (const Json& point : points) {
     if (!point.is_array() || point.size() != 2 || !point[0].is_number() || !point[1].is_number()) {
-      throw InvalidArgument("{} has a point that is no pair of numbers; {}", name, shape);
+      throw InvalidArgument("{} has a point that is not a pair of numbers; {}", name, shape);
     }
     result.push_back({point[0].get<double>(), point[1].get<double>()});
   }
   return result;
 }
 
-// The one of "x", "line", "region" and "label" that the entry has, with the fields that go with it.
+// Reads the shape of an entry: "x", "line", "region" or "label", with its fields.
 void ParseShape(const Json& entry, const std::string& name, ColorHint& hint) {
   if (entry.contains("line")) {
     hint.shape = ColorHint::Shape::kLine;
@@ -71,7 +71,7 @@ void ParseShape(const Json& entry, const std::string& name, ColorHint& hint) {
     hint.shape = ColorHint::Shape::kLabel;
     const double label = Number(entry, "label", name);
     if (label != std::floor(label) || label < 0.0 || label > 255.0) {
-      throw InvalidArgument("{} has a label that is no whole number of 0 to 255", name);
+      throw InvalidArgument("{} has a label that is not an integer from 0 to 255", name);
     }
     hint.label = static_cast<int>(label);
   } else {
@@ -102,7 +102,7 @@ void ParseFill(const Json& entry, const std::string& name, ColorHint& hint) {
   hint.b = lab.b;
 }
 
-// Fields of an entry by its shape, "color" and "keep" aside.
+// Fields of an entry by its shape, without "color" and "keep".
 std::vector<std::string> FieldsOf(const Json& entry) {
   if (entry.contains("line")) return {"line", "width"};
   if (entry.contains("region")) return {"region"};
@@ -118,7 +118,7 @@ ColorHint ParseHint(const Json& entry, const std::string& name) {
     if (std::find(fields.begin(), fields.end(), key) != fields.end()) continue;
     std::string known;
     for (const std::string& field : fields) known += (known.empty() ? "" : ", ") + field;
-    throw InvalidArgument("{} has the unknown field \"{}\"; known with this shape are {}",
+    throw InvalidArgument("{} has an unknown field \"{}\"; known for this shape are {}",
                           name,
                           key.substr(0, 32),
                           known);

@@ -81,7 +81,7 @@ TEST(HintsTest, FlatPictureTakesItsOnlyHint) {
   }
 }
 
-TEST(HintsTest, OppositeHintsOnePixelApartBothHold) {
+TEST(HintsTest, KeepsOppositeHintsOnePixelApart) {
   const HintSolution solution =
       Spread(Image(33, 33, 1, 50.0f), {{16.5, 16.5, 0, 80, 80}, {17.5, 16.5, 0, -80, -80}});
   EXPECT_EQ(solution.ab.At(0, 16, 16), 80.0f);
@@ -89,7 +89,7 @@ TEST(HintsTest, OppositeHintsOnePixelApartBothHold) {
   for (float value : solution.ab.data) EXPECT_LE(std::abs(value), 80.5f);
 }
 
-TEST(HintsTest, OfContradictingHintsTheLastWinsWithAWarning) {
+TEST(HintsTest, LastOfContradictingHintsWinsWithWarning) {
   const Image luminance(9, 9, 1, 50.0f);
   Recorder recorder;
   const HintSolution solution =
@@ -132,7 +132,7 @@ TEST(HintsTest, TenThousandHintsAreExactAndFinite) {
             static_cast<float>(last.a));
 }
 
-TEST(HintsTest, BlackWhiteAndCheckeredPicturesHaveFiniteAnswers) {
+TEST(HintsTest, ExtremePicturesGiveFiniteColors) {
   Image checkered(64, 64, 1);
   for (int i = 0; i < 64 * 64; ++i) checkered.data[i] = (i + i / 64) % 2 ? 100.0f : 0.0f;
   for (const Image& luminance : {Image(64, 64, 1, 0.0f), Image(64, 64, 1, 100.0f), checkered}) {
@@ -143,7 +143,7 @@ TEST(HintsTest, BlackWhiteAndCheckeredPicturesHaveFiniteAnswers) {
   }
 }
 
-TEST(HintsTest, RegionsAreLockedExactly) {
+TEST(HintsTest, KeepsHintedRegionsExactly) {
   const Image luminance = TwoHalves(60, 40);
   const Image automatic(60, 40, 2, 12.5f);
   Image labels(60, 40, 1, 0.0f);
@@ -163,7 +163,7 @@ TEST(HintsTest, RegionsAreLockedExactly) {
   EXPECT_EQ(solution.hinted_pixels, 100 + 100 + 44 + 10);
 }
 
-TEST(HintsTest, LocksThatReferToNothingAreRefusedByName) {
+TEST(HintsTest, NamesRefusedRegionsAndLabels) {
   const Image luminance = TwoHalves(60, 40);
   const auto message_of = [&](const char* json, const HintPictures& pictures) -> std::string {
     try {
@@ -191,7 +191,7 @@ TEST(HintsTest, LocksThatReferToNothingAreRefusedByName) {
             std::string::npos);
 }
 
-TEST(HintsTest, AHintThatCoversEverythingIsTheAnswer) {
+TEST(HintsTest, HintOfWholePictureIsTheResult) {
   const Image luminance = TwoHalves(32, 24);
   const HintSolution solution = Spread(luminance, {{16, 12, 1e6, 12, 34}});
   EXPECT_EQ(solution.hinted_pixels, 32 * 24);
@@ -226,7 +226,7 @@ TEST(HintsTest, OnePixelPicture) {
   EXPECT_NEAR(solution.ab.At(0, 0, 0), 7.0f, 1e-3f);
 }
 
-TEST(HintsTest, LargePicturesAreSolvedSmallAndFollowTheEdgesOfTheLargeOne) {
+TEST(HintsTest, LargePicturesAreSolvedSmallAndUpsampled) {
   const Image luminance = TwoHalves(400, 300);
   HintOptions options;
   options.max_side_px = 100;
@@ -275,7 +275,7 @@ TEST(StrokesTest, ThinStrokesSurviveTheReduction) {
   EXPECT_NEAR(solution.ab.At(0, 10, 10), LabFromSrgb(RgbColor{1, 0, 0}).a, 2.0);
 }
 
-TEST(StrokesTest, NoStrokeOrAnotherSizeIsRefused) {
+TEST(StrokesTest, RefusesMissingStrokesAndOtherSizes) {
   const Image luminance(40, 40, 1, 50.0f);
   EXPECT_THROW(SpreadStrokes(luminance, Image(40, 40, 4, 0.0f)), Error);
   EXPECT_THROW(SpreadStrokes(luminance, Image(40, 40, 3, 0.7f)), Error);

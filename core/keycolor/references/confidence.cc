@@ -11,8 +11,9 @@
 namespace color3d {
 namespace {
 
-constexpr double kAgreementWidth = 12.0;  // Lab units of spread at which voters contradict
-constexpr float kSameCell = 1e-4f;        // squared distance of a cell to itself, rounded
+constexpr double kAgreementWidth =
+    12.0;  // spread of the voters' colours, Lab units, at which they disagree
+constexpr float kSameCell = 1e-4f;  // squared distance of a cell to itself, up to rounding
 
 double Median(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -1,4 +1,4 @@
-// How certain matches between pictures are. Torch in the interface; used inside
+// Confidence of matches between pictures. Torch in the interface; used inside
 // core/keycolor/references only. Pure functions, thread-safe.
 #pragma once
 
@@ -8,14 +8,15 @@
 
 namespace color3d {
 
-inline constexpr double kDistanceFloor = 0.02;  // squared; features are noisy
+inline constexpr double kDistanceFloor = 0.02;  // squared distance, the noise of features
 
-// [q], 0..1: closeness (the match's squared distance against `distance_scale`) x mutuality (whether
-// another cell is nearer to the matched one) x agreement of the voters' colours.
+// Returns [q], 0..1: closeness (squared distance of the match relative to `distance_scale`) times
+// mutuality (whether another cell is nearer to the matched one) times agreement of the colours of
+// the voters.
 torch::Tensor Confidence(const CellMatches& matches, double distance_scale);
 
-// Squared distance at which a match is no better than chance, half-way (geometrically) between how
-// near cells of the references are to their nearest others and how far two of them are apart.
+// Squared distance at which a match is no better than chance: the geometric mean of the typical
+// distance of a cell of the references to its nearest other cell and that of two random cells.
 double DistanceScale(const torch::Tensor& sample, const torch::Tensor& features);
 
 }  // namespace color3d

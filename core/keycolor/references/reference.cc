@@ -33,21 +33,22 @@ namespace color3d {
 namespace {
 
 constexpr int kMinSidePx = 16;
-constexpr std::array<double, 3> kScales{0.75, 1.0, 1.33};  // of a reference: sizes of things differ
+constexpr std::array<double, 3> kScales{
+    0.75, 1.0, 1.33};  // scales of a reference, since sizes of things differ
 constexpr int64_t kScaleSample = 500;
-constexpr int kFirstTapStridePx = 2;  // of the embedded encoder
-// Of the vote among matches in other photos.
+constexpr int kFirstTapStridePx = 2;  // stride of the embedded encoder's finest tap
+// Vote among matches in other photos.
 constexpr double kTemperature = 0.3;
-constexpr int kLevels = 1024;  // of the histograms of L
-// Smallest weight of a match: regions without any get their neighbors' colour.
+constexpr int kLevels = 1024;  // bins of the histograms of L
+// Minimum weight of a match. Regions without matches get the colour of their neighbors.
 constexpr float kMinConfidence = 1e-4f;
 
 void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
   if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
+    throw InvalidArgument("the key view's luminance must have 1 channel, but has {}",
                           luminance.channels);
   }
-  if (references.empty()) throw InvalidArgument("there is no reference picture; give at least one");
+  if (references.empty()) throw InvalidArgument("no reference picture; give at least one");
   for (size_t k = 0; k < references.size(); ++k) {
     const Image& picture = references[k];
     const std::string name = fmt::format("reference picture {}", k);
@@ -56,10 +57,10 @@ void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
     }
     if (std::min(picture.width, picture.height) < kMinSidePx) {
       throw InvalidArgument(
-          "{} is {} px, the least side is {} px", name, SizeText(picture), kMinSidePx);
+          "{} is {} px; sides must have at least {} px", name, SizeText(picture), kMinSidePx);
     }
     for (float value : picture.data) {
-      if (!std::isfinite(value)) throw InvalidArgument("{} holds a value that is not finite", name);
+      if (!std::isfinite(value)) throw InvalidArgument("{} has a value that is not finite", name);
     }
   }
 }
@@ -68,8 +69,8 @@ int LevelOf(float l) {
   return std::clamp(static_cast<int>(l * (kLevels / 100.0f)), 0, kLevels - 1);
 }
 
-// L of the reference, mapped monotonically so that its histogram becomes the key view's: exposure
-// and development differ between two photos of a place.
+// L of the reference, mapped monotonically to the histogram of the key view, since exposure and
+// development differ between photos.
 Image MatchHistogram(const Image& luminance, const Image& key) {
   const auto cumulate = [](const Image& picture) {
     std::vector<double> sums(kLevels, 0.0);
@@ -90,7 +91,7 @@ Image MatchHistogram(const Image& luminance, const Image& key) {
   return matched;
 }
 
-// Cells of one picture, with the encoder's features.
+// Cells of a picture, with features of the encoder.
 CellFeatures Describe(const TapEncoder& encoder, const Image& luminance) {
   const ConvNextConfig& config = encoder.config();
   const int multiple = config.Stride(config.StageCount() - 1);
@@ -104,12 +105,12 @@ CellFeatures Describe(const TapEncoder& encoder, const Image& luminance) {
 
 // Cells of the references, before whitening.
 struct ReferenceCells {
-  std::vector<std::vector<torch::Tensor>> blocks;  // by kind of feature, then a part per picture
+  std::vector<std::vector<torch::Tensor>> blocks;  // by block of features, then by picture
   std::vector<torch::Tensor> colors;
-  std::vector<int32_t> reference;  // that each cell is from
+  std::vector<int32_t> reference;  // reference of each cell
 };
 
-// Of one reference at one scale, at most `wanted`, drawn at random.
+// Samples at most `wanted` cells of a reference at one scale.
 void AddCells(const TapEncoder& encoder,
               const Image& luminance,
               const Image& ab,
@@ -126,11 +127,11 @@ void AddCells(const TapEncoder& encoder,
   cells.reference.insert(cells.reference.end(), rows.size(0), reference);
 }
 
-ReferenceCells CellsOf(const std::vector<Image>& references,
-                       const Image& key_luminance,
-                       const TapEncoder& encoder,
-                       const ReferenceOptions& options,
-                       const CancellationToken& cancel) {
+ReferenceCells SampleReferenceCells(const std::vector<Image>& references,
+                                    const Image& key_luminance,
+                                    const TapEncoder& encoder,
+                                    const ReferenceOptions& options,
+                                    const CancellationToken& cancel) {
   ReferenceCells cells;
   Random random(options.seed);
   const int64_t pictures = static_cast<int64_t>(references.size() * kScales.size());
@@ -158,11 +159,11 @@ ReferenceCells CellsOf(const std::vector<Image>& references,
   return cells;
 }
 
-// What the references' cells say about those of the key view.
+// Colours of the key view's cells from those of the references.
 struct KeyMatches {
-  Image ab;                        // a pixel per cell
-  Image confidence;                // 0..1, likewise
-  std::vector<int32_t> reference;  // that the nearest cell is from
+  Image ab;                        // one pixel per cell
+  Image confidence;                // 0..1, one pixel per cell
+  std::vector<int32_t> reference;  // reference of the nearest cell
 };
 
 KeyMatches Match(const std::vector<Image>& references,
@@ -173,10 +174,11 @@ KeyMatches Match(const std::vector<Image>& references,
   torch::NoGradGuard no_grad;
   SetTorchThreads(control.pool.thread_count(), /*blas_threads=*/1);
   control.progress.OnProgress(0, 0, "describing the reference pictures");
-  const ReferenceCells known = CellsOf(references, luminance, encoder, options, control.cancel);
+  const ReferenceCells known =
+      SampleReferenceCells(references, luminance, encoder, options, control.cancel);
   std::vector<torch::Tensor> blocks;
   for (const std::vector<torch::Tensor>& parts : known.blocks) blocks.push_back(torch::cat(parts));
-  // The shares of the taps go by their order, also where the finest has a larger stride.
+  // Shares follow the order of the taps, even if the finest one has a larger stride.
   const Whitening whitening(blocks, kFirstTapStridePx, {});
   const CellBank bank{whitening.Apply(blocks),
                       torch::cat(known.colors),
@@ -212,7 +214,7 @@ const TapEncoder& RequireTaps(const Encoder& encoder) {
                         encoder.description());
 }
 
-// The matches, spread along the luminance by their confidences.
+// Propagates the matches along the luminance, weighted by their confidence.
 void Spread(const Image& luminance,
             const KeyMatches& matches,
             const ReferenceOptions& options,
@@ -245,8 +247,8 @@ void Spread(const Image& luminance,
   solution.confidence = Resize(matches.confidence, luminance.width, luminance.height);
 }
 
-// Mean confidence and the share of each reference in it; chroma is faded where the references say
-// nothing about this picture.
+// Sets mean confidence and the share of each reference in it. Fades chroma if the references do not
+// resemble this picture.
 void WeighReferences(const KeyMatches& matches,
                      size_t references,
                      const ReferenceOptions& options,
@@ -264,8 +266,8 @@ void WeighReferences(const KeyMatches& matches,
   if (solution.mean_confidence >= options.low_confidence) return;
   const double fade = std::pow(solution.mean_confidence / options.low_confidence, 2);
   progress.OnWarning(fmt::format(
-      "the reference pictures hardly resemble the key view (mean confidence {:.3g}, expected {} or "
-      "more): chroma is faded to {:.3g} of itself; give a picture of the same place or things",
+      "the reference pictures do not resemble the key view (mean confidence {:.3g}, expected {} or "
+      "more): chroma is scaled by {:.3g}; give a picture of the same place or things",
       solution.mean_confidence,
       options.low_confidence,
       fade));

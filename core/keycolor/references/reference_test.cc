@@ -84,7 +84,7 @@ TEST(ReferenceTest, ColorsFollowTexture) {
   }
 }
 
-TEST(ReferenceTest, OfSeveralReferencesTheAlikeOneExplains) {
+TEST(ReferenceTest, PrefersTheSimilarReference) {
   const Image key = Bands(360, 160, 120);
   Recorder recorder;
   const ReferenceSolution solution =
@@ -97,7 +97,7 @@ TEST(ReferenceTest, OfSeveralReferencesTheAlikeOneExplains) {
   EXPECT_GT(solution.explained[1], 0.7);
 }
 
-TEST(ReferenceTest, AnUnrelatedReferenceWarnsAndFades) {
+TEST(ReferenceTest, WarnsAndFadesForUnrelatedReference) {
   const Image key = Bands(360, 160, 120);
   ReferenceOptions options;
   options.low_confidence = 1.0;  // nothing is that certain
@@ -108,7 +108,7 @@ TEST(ReferenceTest, AnUnrelatedReferenceWarnsAndFades) {
   for (float value : solution.ab.data) ASSERT_LE(std::abs(value), 20.0f * 0.9f);
 }
 
-TEST(ReferenceTest, TheNumberOfThreadsDoesNotChangeABit) {
+TEST(ReferenceTest, GivesSameBytesForAnyThreadCount) {
   const Image key = Bands(100, 70, 40);
   const std::vector<Image> references{SrgbFromLab(Bands(100, 70, 0))};
   std::vector<float> first;
@@ -121,7 +121,7 @@ TEST(ReferenceTest, TheNumberOfThreadsDoesNotChangeABit) {
   }
 }
 
-TEST(ReferenceTest, ReferencesWithoutUseAreRefusedByNumber) {
+TEST(ReferenceTest, NamesReferencesThatItRefuses) {
   const Image luminance = LuminanceOfLab(Bands(100, 70, 0));
   const Image good = SrgbFromLab(Bands(100, 70, 0));
   const auto message_of = [&](const std::vector<Image>& references) -> std::string {

@@ -90,7 +90,7 @@ std::optional<LabColor> FromHex(const std::string& word) {
   return LabOf(rgb);
 }
 
-// "reddish", "bluish": half of the colour.
+// "reddish", "bluish": half of the chroma.
 std::optional<LabColor> FromIsh(const std::string& word) {
   if (!word.ends_with("ish")) return std::nullopt;
   std::string stem = word.substr(0, word.size() - 3);
@@ -147,7 +147,7 @@ std::vector<std::string> KnownColorNames() {
 }
 
 Chroma ChromaAtLuminance(const LabColor& color, double l) {
-  constexpr double kMinRange = 10.0;  // near-black and near-white names have no shadow to fall to
+  constexpr double kMinRange = 10.0;  // for colours near black and white
   const double shadow = l / std::max(color.l, kMinRange);
   const double highlight = (100.0 - l) / std::max(100.0 - color.l, kMinRange);
   const double share = std::clamp(std::min(shadow, highlight), 0.0, 1.0);

@@ -9,10 +9,11 @@
 namespace color3d {
 namespace {
 
-// The picture is monochrome, and a sentence that says so fits it better.
+// The picture is monochrome; sentences that mention this fit it better.
 constexpr const char* kSentences[] = {"a black and white photo of ", "a photo of ", ""};
-constexpr int kMaxWindowsPerSide = 16;  // bounds the work on very long pictures
-constexpr float kMinWeight = 0.05f;     // of a window's border, so that the picture's own counts
+constexpr int kMaxWindowsPerSide = 16;  // bounds the work for elongated pictures
+constexpr float kMinWeight =
+    0.05f;  // weight at a window's border, above 0 so that borders of the picture count
 
 void Normalise(std::vector<float>& vector) {
   double sum = 1e-30;
@@ -92,8 +93,8 @@ Image Cosines(const Image& features, const std::vector<std::vector<float>>& text
   return cosines;
 }
 
-// Adds a window's cosines to the map, with a weight that falls to its border, where a window sees
-// less of what surrounds a place.
+// Adds a window's cosines to the map. Weights fall towards its border, where less context is
+// visible.
 void Blend(const Image& cosines, const Window& window, double scale, Image& sum, Image& weights) {
   const int left = static_cast<int>(std::floor(window.left * scale));
   const int top = static_cast<int>(std::floor(window.top * scale));

@@ -1,4 +1,4 @@
-// How well texts fit every place of a picture: cosines of CLIP's dense features in overlapping
+// Similarity of texts to each place of a picture: cosines of CLIP's dense features in overlapping
 // windows of several sizes. No torch.
 #pragma once
 
@@ -12,13 +12,13 @@
 
 namespace color3d {
 
-// Unit feature of a thing: the mean over a few sentences about it.
+// Unit feature of a thing: mean over several sentences about it.
 std::vector<float> TextFeatureOf(const TextImageModel& model, const std::string& thing);
 
 // One plane per text, cosines in -1..1, on a grid whose longer side is `map_side_px` (or the
-// picture's, when smaller). `texts` are unit vectors. `windows_per_side`: for each entry n, square
+// picture's, if smaller). `texts` are unit vectors. `windows_per_side`: for each entry n, square
 // windows of 1/n of the shorter side, half overlapping. Throws Error{kInternal} when the model's
-// features have another length than the texts.
+// features and the texts have different lengths.
 Image DenseSimilarity(const TextImageModel& model,
                       const Image& srgb,
                       const std::vector<std::vector<float>>& texts,

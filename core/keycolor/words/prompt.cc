@@ -16,12 +16,12 @@
 namespace color3d {
 namespace {
 
-// What a place shows when it shows none of the things.
+// Texts of the background, for places that show none of the things.
 constexpr const char* kBackgrounds[] = {"the background", "something else", "an empty surface"};
-constexpr int kLargestPictureSidePx = 1536;  // what the finest windows are cut from
+constexpr int kLargestPictureSidePx = 1536;  // size from which the finest windows are cropped
 constexpr int kHintsPerSide = 64;
-// Above the guided filter's defaults: one of CLIP's patches covers several cells, so the borders
-// lie further from the edges of L that they belong to. Not measured against the defaults.
+// Above the guided filter's defaults: a patch of CLIP covers several cells, so borders of regions
+// are further from the edges of L. Not measured against the defaults.
 constexpr int kPatchGuideRadius = 3;
 constexpr float kPatchGuideVarianceFloor = 30.0f;
 
@@ -83,7 +83,7 @@ Image Probabilities(const Image& luminance,
       probabilities.Plane(count)[i] += planes.Plane(c)[i];
     }
   }
-  // CLIP's patches are coarse: their borders are brought to the edges of L.
+  // Aligns the coarse borders of CLIP's patches with the edges of L.
   const Image guide = Resize(luminance, planes.width, planes.height);
   probabilities = UpsampleGuided(
       Resize(probabilities, std::max(1, planes.width / 4), std::max(1, planes.height / 4)),
@@ -95,8 +95,8 @@ Image Probabilities(const Image& luminance,
 }
 
 struct Leader {
-  int phrase = 0;     // the number of phrases: the background
-  float lead = 0.0f;  // over the next best
+  int phrase = 0;     // index; the number of phrases: background
+  float lead = 0.0f;  // lead over the second best
 };
 
 Leader LeaderAt(const Image& probabilities, size_t i, const std::vector<bool>& allowed) {
@@ -141,7 +141,7 @@ std::vector<PromptRegion> RegionsOf(const std::vector<ColorPhrase>& phrases,
   return regions;
 }
 
-// The most certain pixel of every cell of a grid becomes a hint, when it is certain enough.
+// The most certain pixel of each grid cell becomes a hint if its lead is large enough.
 class HintPlacer {
  public:
   HintPlacer(const Image& luminance,
@@ -218,7 +218,7 @@ class HintPlacer {
   const Image& probabilities_;
   const std::vector<PromptRegion>& regions_;
   double seed_confidence_;
-  std::vector<bool> allowed_;  // phrases that were found, and the background
+  std::vector<bool> allowed_;  // phrases that were found, and background
 };
 
 Error NothingFound(const std::vector<PromptRegion>& regions) {

@@ -35,7 +35,7 @@ const std::set<std::string_view> kArticles = {"a",
                                               "those",
                                               "each",
                                               "every"};
-// Where a colour after the thing may follow: "the sky is blue", "the house in red".
+// Links between a thing and a following colour: "the sky is blue", "the house in red".
 const std::set<std::string_view> kLinks = {
     "is", "are", "was", "were", "be", "become", "becomes", "looks", "should", "in", "to", "as"};
 const std::set<std::string_view> kBreaks = {
@@ -52,7 +52,7 @@ struct Clause {
   Boundary before = Boundary::kBreak;
 };
 
-// Lower-case words; "" where a sign ends a clause. Hyphens part words, but for none in #hex.
+// Splits into lower-case words, with "" where punctuation ends a clause. Hyphens separate words.
 std::vector<std::string> WordsOf(const std::string& prompt) {
   std::vector<std::string> words;
   std::string word;
@@ -80,7 +80,7 @@ std::vector<Clause> ClausesOf(const std::string& prompt) {
       const Boundary boundary =
           !word.empty() && kLinks.count(word) ? Boundary::kLink : Boundary::kBreak;
       if (clauses.back().words.empty()) {
-        // "should be": a link stays one; anything else wins over it.
+        // "should be": a link remains one; other kinds take precedence.
         const bool only_links =
             boundary == Boundary::kLink && clauses.back().before == Boundary::kLink;
         clauses.back().before = only_links ? Boundary::kLink : boundary;
@@ -121,7 +121,7 @@ std::vector<Mention> ColorsIn(const std::vector<std::string>& words) {
 
 class PhraseCollector {
  public:
-  // `previous`: what the clause before says when it has no colour, for "the sky | is | blue".
+  // `previous`: words of the preceding clause if it has no colour, for "the sky | is | blue".
   void AddClause(const Clause& clause, const std::string& previous) {
     const std::vector<std::string>& words = clause.words;
     const std::vector<Mention> mentions = ColorsIn(words);

@@ -1,4 +1,4 @@
-// What a prompt says about colour: "a red brick castle under a blue sky" is {red, brick castle} and
+// Colour phrases of a prompt: "a red brick castle under a blue sky" is {red, brick castle} and
 // {blue, sky}. English word order; no model, no torch. Pure functions.
 #pragma once
 
@@ -16,13 +16,13 @@ struct ColorPhrase {
 
 struct ParsedPrompt {
   std::vector<ColorPhrase> phrases;
-  std::vector<std::string> notes;  // what was left out and why, for the report
+  std::vector<std::string> notes;  // omitted words with reasons, for the report
 };
 
-// A thing is what follows a colour up to the next sign, preposition, verb or colour ("white clouds
-// over green hills"), or what comes before it ("the sky is blue", "paint the roof red"). The first
-// colour of a thing counts. Throws Error{kInvalidArgument} when the prompt is longer than 2000
-// bytes, names more than 32 things, or none (with the colours that are known).
+// A thing is the words after a colour, up to the next punctuation mark, preposition, verb or colour
+// ("white clouds over green hills"), or the words before it ("the sky is blue", "paint the roof
+// red"). The first colour of a thing counts. Throws Error{kInvalidArgument} if the prompt is longer
+// than 2000 bytes, names more than 32 things, or none (listing the known colours).
 ParsedPrompt ParsePrompt(const std::string& prompt);
 
 }  // namespace color3d

@@ -51,7 +51,7 @@ TEST(PromptPhrasesTest, NamesOfTwoWordsModifiersAndHex) {
           {"pale sky blue", "shirt"}, {"#4682b4", "door"}, {"reddish", "hair"}, {"#fff", "wall"}}));
 }
 
-TEST(PromptPhrasesTest, SaysWhatWasLeftOut) {
+TEST(PromptPhrasesTest, NotesOmittedWords) {
   const ParsedPrompt parsed = ParsePrompt("red, blue sky and a green sky");
   ASSERT_EQ(parsed.phrases.size(), 1u);
   ASSERT_EQ(parsed.notes.size(), 2u);
@@ -75,7 +75,7 @@ TEST(PromptPhrasesTest, RefusesPromptsWithoutColor) {
   EXPECT_THROW(ParsePrompt(many), Error);
 }
 
-TEST(ColorNamesTest, TheTableIsSortedAndNamesFindThemselves) {
+TEST(ColorNamesTest, TableIsSortedAndEveryNameIsFound) {
   const std::vector<std::string> names = KnownColorNames();
   EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
   for (const std::string& name : names) {
@@ -89,7 +89,7 @@ TEST(ColorNamesTest, TheTableIsSortedAndNamesFindThemselves) {
   }
 }
 
-TEST(ColorNamesTest, HuesAreWhereTheyBelong) {
+TEST(ColorNamesTest, HuesMatchTheirNames) {
   const auto ab = [](const char* name) {
     const auto color = ColorAt({name}, 0);
     return std::pair{color->lab.a, color->lab.b};

@@ -85,7 +85,7 @@ TEST(PromptTest, PhrasesColorTheirRegions) {
   EXPECT_GT(solution.spread.hinted_pixels, 100);
 }
 
-TEST(PromptTest, AThingThatIsNotThereIsReportedAndNotForced) {
+TEST(PromptTest, ReportsPhraseThatIsNotFound) {
   Image l(200, 150, 1, 85.0f);  // nothing but sky
   const PromptSolution solution = Solve(l, "blue sky, red wall");
   EXPECT_TRUE(solution.regions[0].found);
@@ -104,7 +104,7 @@ TEST(PromptTest, AThingThatIsNotThereIsReportedAndNotForced) {
   }
 }
 
-TEST(PromptTest, WhatNoPhraseNamesTakesTheRestsColor) {
+TEST(PromptTest, UnnamedAreasTakeTheGivenColors) {
   // The model knows no unicorn: its text is near the "nothing" feature, which no patch shows.
   const Image l = Scene(320, 240);
   Image rest(320, 240, 2);
@@ -118,7 +118,7 @@ TEST(PromptTest, WhatNoPhraseNamesTakesTheRestsColor) {
   EXPECT_FLOAT_EQ(solution.confidence.At(0, 220, 80), 0.0f);
 }
 
-TEST(PromptTest, TheSameInputGivesTheSameBytes) {
+TEST(PromptTest, IsRepeatable) {
   const Image l = Scene(200, 300);
   const PromptSolution a = Solve(l, "blue sky, green grass");
   const PromptSolution b = Solve(l, "blue sky, green grass");

@@ -8,10 +8,10 @@
 namespace color3d {
 namespace {
 
-constexpr double kFarthest = 1e9;  // of a camera from the scene's origin, scene units
+constexpr double kFarthest = 1e9;  // distance of a camera from the origin, scene units
 constexpr int kLargestSide = 1'000'000;
 
-// Of another size, it sees as much between top and bottom.
+// Keeps the vertical field of view if the size differs.
 Camera WithSize(const Camera& camera, int width, int height) {
   const double scale = static_cast<double>(height) / camera.height;
   return {width, height, scale * camera.fx, scale * camera.fy, 0.5 * width, 0.5 * height};

@@ -1,4 +1,4 @@
-// Cameras that the user has made elsewhere, to render a scene from. Stateless.
+// Reads files of cameras that other programs wrote, to render a scene from them. Stateless.
 #pragma once
 
 #include <optional>
@@ -16,14 +16,13 @@ struct FileCamera {
   std::optional<double> time_s;
 };
 
-// A transforms.json, as Nerfstudio, NeRF and exporters of Blender write it: a list "frames" with a
-// transform_matrix each (camera to world, OpenGL axes) in the frame and units of the model that the
-// user gave or that the exported files have; w, h, fl_x, fl_y, cx, cy or camera_angle_x, for all or
-// for each. Each may have the `time` at which it sees a scene that moves: seconds from the scene's
-// first moment. Photos and lens distortion that it names do not matter. What it does not say of the
-// picture is as in `absent`. Throws Error{kInvalidArgument} that names the file, the frame and the
-// field: no JSON, no frames or more than `max_frames`, a matrix that is no pose, numbers that are
-// not finite.
+// Reads a transforms.json as Nerfstudio, NeRF and Blender exporters write it: a list "frames", each
+// with a transform_matrix (camera to world, OpenGL axes) in the frame and units of the user's model
+// and of the exported files; and w, h, fl_x, fl_y, cx, cy or camera_angle_x, for all frames or for
+// each. In dynamic scenes a frame may have a `time`: seconds from the scene's first moment. Photos
+// and lens distortion are ignored. Missing intrinsics are taken from `absent`. Throws
+// Error{kInvalidArgument} that names the file, the frame and the field if the text is not JSON, has
+// no frames or more than `max_frames`, a matrix is no pose, or a number is not finite.
 std::vector<FileCamera> ReadCameraFile(std::string_view text,
                                        const std::string& file_name,
                                        const Scene& scene,

@@ -30,7 +30,7 @@ std::string Complaint(const std::string& text) {
   return "none";
 }
 
-TEST(CameraFileTest, PosesAreInTheUnitsOfTheUploadedModel) {
+TEST(CameraFileTest, PosesAreInUnitsOfUploadedModel) {
   Scene scene;
   scene.world_from_scene_scale = 10.0;
   scene.world_offset = {1.0, 2.0, 3.0};
@@ -46,7 +46,7 @@ TEST(CameraFileTest, PosesAreInTheUnitsOfTheUploadedModel) {
   EXPECT_EQ(cameras[0].camera.fy, 520.0);
 }
 
-TEST(CameraFileTest, WhatTheFileSaysOfThePictureCountsForAllOrForOne) {
+TEST(CameraFileTest, ReadsIntrinsicsOfFileOrFrame) {
   const auto cameras =
       Read("{\"w\":200,\"h\":100,\"fl_x\":90,\"frames\":[" + Frame() + "," +
            Frame("[1,0,0,6]", "\"fl_x\":70,\"cx\":99,\"file_path\":\"nowhere.png\",") + "]}");
@@ -62,7 +62,7 @@ TEST(CameraFileTest, WhatTheFileSaysOfThePictureCountsForAllOrForOne) {
   EXPECT_DOUBLE_EQ(sized[0].camera.cx, 50.0);
 }
 
-TEST(CameraFileTest, AFrameMayHaveATime) {
+TEST(CameraFileTest, ReadsTimesOfFrames) {
   const auto cameras =
       Read("{\"time\":9,\"frames\":[" + Frame() + "," + Frame("[1,0,0,6]", "\"time\":0.5,") + "]}");
   EXPECT_FALSE(cameras[0].time_s) << "no file says that of all its frames";
@@ -71,7 +71,7 @@ TEST(CameraFileTest, AFrameMayHaveATime) {
               HasSubstr("frame 0: time must be a finite number"));
 }
 
-TEST(CameraFileTest, WhatIsWrongIsNamed) {
+TEST(CameraFileTest, NamesFaults) {
   EXPECT_THAT(Complaint("{\"frames\": ["), HasSubstr("path.json is not JSON"));
   EXPECT_THAT(Complaint(""), HasSubstr("not JSON"));
   EXPECT_THAT(Complaint("[]"), HasSubstr("no list of frames"));

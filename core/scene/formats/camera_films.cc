@@ -126,7 +126,7 @@ void CheckFilms(const std::vector<CameraFilm>& films, const std::string& from) {
   }
 }
 
-// The files that hold the film's pictures, in their order.
+// Returns the files of the film's pictures, in order.
 std::vector<fs::path> FilesOf(const CameraFilm& film, const fs::path& scene_folder) {
   if (!film.is_pictures) return {scene_folder / film.file};
   std::vector<fs::path> files;
@@ -136,7 +136,7 @@ std::vector<fs::path> FilesOf(const CameraFilm& film, const fs::path& scene_fold
   return files;
 }
 
-// A copy shows nothing from a second place.
+// Throws for copies: they show nothing from a second position.
 void RefuseCopies(const std::vector<CameraFilm>& films, const fs::path& scene_folder) {
   std::map<std::vector<uintmax_t>, std::vector<const CameraFilm*>> by_sizes;
   for (const CameraFilm& film : films) {
@@ -161,7 +161,7 @@ void RefuseCopies(const std::vector<CameraFilm>& films, const fs::path& scene_fo
   }
 }
 
-// The folders in frames/, each a camera's; nothing where there is one, or none.
+// Returns the folders in frames/, one for each camera; empty if there are fewer than two.
 std::vector<CameraFilm> FoldersOfPictures(const std::vector<std::string>& files) {
   std::set<std::string> folders;
   std::string direct;
@@ -192,7 +192,7 @@ std::vector<CameraFilm> FoldersOfPictures(const std::vector<std::string>& files)
   return films;
 }
 
-// Those of a folder that holds nothing else to look at.
+// Returns the films of a folder that has no other pictures.
 std::vector<CameraFilm> FilmsAlone(const std::vector<std::string>& files) {
   std::vector<CameraFilm> films;
   for (const std::string& file : files) {

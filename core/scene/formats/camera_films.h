@@ -1,6 +1,5 @@
-// Films of several cameras that saw one scene. Frames become views where films are decoded
-// (core/stage/film); here is which films there are, and what the files beside them say of the
-// cameras.
+// Films of several cameras of one scene: finds the films, and reads the cameras from the files
+// beside them. Frames become views in core/stage/film_import.
 #pragma once
 
 #include <filesystem>
@@ -22,21 +21,21 @@ struct CameraFilm {
   bool is_pictures = false;    // likewise
 };
 
-// Width and height in px of a film, as people see it.
+// Returns width and height of a film as displayed, px.
 using FilmSize = std::function<std::pair<int, int>(const std::string& file)>;
 
-// Sorted by camera; empty where the scene has no two films:
-// - a transforms.json whose frames name films, one each, with a pose, or none of them with one, and
-//   no time, but perhaps with a `time_offset` in seconds, where the cameras' clocks differ or one
-//   began later;
-// - a poses_bounds.npy (LLFF, as DyNeRF and Neural 3D Video have it) with as many films beside it
-// as
-//   it has rows, in the order of their names;
+// Returns the films sorted by camera; empty if the scene has fewer than two. In order of
+// preference:
+// - a transforms.json whose frames name one film each. Either all have a pose or none has. No frame
+//   has a time; each may have a `time_offset` in seconds, if clocks differ or a camera started
+//   later.
+// - a poses_bounds.npy (LLFF, as in DyNeRF and Neural 3D Video) with one row for each film beside
+//   it, in the order of their names.
 // - films without such a file and without photos, or folders of pictures in frames/: no poses.
-// Throws Error{kInvalidArgument}: films and photos in one file, some films with a pose and some
-// without, a film that is missing or named twice, two cameras of one name, numbers of films and
-// poses that differ, cameras that do not fit the film's shape, a file that names one film, pictures
-// beside folders of pictures, two films that are copies of each other.
+// Throws Error{kInvalidArgument} for films and photos in one file, films of which only some have a
+// pose, a film that is missing or named twice, two cameras of one name, different numbers of films
+// and poses, a camera of another aspect ratio than its film, a file that names one film only,
+// pictures beside folders of pictures, and two films that are copies of each other.
 std::vector<CameraFilm> ReadCameraFilms(const std::filesystem::path& scene_folder,
                                         const FilmSize& size_of);
 

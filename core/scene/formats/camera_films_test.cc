@@ -56,7 +56,7 @@ class CameraFilms : public testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(CameraFilms, ATransformsJsonNamesThem) {
+TEST_F(CameraFilms, ReadsTransformsJson) {
   EXPECT_TRUE(Read().empty());
   EXPECT_TRUE(Read(Frame("a.png")).empty());
   Touch("films/b.mp4");
@@ -78,7 +78,7 @@ TEST_F(CameraFilms, ATransformsJsonNamesThem) {
       -1.5);
 }
 
-TEST_F(CameraFilms, WrongTransformsAreRefusedByName) {
+TEST_F(CameraFilms, NamesFaultsOfTransformsJson) {
   Touch("a.mp4");
   Touch("b.mp4");
   EXPECT_THAT(Said(Frame("a.mp4") + "," + Frame("c.mp4")), HasSubstr("there is no film c.mp4"));
@@ -99,7 +99,7 @@ TEST_F(CameraFilms, WrongTransformsAreRefusedByName) {
   EXPECT_THAT(Said(Frame("a.mp4", "\"h\":96,") + "," + Frame("b.mp4")), HasSubstr("96 x 96 px"));
 }
 
-TEST_F(CameraFilms, RowsOfPosesBoundsAreTheFilmsByName) {
+TEST_F(CameraFilms, PosesBoundsRowsFollowFilmNames) {
   const std::string poses = NpyOf({3, 17}, PosesOfThree());
   WriteFileAtomic(folder_.path() / "poses_bounds.npy", poses);
   EXPECT_TRUE(Read().empty());  // LLFF's photos: not read
@@ -115,7 +115,7 @@ TEST_F(CameraFilms, RowsOfPosesBoundsAreTheFilmsByName) {
   EXPECT_NEAR(view.camera.cy, 16.0, 1e-9);
 }
 
-TEST_F(CameraFilms, WrongPosesBoundsAreRefused) {
+TEST_F(CameraFilms, RefusesWrongPosesBounds) {
   for (const char* name : {"cam00.mp4", "cam01.mp4", "cam02.mp4"}) Touch(name);
   std::vector<double> rows = PosesOfThree();
   const std::string good = NpyOf({3, 17}, rows);
@@ -138,7 +138,7 @@ TEST_F(CameraFilms, WrongPosesBoundsAreRefused) {
               HasSubstr("row 2: 96 x 64 px with a focal length"));
 }
 
-TEST(Npy, OrdersAndTypes) {
+TEST(Npy, ReadsOrdersAndTypes) {
   std::string bytes = NpyOf({2, 3}, {1, 2, 3, 4, 5, 6});
   EXPECT_EQ(ReadNpy(bytes, "x.npy", 6).values, (std::vector<double>{1, 2, 3, 4, 5, 6}));
   EXPECT_EQ(ReadNpy(bytes, "x.npy", 6).shape, (std::vector<size_t>{2, 3}));
@@ -158,7 +158,7 @@ TEST(Npy, OrdersAndTypes) {
   }
 }
 
-TEST_F(CameraFilms, WithoutPosesTheyAreAllLookedFor) {
+TEST_F(CameraFilms, FindsFilmsWithoutPoses) {
   Touch("b.mp4");
   EXPECT_TRUE(Read().empty()) << "one film is a film";
   Touch("a.mp4");
@@ -194,7 +194,7 @@ TEST_F(CameraFilms, FoldersOfPicturesAreCameras) {
   EXPECT_THAT(Refusal([&] { Read(); }), HasSubstr("frames/2.png lies beside the folder frames/"));
 }
 
-TEST_F(CameraFilms, CopiesOfAFilmAreNamed) {
+TEST_F(CameraFilms, NamesCopiesOfFilms) {
   Touch("a.mp4");
   Touch("b.mp4");
   fs::copy_file(folder_.path() / "a.mp4", folder_.path() / "c (1).mp4");
@@ -206,7 +206,7 @@ TEST_F(CameraFilms, CopiesOfAFilmAreNamed) {
   EXPECT_EQ(Read().size(), 2u);
 }
 
-TEST_F(CameraFilms, CopiesOfAFoldersFramesAreNamed) {
+TEST_F(CameraFilms, NamesCopiesOfFolders) {
   for (const char* frame : {"1.png", "2.png"}) {
     Touch(std::string("frames/left/") + frame);
     fs::create_directories(folder_.path() / "frames/right");

@@ -13,7 +13,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "COLMAP's files are little-endian");
 
-// Reads numbers one after the other; every read is checked against the end of the file.
+// Reads consecutive numbers; every read is checked against the end of the file.
 class Cursor {
  public:
   explicit Cursor(const fs::path& path) : name_(path.filename().string()), bytes_(ReadFile(path)) {}
@@ -40,7 +40,7 @@ class Cursor {
     at_ = end + 1;
     return text;
   }
-  // A count of records of at least `record_bytes`, which must fit into what is left.
+  // Reads a number of records of at least `record_bytes`, which must fit into the rest of the file.
   uint64_t ReadCount(size_t record_bytes, const std::string& what) {
     const uint64_t count = Read<uint64_t>();
     if (count > Left() / record_bytes) {

@@ -91,8 +91,8 @@ ColmapCamera MakeColmapCamera(const std::string& model,
     throw InvalidArgument(
         "{} has a focal length of {} px; it must be positive", place, std::min(c.fx, c.fy));
   }
-  // What is left is in OpenCV's order: RADIAL has k1 k2, OPENCV k1 k2 p1 p2, FULL_OPENCV goes on
-  // with k3..k6, the fisheyes have k1..k4.
+  // The remaining parameters are in OpenCV's order: RADIAL has k1 k2, OPENCV k1 k2 p1 p2,
+  // FULL_OPENCV also k3..k6, the fisheye models have k1..k4.
   const size_t first = next;
   for (; next < parameters.size(); ++next) out.distortion.k[next - first] = parameters[next];
   if (IsFisheye(model)) {

@@ -1,4 +1,4 @@
-// COLMAP's sparse model as its files hold it, before it becomes a Scene. For this folder only.
+// COLMAP's sparse model as stored in its files, before it becomes a Scene. For this folder only.
 #pragma once
 
 #include <Eigen/Core>
@@ -44,14 +44,14 @@ struct ColmapModel {
   std::vector<ColmapPoint> points;
 };
 
-// True when the folder has a cameras.bin or cameras.txt.
+// Returns true if the folder has a cameras.bin or cameras.txt.
 bool IsColmapFolder(const std::filesystem::path& folder);
 
-// Binary where all three files are, else text. Throws Error{kInvalidArgument} naming file and
-// place for anything that is cut short, inconsistent or not finite.
+// Reads the binary files if all three exist, else the text files. Throws Error{kInvalidArgument}
+// naming file and place if one is truncated or inconsistent, or has a number that is not finite.
 ColmapModel LoadColmapModel(const std::filesystem::path& folder);
 
-// Shared by the two readers. `model` is COLMAP's name ("SIMPLE_RADIAL"); `place` opens the message.
+// Shared by both readers. `model`: COLMAP's name ("SIMPLE_RADIAL"). `place`: start of messages.
 int ColmapParameterCount(const std::string& model, const std::string& place);
 std::string ColmapModelName(int model_id, const std::string& place);
 ColmapCamera MakeColmapCamera(const std::string& model,
@@ -59,23 +59,23 @@ ColmapCamera MakeColmapCamera(const std::string& model,
                               uint64_t height,
                               const std::vector<double>& parameters,
                               const std::string& place);
-// Normalises the quaternion; refuses zero and non-finite ones.
+// Normalises the quaternion. Throws if it is zero or not finite.
 Pose MakeColmapPose(const double (&qvec_wxyz)[4],
                     const double (&tvec)[3],
                     const std::string& place);
-// Refuses control characters, which would break lines of messages and logs.
+// Throws if the name has control characters, which would break lines of messages and logs.
 void CheckColmapName(const std::string& name, const std::string& place);
 void CheckColmapPoint(const ColmapPoint& point, const std::string& place);
-// -1, unknown, for a reprojection error that is not finite.
+// Returns -1 (unknown) for a reprojection error that is not finite.
 double KnownError(double error_px);
 
 ColmapModel LoadColmapBinary(const std::filesystem::path& folder);
 ColmapModel LoadColmapText(const std::filesystem::path& folder);
 
-// What COLMAP does not keep: when its photos were taken. A text file as COLMAP's are, with a line
-// "SECONDS NAME" for each photo; the name, as the model has it, may hold blanks. By name. Throws
-// Error{kInvalidArgument} naming file and line: no finite number, no name, a name that is there
-// twice or holds control characters.
+// Reads the times of photos, which COLMAP's model does not store, by name: a text file in COLMAP's
+// style with a line "SECONDS NAME" for each photo. Names are those of the model and may contain
+// blanks. Throws Error{kInvalidArgument} naming file and line for a number that is not finite, and
+// for a name that is missing, repeated or has control characters.
 std::map<std::string, FrameTime> LoadColmapTimes(const std::filesystem::path& file);
 
 }  // namespace color3d

@@ -106,7 +106,7 @@ void ExpectSameScene(const Scene& got, const Scene& expected) {
   }
 }
 
-TEST(Colmap, BinaryModelIsRead) {
+TEST(Colmap, ReadsBinaryModel) {
   const ScratchFolder folder;
   const Scene scene = ArcScene(4, {Distortion::Model::kBrown, {-0.1, 0.01, 1e-3, 2e-3}});
   WritePhotos(scene, folder.path());
@@ -129,7 +129,7 @@ TEST(Colmap, TextRoundTrips) {
   }
 }
 
-TEST(Colmap, WorldOffsetIsPutBackOnExport) {
+TEST(Colmap, ExportAddsWorldOffset) {
   const ScratchFolder folder;
   Scene scene = ArcScene(3);
   WritePhotos(scene, folder.path());
@@ -141,7 +141,7 @@ TEST(Colmap, WorldOffsetIsPutBackOnExport) {
   EXPECT_LT((far.views[1].cam_from_world.Apply(far.points[0].position) - p).norm(), 1e-6);
 }
 
-TEST(Colmap, TextWithCommentsBlanksAndWindowsLineEnds) {
+TEST(Colmap, ReadsTextWithCommentsBlanksAndCrLf) {
   const ScratchFolder folder;
   Scene scene = ArcScene(2);
   scene.views[0].name = "a b.png";
@@ -185,7 +185,7 @@ class ColmapTimes : public testing::Test {
   std::vector<std::string> warnings_, cameras_;
 };
 
-TEST_F(ColmapTimes, ViewsHaveTheMomentsOfTheirLines) {
+TEST_F(ColmapTimes, ViewsGetMomentsOfTheirLines) {
   const Scene scene =
       Read("# SECONDS NAME\r\n\r\n2.5 l/a b.png \r\n  +2e0\t0001.png\n3 unplaced.png\n4 0002.png");
   EXPECT_EQ(scene.views[0].moment, (Moment{0.0, 0}));
@@ -195,7 +195,7 @@ TEST_F(ColmapTimes, ViewsHaveTheMomentsOfTheirLines) {
   EXPECT_TRUE(warnings_.empty());
 }
 
-TEST_F(ColmapTimes, FoldersAreCamerasWherePhotosShareATime) {
+TEST_F(ColmapTimes, FoldersAreCamerasIfPhotosShareTime) {
   const Scene scene = Read("1 0001.png\n2 0002.png\n1 l/a b.png\n");
   EXPECT_EQ(cameras_, (std::vector<std::string>{"", "l"}));
   EXPECT_EQ(scene.views[2].moment, (Moment{0.0, 1}));
@@ -205,7 +205,7 @@ TEST_F(ColmapTimes, FoldersAreCamerasWherePhotosShareATime) {
                 "camera and one time (1); remove one of them, or give each camera a folder"));
 }
 
-TEST_F(ColmapTimes, EveryPhotoHasOneOrNone) {
+TEST_F(ColmapTimes, RefusesTimesForSomePhotosOnly) {
   EXPECT_THAT(
       Said("1 0001.png\n2 0003.png\n"),
       HasSubstr("times.txt has no time for 2 of the COLMAP model's 3 photos (0002.png, l/a "
@@ -218,7 +218,7 @@ TEST_F(ColmapTimes, EveryPhotoHasOneOrNone) {
   }
 }
 
-TEST_F(ColmapTimes, BadLinesAreRefusedByNumber) {
+TEST_F(ColmapTimes, NamesNumberOfBadLine) {
   EXPECT_EQ(Said("#\n\n0001.png 1\n"),
             "times.txt: line 3: \"0001.png\" is not a number of seconds; a line is SECONDS NAME");
   EXPECT_THAT(Said("0,5 0001.png\n"), HasSubstr("line 1: \"0,5\" is not a number of seconds"));
@@ -231,7 +231,7 @@ TEST_F(ColmapTimes, BadLinesAreRefusedByNumber) {
   EXPECT_THAT(Said("1 a\x01.png\n"), HasSubstr("times.txt: line 1: the name of an image holds"));
 }
 
-TEST(Colmap, EveryCameraModel) {
+TEST(Colmap, ReadsEveryCameraModel) {
   struct Case {
     const char* model;
     std::vector<double> parameters;
@@ -279,7 +279,7 @@ TEST(Colmap, EveryCameraModel) {
               HasSubstr("0 x 32 px"));
 }
 
-TEST(Colmap, TruncatedBinaryFilesAreRefusedAtEveryLength) {
+TEST(Colmap, RefusesBinaryFilesTruncatedAnywhere) {
   const Scene scene = ArcScene(2);
   BinaryModel good = MakeBinary(scene);
   const ScratchFolder folder;
@@ -299,7 +299,7 @@ TEST(Colmap, TruncatedBinaryFilesAreRefusedAtEveryLength) {
   refused(&BinaryModel::points);
 }
 
-TEST(Colmap, HugeCountsAreRefusedWithoutAllocating) {
+TEST(Colmap, RefusesHugeCountsWithoutAllocating) {
   BinaryModel model = MakeBinary(ArcScene(2));
   const ScratchFolder folder;
   const uint64_t huge = uint64_t{1} << 61;
@@ -332,7 +332,7 @@ TEST(Colmap, RandomDamageNeverCrashes) {
   }
 }
 
-TEST(Colmap, NonFiniteNumbersAreNamed) {
+TEST(Colmap, NamesNonFiniteNumbers) {
   const ScratchFolder folder;
   Scene scene = ArcScene(2);
   const double nan = std::nan("");
@@ -355,7 +355,7 @@ TEST(Colmap, NonFiniteNumbersAreNamed) {
               HasSubstr("\"1e999\" is not a number"));
 }
 
-TEST(Colmap, InconsistentModelsAreRefused) {
+TEST(Colmap, RefusesInconsistentModels) {
   const ScratchFolder folder;
   const Scene scene = ArcScene(2);
   WriteColmapText(scene, folder.path());
@@ -383,7 +383,7 @@ TEST(Colmap, InconsistentModelsAreRefused) {
               HasSubstr("has no points3D.txt"));
 }
 
-TEST(Colmap, CamerasOfReducedPhotosAreScaledAndOtherShapesRefused) {
+TEST(Colmap, ScalesCamerasAndRefusesOtherShapes) {
   const ScratchFolder folder;
   Scene scene = ArcScene(2);
   for (View& view : scene.views) view.captured_camera = {97, 64, 100.0, 102.0, 49.0, 30.0};
@@ -401,7 +401,7 @@ TEST(Colmap, CamerasOfReducedPhotosAreScaledAndOtherShapesRefused) {
 }
 
 // Turning the pixels of a photo with its EXIF orientation and turning its camera must agree.
-TEST(Colmap, CamerasTurnWithExifOrientation) {
+TEST(Colmap, RotatesCamerasByExifOrientation) {
   for (int orientation : {1, 3, 6, 8}) {
     Photo photo{"a.jpg", "images/a.jpg", 48, 32, orientation};
     photo.width = orientation >= 5 ? 32 : 48;

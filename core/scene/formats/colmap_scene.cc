@@ -22,14 +22,14 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// A model's views before their photos are looked at; image numbers by view.
+// Views of a model before their photos are looked up; image numbers by view.
 struct NamedViews {
   std::vector<uint32_t> images;
   std::vector<std::string> files;    // relative to the scene's folder, one for each image
-  std::vector<std::string> missing;  // names of photos that are not there
+  std::vector<std::string> missing;  // names of missing photos
 };
 
-// The views' moments, where a file tells times.
+// Sets the views' moments if there is a file of times.
 FrameMoments ReadMoments(const fs::path& scene_folder,
                          const NamedFiles& photos,
                          const std::vector<View>& views) {
@@ -69,7 +69,7 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
     none.note = fmt::format(
         "{} names no photo as the COLMAP model does ({}): the scene is taken to stand still",
         kTimesFile,
-        SomeOf(without, 3));
+        SummarizeNames(without, 3));
     return none;
   }
   if (!without.empty()) {
@@ -79,13 +79,14 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
         kTimesFile,
         without.size(),
         views.size(),
-        SomeOf(without, 3),
+        SummarizeNames(without, 3),
         frames[0].file);
   }
   return MomentsOf(frames);
 }
 
-// In the order of their photos' names, so that it does not depend on the numbers that COLMAP gave.
+// Orders views by the names of their photos, so that the result does not depend on COLMAP's
+// numbers.
 NamedViews NamesOf(const ColmapModel& model, const NamedFiles& photos) {
   std::vector<std::pair<std::string, uint32_t>> order;
   for (const auto& [id, image] : model.images) order.emplace_back(image.name, id);
@@ -126,7 +127,7 @@ NamedViews NamesOf(const ColmapModel& model, const NamedFiles& photos) {
   return named;
 }
 
-// What is left out, or an error where too little is left.
+// Warns of photos that are left out; throws if too few remain.
 void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>* warnings) {
   constexpr size_t kFewest = 2;
   if (named.images.size() < std::min(kFewest, total)) {
@@ -135,7 +136,7 @@ void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>
         "the photos that the poses were computed from",
         total,
         named.images.size(),
-        SomeOf(named.missing));
+        SummarizeNames(named.missing));
   }
   if (named.missing.empty() || warnings == nullptr) return;
   warnings->push_back(
@@ -143,10 +144,10 @@ void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>
                   "were left out: {}",
                   named.missing.size(),
                   total,
-                  SomeOf(named.missing)));
+                  SummarizeNames(named.missing)));
 }
 
-// Of points that no photo is said to see, those into whose picture they fall count.
+// Points without tracks get the views whose picture they fall into.
 std::vector<SparsePoint> PointsOf(const ColmapModel& model,
                                   const std::map<uint32_t, int>& view_of_image,
                                   const Scene& scene) {
@@ -168,7 +169,7 @@ std::vector<SparsePoint> PointsOf(const ColmapModel& model,
     point.views.assign(views.begin(), views.end());
     if (from.image_ids.empty()) {
       point.reprojection_error_px = -1.0;
-      point.views = ViewsThatFace(scene, point.position, 0.0);
+      point.views = ViewsFacing(scene, point.position, 0.0);
     }
     points.push_back(std::move(point));
   }
@@ -261,7 +262,7 @@ std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
         "there are {} COLMAP models; the one in {} is used, since it has most photos ({})",
         counts.size(),
         Shown(choice->folder),
-        SomeOf(counts, 8)));
+        SummarizeNames(counts, 8)));
   }
   return choice;
 }

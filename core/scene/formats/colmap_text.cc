@@ -18,14 +18,14 @@ namespace {
 
 constexpr std::string_view kBlanks = " \t\r";
 
-// The lines of a file, and the words of the current line.
+// Lines of a file, and words of the current line.
 class Lines {
  public:
   explicit Lines(const fs::path& path) : name_(path.filename().string()), text_(ReadFile(path)) {
     at_ = text_.size() - WithoutMark(text_, name_).size();
   }
 
-  // False at the end of the file.
+  // Returns false at the end of the file.
   bool NextLine() {
     if (at_ >= text_.size()) return false;
     size_t end = text_.find('\n', at_);
@@ -55,8 +55,8 @@ class Lines {
     SkipBlanks();
     return word;
   }
-  // Independent of the locale. Accepts "nan" and "inf", which the caller's checks refuse by name.
-  // `wanted` says in the error what the word is not.
+  // Independent of the locale. Accepts "nan" and "inf", which callers refuse by name. `wanted`: the
+  // expected kind of value, for errors.
   template <typename T>
   T Number(const char* wanted = "a number that fits here") {
     std::string_view word = Word();
@@ -69,7 +69,7 @@ class Lines {
     }
     return value;
   }
-  // As Number, for whole numbers: 154.0 is one, as tables of floating point numbers are saved.
+  // As Number, for integers. Accepts 154.0, as in tables saved as floating point numbers.
   template <typename T>
   T Whole() {
     const std::string_view word = Peek();
@@ -85,7 +85,7 @@ class Lines {
     }
     return static_cast<T>(value);
   }
-  // The next word, which stays; empty at the end of the line.
+  // Returns the next word without consuming it; empty at the end of the line.
   std::string_view Peek() const {
     return line_.substr(0, std::min(line_.find_first_of(kBlanks), line_.size()));
   }
@@ -96,7 +96,7 @@ class Lines {
     --number_;
     line_ = {};
   }
-  // The rest of the line: file names may hold blanks.
+  // Returns the rest of the line, since file names may contain blanks.
   std::string Rest() {
     std::string rest(line_);
     rest.erase(rest.find_last_not_of(kBlanks) + 1);
@@ -124,8 +124,8 @@ bool IsNumber(std::string_view word) {
   return error != std::errc::invalid_argument && end == word.data() + word.size();
 }
 
-// Whether a line is one of a photo (number, pose, camera, name), and not of observations (three
-// numbers each): some programs write no second line for a photo without observations.
+// Returns true for the line of a photo (number, pose, camera, name), false for one of observations
+// (three numbers each): some programs write no second line for photos without observations.
 bool IsLineOfPhoto(std::string_view line) {
   constexpr size_t kWordsBeforeName = 9;
   size_t count = 0;
@@ -142,7 +142,7 @@ bool IsLineOfPhoto(std::string_view line) {
   return count == kWordsBeforeName + 1;  // a name like 0001
 }
 
-// COLMAP's number of no point, which some programs write without its sign.
+// COLMAP's number for no point; some programs write it as unsigned.
 constexpr uint64_t kNoPoint = std::numeric_limits<uint64_t>::max();
 
 int64_t PointId(Lines& lines) {
@@ -184,7 +184,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
     CheckColmapName(image.name, lines.Place());
     const std::string place = lines.Place() + ": image " + image.name;
     image.cam_from_world = MakeColmapPose(qvec, tvec, place);
-    // The second line of an image may be empty, or missing.
+    // The second line of an image may be empty or missing.
     bool more = lines.NextLine();
     while (more && lines.Line().starts_with('#')) more = lines.NextLine();
     if (more) {
@@ -212,7 +212,7 @@ std::vector<ColmapPoint> ReadPoints(const fs::path& path) {
     ColmapPoint point;
     point.id = id;
     for (int i = 0; i < 3; ++i) point.position[i] = lines.Number<double>();
-    // The colour is not used; neither it nor the error need be there.
+    // The colour is ignored; it and the error may be missing.
     for (int i = 0; i < 3 && !lines.AtEndOfLine(); ++i) lines.Word();
     if (!lines.AtEndOfLine()) point.error_px = KnownError(lines.Number<double>());
     CheckColmapPoint(point, fmt::format("{}: point {}", lines.Place(), id));

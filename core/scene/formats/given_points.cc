@@ -46,7 +46,7 @@ NamedFiles PlyFiles(const fs::path& scene_folder) {
   return NamedFiles(std::move(files));
 }
 
-// The file of points, relative to the scene's folder; empty: none.
+// Returns the file of points, relative to the scene's folder; empty if there is none.
 std::string FileOfPoints(const json& transforms,
                          const std::string& file_name,
                          const fs::path& scene_folder,
@@ -69,7 +69,7 @@ std::string FileOfPoints(const json& transforms,
   return "";
 }
 
-// applied_transform, 3 x 4 or 4 x 4; nothing where it is not there, or is no transform.
+// Returns applied_transform, 3 x 4 or 4 x 4; nullopt if it is missing or no transform.
 std::optional<Eigen::Affine3d> AppliedTransform(const json& transforms) {
   const auto rows = transforms.find("applied_transform");
   if (rows == transforms.end() || !rows->is_array() || rows->size() < 3) return std::nullopt;
@@ -87,23 +87,23 @@ std::optional<Eigen::Affine3d> AppliedTransform(const json& transforms) {
   return applied;
 }
 
-// How many of some points at least two views see, 0..1.
+// Returns the fraction of points that at least two views see, 0..1.
 double ShareSeen(const Scene& scene, const Positions& points, const Eigen::Affine3d& transform) {
   size_t seen = 0;
   for (const Eigen::Vector3d& point : points) {
-    seen += ViewsThatFace(scene, transform * point, 0.0).size() >= kFewestViews;
+    seen += ViewsFacing(scene, transform * point, 0.0).size() >= kFewestViews;
   }
   return static_cast<double>(seen) / static_cast<double>(std::max<size_t>(1, points.size()));
 }
 
-// From the file's frame to that of the poses.
+// Returns the transform from the file's frame to that of the poses.
 Eigen::Affine3d FrameOf(const json& transforms, const Scene& scene, const Positions& points) {
   const Eigen::Affine3d as_it_is = Eigen::Affine3d::Identity();
   const std::optional<Eigen::Affine3d> applied = AppliedTransform(transforms);
   if (!applied) return as_it_is;
   const Positions tried = EvenlyOf(points, kTriedPoints);
   Eigen::Affine3d best = as_it_is;
-  // As the poses are, unless that explains far less.
+  // Keeps the points in the frame of the poses unless far fewer are visible there.
   double most = 2.0 * ShareSeen(scene, tried, as_it_is);
   for (const Eigen::Affine3d& other : {*applied, applied->inverse()}) {
     const double share = ShareSeen(scene, tried, other);
@@ -143,7 +143,7 @@ std::vector<SparsePoint> ReadGivenPoints(const json& transforms,
     point.position = transform * position;
     if (!point.position.allFinite()) continue;
     point.reprojection_error_px = -1.0;
-    point.views = ViewsThatFace(scene, point.position, 0.0);
+    point.views = ViewsFacing(scene, point.position, 0.0);
     if (point.views.size() >= kFewestViews) points.push_back(std::move(point));
   }
   Warn(warnings,

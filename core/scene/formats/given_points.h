@@ -1,4 +1,4 @@
-// Sparse points that come with poses, but without what sees them. For core/scene only.
+// Sparse points that come with poses but without tracks. For core/scene only.
 #pragma once
 
 #include <filesystem>
@@ -10,12 +10,12 @@
 
 namespace color3d {
 
-// The points of the PLY that `ply_file_path` of a transforms.json names among the scene's files,
-// else of a sparse_pc.ply or points3d.ply in its folder; empty where there is none. `scene` has its
-// views; a point lists those into whose picture it falls, and a point that fewer than two see is
-// left out. Points are in the frame of the poses; where far more of them are seen with
-// `applied_transform` applied, or taken back, so it is done. `warnings` (may be null) receives
-// which file is used, or why not.
+// Reads the PLY that `ply_file_path` of a transforms.json names among the scene's files, else
+// sparse_pc.ply or points3d.ply in its folder. Returns no points if there is none. Requires:
+// `scene` has its views. A point lists the views whose picture it falls into; points in fewer than
+// two views are left out. Points are in the frame of the poses; if far more of them are visible
+// with `applied_transform`, or with its inverse, it is applied. `warnings` (may be null) receives
+// the file used, or why none is.
 std::vector<SparsePoint> ReadGivenPoints(const nlohmann::json& transforms,
                                          const std::string& file_name,
                                          const std::filesystem::path& scene_folder,

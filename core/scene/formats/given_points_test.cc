@@ -53,14 +53,14 @@ std::string BinaryPly(const std::vector<Eigen::Vector3d>& points, bool big_endia
   return bytes;
 }
 
-TEST(PointPly, EveryFormatIsRead) {
+TEST(PointPly, ReadsEveryFormat) {
   const std::vector<Eigen::Vector3d> points = {{1, 2, 3}, {-0.5, 0.25, 1e6}};
   EXPECT_EQ(ReadPointPly(AsciiPly(points), "a.ply", 100), points);
   EXPECT_EQ(ReadPointPly(BinaryPly(points, false), "a.ply", 100), points);
   EXPECT_EQ(ReadPointPly(BinaryPly(points, true), "a.ply", 100), points);
 }
 
-TEST(PointPly, PointsThatAreNotFiniteAreLeftOutAndMostAreThinned) {
+TEST(PointPly, DropsNonFinitePointsAndThinsMany) {
   std::vector<Eigen::Vector3d> points(10, Eigen::Vector3d(1, 2, 3));
   points[3].y() = std::nan("");
   EXPECT_EQ(ReadPointPly(AsciiPly(points), "a.ply", 100).size(), 9u);
@@ -68,7 +68,7 @@ TEST(PointPly, PointsThatAreNotFiniteAreLeftOutAndMostAreThinned) {
   EXPECT_EQ(ReadPointPly(AsciiPly(points), "a.ply", 4).size(), 3u);  // 0, (3), 6, 9
 }
 
-TEST(PointPly, DamagedFilesAreNamed) {
+TEST(PointPly, NamesDamagedFiles) {
   const std::string good = BinaryPly({{1, 2, 3}, {4, 5, 6}}, false);
   for (size_t length = 0; length < good.size(); ++length) {
     EXPECT_THAT(Refusal([&] { ReadPointPly(good.substr(0, length), "a.ply", 9); }),
@@ -112,7 +112,7 @@ class GivenPoints : public testing::Test {
   QuietRun run_;
 };
 
-TEST_F(GivenPoints, OfTransformsAreTheStartOfGeometry) {
+TEST_F(GivenPoints, ReadsPointsOfTransforms) {
   Say("ply_file_path", "cloud/sparse.ply");
   fs::create_directories(folder_.path() / "cloud");
   WriteFileAtomic(folder_.path() / "cloud/sparse.ply", AsciiPly(points_));
@@ -121,13 +121,13 @@ TEST_F(GivenPoints, OfTransformsAreTheStartOfGeometry) {
   EXPECT_THAT(result.warnings, Contains("geometry starts from 50 points of cloud/sparse.ply"));
 }
 
-TEST_F(GivenPoints, OfBlenderLieBesideIt) {
+TEST_F(GivenPoints, FindsPointsBesideBlenderFiles) {
   WriteFileAtomic(folder_.path() / "points3d.ply", BinaryPly(points_, false));
   ExpectTheSamePoints(Run());
 }
 
 // Poses are in the frame that applied_transform leads to; points of some programs are not.
-TEST_F(GivenPoints, AreBroughtIntoTheFrameOfThePoses) {
+TEST_F(GivenPoints, MovesPointsIntoFrameOfPoses) {
   Say("ply_file_path", "sparse_pc.ply");
   Say("applied_transform", {{1, 0, 0, 30}, {0, 0, 1, 0}, {0, -1, 0, 0}});
   const auto apply = [](const Eigen::Vector3d& p) {
@@ -149,7 +149,7 @@ TEST_F(GivenPoints, AreBroughtIntoTheFrameOfThePoses) {
   ExpectTheSamePoints(Run());
 }
 
-TEST_F(GivenPoints, ThatCannotBeUsedAreNamedAndRefuseNothing) {
+TEST_F(GivenPoints, WarnsOfUnusablePoints) {
   Say("ply_file_path", "../outside.ply");
   WriteFileAtomic(folder_.path().parent_path() / "outside.ply", AsciiPly(points_));
   EXPECT_THAT(Run().warnings,
@@ -165,7 +165,7 @@ TEST_F(GivenPoints, ThatCannotBeUsedAreNamedAndRefuseNothing) {
   EXPECT_THAT(Run().warnings, Contains(HasSubstr("none of the 2 points in a.ply")));
 }
 
-TEST_F(GivenPoints, OfColmapNeedNoTracks) {
+TEST_F(GivenPoints, AcceptsColmapPointsWithoutTracks) {
   WriteColmapText(scene_, folder_.path() / "sparse/0");
   std::string text;
   for (size_t i = 0; i < points_.size(); ++i) {
@@ -177,7 +177,7 @@ TEST_F(GivenPoints, OfColmapNeedNoTracks) {
 }
 
 // Of the photos that saw a point one is left: where all points are like that, they are kept.
-TEST_F(GivenPoints, OfPhotosThatWereThrownAwayAreKept) {
+TEST_F(GivenPoints, KeepsPointsOfDeletedPhotos) {
   Scene scene = scene_;
   for (SparsePoint& point : scene.points) point.views = {0, 1};
   WriteColmapText(scene, folder_.path() / "sparse/0");

@@ -37,7 +37,7 @@ json ParseObject(const fs::path& folder, const std::string& file) {
   return root;
 }
 
-// The numbers of a list, lists in it one after the other.
+// Flattens nested lists of numbers.
 std::vector<double> NumbersOf(const FrameFields& fields, const char* key, size_t count) {
   const json* list = fields.Find(key);
   std::vector<double> numbers;
@@ -69,7 +69,7 @@ double Positive(const FrameFields& fields, const char* key, double absent) {
   return value;
 }
 
-// OpenCV's axes; orientation: from the world to the camera.
+// OpenCV's axes; orientation: from world to camera.
 void ReadCamera(const json& root, const std::string& file, View* view) {
   const FrameFields fields(root, root, file);
   const std::vector<double> r = NumbersOf(fields, "orientation", 9);
@@ -114,7 +114,7 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
   }
 }
 
-// The frame's picture, relative to the scene's folder; empty when there is none.
+// Returns the picture of the frame, relative to the scene's folder; empty if there is none.
 std::string PictureOf(const NamedFiles& photos, const std::string& name) {
   for (const char* scale : {"2x", "1x", "4x", "8x"}) {
     const std::string file = photos.Find(fmt::format("rgb/{}/{}", scale, name));
@@ -135,7 +135,7 @@ FrameTime TimeOf(const json& entry, const std::string& name, const std::string& 
   return time;
 }
 
-// What hides what is not known: a point lists the views whose picture it falls into.
+// Occlusion is unknown: a point lists the views whose picture it falls into.
 std::vector<SparsePoint> ReadPoints(const fs::path& scene_folder, const Scene& scene) {
   std::error_code error;
   if (!fs::is_regular_file(scene_folder / kPoints, error)) return {};
@@ -147,7 +147,7 @@ std::vector<SparsePoint> ReadPoints(const fs::path& scene_folder, const Scene& s
   for (size_t i = 0; i < points.size(); ++i) {
     points[i].position = Eigen::Map<const Eigen::Vector3d>(&array.values[3 * i]);
     points[i].reprojection_error_px = -1.0;
-    points[i].views = ViewsThatFace(scene, points[i].position, 0.0);
+    points[i].views = ViewsFacing(scene, points[i].position, 0.0);
   }
   return points;
 }
@@ -168,7 +168,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
   Scene scene;
   std::vector<FrameTime> times;
   std::vector<std::string> missing;
-  for (const auto& [name, entry] : frames.items()) {  // in the order of their names
+  for (const auto& [name, entry] : frames.items()) {  // in order of names
     if (!IsSafeRelativePath(name)) {
       throw InvalidArgument("{}: '{}' is no name of a frame", kMetadata, name);
     }
@@ -204,7 +204,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
                     missing.size(),
                     frames.size(),
                     kMetadata,
-                    SomeOf(missing)));
+                    SummarizeNames(missing)));
   }
   if (cameras != nullptr) *cameras = std::move(moments.cameras);
   std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {

@@ -77,7 +77,7 @@ class Nerfies : public testing::Test {
   std::vector<View> views_;
 };
 
-TEST_F(Nerfies, CamerasTimesAndPoints) {
+TEST_F(Nerfies, ReadsCamerasTimesAndPoints) {
   EXPECT_FALSE(IsNerfiesFolder(folder_.path()));
   WriteScene(6);
   ASSERT_TRUE(IsNerfiesFolder(folder_.path()));
@@ -109,7 +109,7 @@ TEST_F(Nerfies, CamerasTimesAndPoints) {
   }
 }
 
-TEST_F(Nerfies, IsImportedAndPointsMayBeMissing) {
+TEST_F(Nerfies, ImportsWithoutPoints) {
   WriteScene(9);
   fs::remove(folder_.path() / "points.npy");
   QuietRun run;
@@ -122,7 +122,7 @@ TEST_F(Nerfies, IsImportedAndPointsMayBeMissing) {
   EXPECT_EQ(result.scene.HeldOutViews(), (std::vector<int>{8, 9}));  // the fifth moment
 }
 
-TEST_F(Nerfies, FramesWithoutPictureAreLeftOut) {
+TEST_F(Nerfies, LeavesOutFramesWithoutPicture) {
   WriteScene(3);
   fs::remove(folder_.path() / "rgb/2x/000002.png");
   std::vector<std::string> warnings;
@@ -133,7 +133,7 @@ TEST_F(Nerfies, FramesWithoutPictureAreLeftOut) {
   EXPECT_THAT(Said(), HasSubstr("names 6 frames, of which 0 have a picture"));
 }
 
-TEST_F(Nerfies, BrokenFilesAreRefusedByName) {
+TEST_F(Nerfies, NamesBrokenFiles) {
   WriteScene(2);
   WriteCamera("000001", views_[1], ",\"skew\":0.5");
   EXPECT_EQ(Said(), "camera/000001.json: skew is not supported");

@@ -16,7 +16,7 @@ static_assert(std::endian::native == std::endian::little);
 constexpr std::string_view kMagic = "\x93NUMPY";
 constexpr size_t kMaxDimensions = 8;
 
-// What follows `key` in the header's dictionary; empty when it is not there.
+// Returns the text after `key` in the header's dictionary; empty if it is missing.
 std::string_view After(std::string_view header, std::string_view key) {
   const size_t at = header.find(key);
   if (at == std::string_view::npos) return {};
@@ -25,7 +25,7 @@ std::string_view After(std::string_view header, std::string_view key) {
   return header;
 }
 
-// "(3, 17)"; nothing when it is not like that.
+// Parses e.g. "(3, 17)"; nullopt if malformed.
 std::optional<std::vector<size_t>> ShapeOf(std::string_view text, size_t max_values) {
   if (text.empty() || text[0] != '(') return std::nullopt;
   const size_t end = text.find(')');

@@ -1,4 +1,4 @@
-// NumPy's files of numbers (format 1 and 2). For this folder only.
+// Reads NumPy's array files (format 1 and 2). For this folder only.
 #pragma once
 
 #include <string>
@@ -12,9 +12,9 @@ struct NpyArray {
   std::vector<double> values;  // in C order, all finite
 };
 
-// float32, float64, and int32, int64, little-endian, C or Fortran order, of at most `max_values`.
-// Throws Error{kInvalidArgument} that names the file: not such a file, cut short, other types,
-// numbers that are not finite.
+// Reads at most `max_values` little-endian values of type float32, float64, int32 or int64 in C or
+// Fortran order. Throws Error{kInvalidArgument} that names the file if it is no such file, is
+// truncated, has another type, or a number that is not finite.
 NpyArray ReadNpy(std::string_view bytes, const std::string& file_name, size_t max_values);
 
 }  // namespace color3d

@@ -41,7 +41,7 @@ constexpr Type kTypes[] = {{"char", "int8", 1, &ReadAs<int8_t>},
                            {"float", "float32", 4, &ReadAs<float>},
                            {"double", "float64", 8, &ReadAs<double>}};
 
-// The next word of a line, which loses it; empty at its end.
+// Removes and returns the next word of a line; empty at its end.
 std::string_view TakeWord(std::string_view* line) {
   line->remove_prefix(std::min(line->find_first_not_of(kBlanks), line->size()));
   const std::string_view word =
@@ -50,7 +50,7 @@ std::string_view TakeWord(std::string_view* line) {
   return word;
 }
 
-// The next line, without its end; nothing at the end of the text.
+// Returns the next line, without its end; nullopt at the end of the text.
 std::optional<std::string_view> TakeLine(std::string_view* text) {
   if (text->empty()) return std::nullopt;
   const size_t end = std::min(text->find('\n'), text->size());
@@ -61,7 +61,7 @@ std::optional<std::string_view> TakeLine(std::string_view* text) {
 
 struct Property {
   const Type* type = nullptr;
-  size_t offset = 0;  // in a row, bytes
+  size_t offset = 0;  // bytes from the start of a row
 };
 
 class PlyPoints {
@@ -163,7 +163,7 @@ class PlyPoints {
     return point;
   }
 
-  // What is no number is not finite, so that the point is left out.
+  // A word that is no number becomes NaN, so that the point is left out.
   static double Number(std::string_view word) {
     double value = 0.0;
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
@@ -192,7 +192,7 @@ class PlyPoints {
   uint64_t count_ = 0;
   size_t stride_ = 0;
   std::vector<Property> row_;
-  int axes_[3] = {-1, -1, -1};  // properties by number
+  int axes_[3] = {-1, -1, -1};  // indices of properties
 };
 
 }  // namespace

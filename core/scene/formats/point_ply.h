@@ -1,4 +1,4 @@
-// Clouds of points in PLY files, as the start of geometry. For core/scene only.
+// Reads point clouds from PLY files, as initial geometry. For core/scene only.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,10 +8,10 @@
 
 namespace color3d {
 
-// x, y and z of the vertices of a PLY: ascii, binary_little_endian or binary_big_endian, numbers of
-// any type, with whatever other properties. Points that are not finite are left out; of more than
-// `most` every so manieth is kept. Throws Error{kInvalidArgument} that names the file: no PLY, no
-// vertices with x, y and z, cut short, lists in its vertices.
+// Reads x, y and z of the vertices of a PLY: ascii, binary_little_endian or binary_big_endian,
+// numbers of any type, other properties ignored. Points that are not finite are left out; if there
+// are more than `most`, every n-th is kept. Throws Error{kInvalidArgument} that names the file if
+// it is no PLY, has no vertices with x, y and z, is truncated, or has lists in its vertices.
 std::vector<Eigen::Vector3d> ReadPointPly(std::string_view bytes,
                                           const std::string& file_name,
                                           size_t most);

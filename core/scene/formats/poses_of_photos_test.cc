@@ -45,7 +45,7 @@ class PosesOfPhotos : public testing::Test {
   QuietRun run_;
 };
 
-TEST_F(PosesOfPhotos, ColmapTextsMayBeginWithAMark) {
+TEST_F(PosesOfPhotos, ReadsColmapTextWithByteOrderMark) {
   for (const char* file : {"cameras.txt", "images.txt", "points3D.txt"}) {
     WriteFileAtomic(Model() / file, "\xef\xbb\xbf" + ReadFile(Model() / file));
   }
@@ -57,7 +57,7 @@ TEST_F(PosesOfPhotos, ColmapTextsMayBeginWithAMark) {
   EXPECT_EQ(Said(), "images.txt is UTF-16 text; save it as UTF-8");
 }
 
-TEST_F(PosesOfPhotos, ColmapPhotosMayHaveOneLineEach) {
+TEST_F(PosesOfPhotos, ReadsColmapImagesWithoutObservations) {
   std::string lines;
   const std::string text = ReadFile(Model() / "images.txt");
   for (size_t at = 0; at < text.size();) {
@@ -82,7 +82,7 @@ TEST_F(PosesOfPhotos, ColmapPhotosMayHaveOneLineEach) {
   EXPECT_EQ(mixed.images.at(3).name, "a b.png");
 }
 
-TEST_F(PosesOfPhotos, ValuesThatAreNotUsedRefuseNothing) {
+TEST_F(PosesOfPhotos, IgnoresUnusedValues) {
   WriteFileAtomic(Model() / "points3D.txt",
                   "1 0.1 0.2 0.3 154.0 132.0 1e2 nan 1 0 2 0.0\n"
                   "2 0.3 0.2 0.1 red green blue inf 1 -1 2 x\n"
@@ -102,7 +102,7 @@ TEST_F(PosesOfPhotos, ValuesThatAreNotUsedRefuseNothing) {
             "images.txt: line 1: \"1.5\" is not a whole number");
 }
 
-TEST_F(PosesOfPhotos, NamesMayDifferInCaseEndingAndSeparators) {
+TEST_F(PosesOfPhotos, MatchesNamesDespiteCaseAndExtension) {
   for (const char* to : {".PNG", ".JPG", "", ".HEIC"}) {
     Replace("sparse/0/images.txt", "0001.png", std::string("0001") + to);
     const ImportResult result = Run();
@@ -121,7 +121,7 @@ TEST_F(PosesOfPhotos, NamesMayDifferInCaseEndingAndSeparators) {
   EXPECT_THAT(result.scene.points.at(0).views, ElementsAre(0, 1, 2, 3));
 }
 
-TEST_F(PosesOfPhotos, PhotosThatWereThrownAwayAreLeftOutWithANote) {
+TEST_F(PosesOfPhotos, LeavesOutDeletedPhotosWithNote) {
   fs::remove(folder_.path() / "images/0002.png");
   const ImportResult result = Run();
   EXPECT_EQ(result.scene.views.size(), 3u);
@@ -139,7 +139,7 @@ TEST_F(PosesOfPhotos, PhotosThatWereThrownAwayAreLeftOutWithANote) {
   EXPECT_THAT(said, Not(HasSubstr(scratch_.path().string())));
 }
 
-TEST_F(PosesOfPhotos, TimesFollowTheNames) {
+TEST_F(PosesOfPhotos, MatchesTimesByName) {
   WriteFileAtomic(folder_.path() / "times.txt",
                   "0 images\\0001.PNG\n1 0002\n2 images/0003.jpg\n3 0004.png\n4 gone.png\n");
   const ImportResult result = Run();
@@ -147,7 +147,7 @@ TEST_F(PosesOfPhotos, TimesFollowTheNames) {
   EXPECT_EQ(result.scene.views[2].time_s(), 2.0);
 }
 
-TEST_F(PosesOfPhotos, TheModelWithMostPhotosIsUsed) {
+TEST_F(PosesOfPhotos, UsesModelWithMostPhotos) {
   Scene few = scene_;
   few.views.resize(2);
   for (SparsePoint& point : few.points) point.views = {0, 1};
@@ -168,7 +168,7 @@ TEST_F(PosesOfPhotos, TheModelWithMostPhotosIsUsed) {
   EXPECT_THAT(Said(), HasSubstr("images.txt: line 1"));
 }
 
-TEST_F(PosesOfPhotos, OfTransformsAreUsedWhereTheyPlaceMore) {
+TEST_F(PosesOfPhotos, UsesTransformsIfTheyPlaceMore) {
   Scene few = scene_;
   few.views.resize(2);
   for (SparsePoint& point : few.points) point.views = {0, 1};
@@ -182,7 +182,7 @@ TEST_F(PosesOfPhotos, OfTransformsAreUsedWhereTheyPlaceMore) {
                        "sparse/0 of 2"));
 }
 
-TEST_F(PosesOfPhotos, AModelInAnyUsualPlaceIsUsed) {
+TEST_F(PosesOfPhotos, FindsModelInAnyUsualPlace) {
   for (const char* place : {"sparse/1", "colmap/sparse/0", "colmap/sparse/1", "mine"}) {
     fs::remove_all(folder_.path() / "sparse");
     fs::remove_all(folder_.path() / "colmap");
@@ -191,7 +191,7 @@ TEST_F(PosesOfPhotos, AModelInAnyUsualPlaceIsUsed) {
   }
 }
 
-TEST_F(PosesOfPhotos, BlendersFilesAreTakenTogether) {
+TEST_F(PosesOfPhotos, MergesFilesOfBlender) {
   fs::remove_all(folder_.path() / "sparse");
   Scene train = scene_, test = scene_;
   train.views.resize(3);
@@ -222,7 +222,7 @@ std::string PosesBounds(const Scene& scene) {
   return NpyOf({scene.views.size(), 17}, values);
 }
 
-TEST_F(PosesOfPhotos, PosesBoundsAreOfPhotosToo) {
+TEST_F(PosesOfPhotos, ReadsPosesBoundsOfPhotos) {
   fs::remove_all(folder_.path() / "sparse");
   WriteFileAtomic(folder_.path() / "poses_bounds.npy", PosesBounds(scene_));
   const ImportResult result = Run();
@@ -247,7 +247,7 @@ TEST_F(PosesOfPhotos, PosesBoundsAreOfPhotosToo) {
 }
 
 // Whatever is wrong, nobody learns where the server keeps its files.
-TEST_F(PosesOfPhotos, MessagesNameNoFolderOfTheServer) {
+TEST_F(PosesOfPhotos, MessagesHideServerPaths) {
   const auto expect = [&](const std::string& said) {
     EXPECT_NE(said, "");
     EXPECT_THAT(said, Not(HasSubstr(folder_.path().string())));

@@ -24,7 +24,7 @@ double Median(std::vector<double> values) {
   return *middle;
 }
 
-// A point behind the camera counts as the picture's diagonal.
+// For a point behind the camera, the error is the diagonal of the picture.
 double DistancePx(const ColmapCamera& camera,
                   const Eigen::Vector3d& in_camera,
                   const Eigen::Vector2d& seen) {

@@ -1,5 +1,5 @@
-// How well a COLMAP model's cameras explain its own observations: wrong intrinsics show here first.
-// For this folder only.
+// Reprojection errors of a COLMAP model by camera: they reveal wrong intrinsics. For this folder
+// only.
 #pragma once
 
 #include <string>
@@ -9,8 +9,8 @@
 
 namespace color3d {
 
-// Distances between where a camera's photos show sparse points and where the model projects them,
-// px at the size that the camera was calibrated for.
+// Distances between observed and projected sparse points of one camera, px at the size that the
+// camera was calibrated for.
 struct CameraReprojection {
   uint32_t camera_id = 0;
   std::vector<std::string> photos;  // by name
@@ -19,12 +19,12 @@ struct CameraReprojection {
   double median_px = 0.0;
 };
 
-// One entry per camera that some image uses, by number. Observations that are not finite do not
-// count.
+// Returns one entry for each camera that an image uses, by number. Observations that are not finite
+// are ignored.
 std::vector<CameraReprojection> MeasureReprojection(const ColmapModel& model);
 
-// A warning for each camera whose median is above 2 px, or above four times the other cameras'
-// median and half a pixel.
+// Returns a warning for each camera whose median error is above 2 px, or above both 0.5 px and four
+// times the median of the other cameras.
 std::vector<std::string> ReprojectionWarnings(const std::vector<CameraReprojection>& cameras);
 
 }  // namespace color3d

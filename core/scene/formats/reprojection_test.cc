@@ -9,7 +9,7 @@ namespace {
 using ::testing::IsEmpty;
 
 // What all cameras have alike is judged by itself, and few observations are no evidence.
-TEST(Reprojection, WarnsOfLargeErrorsAndOfCamerasUnlikeTheOthers) {
+TEST(Reprojection, WarnsOfLargeErrorsAndOutlierCameras) {
   // The same error in pixels where all cameras have it.
   CameraReprojection camera{1, {"a.png"}, 100, 1.6, 1.5};
   EXPECT_THAT(ReprojectionWarnings({camera, camera}), IsEmpty());

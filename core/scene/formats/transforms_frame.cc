@@ -45,7 +45,8 @@ Distortion ReadDistortion(const FrameFields& fields) {
     return distortion;
   }
   if (model != "FULL_OPENCV" && fields.NumberOr("k4", 0.0) != 0.0) {
-    // OpenCV means a denominator by k4, nerfstudio a fourth power: better none than the wrong one.
+    // OpenCV uses k4 in a denominator, Nerfstudio as a fourth power: no value is better than a
+    // wrong one.
     throw InvalidArgument("{}: k4 is not supported for camera_model {}", fields.place(), model);
   }
   distortion.k = {fields.NumberOr("k1", 0),
@@ -164,7 +165,7 @@ Pose ReadTransform(const FrameFields& fields) {
                           axes.determinant());
   }
   RequireWithinReach(m.col(3), fields.place());
-  // The nearest rotation, then y and z reversed.
+  // Nearest rotation, then y and z reversed.
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Matrix3d world_from_gl = svd.matrixU() * svd.matrixV().transpose();
   const Eigen::Matrix3d world_from_cam =

@@ -1,5 +1,4 @@
-// What a transforms.json of NeRF, Nerfstudio or Blender says of one frame's camera. For this folder
-// only.
+// Camera of one frame in a transforms.json of NeRF, Nerfstudio or Blender. For this folder only.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -11,11 +10,11 @@
 
 namespace color3d {
 
-// Fields of one frame; what a frame does not say, the file says for all. Reading throws
+// Fields of one frame. A field missing from the frame is taken from the top of the file. Throws
 // Error{kInvalidArgument} that names the place and the field.
 class FrameFields {
  public:
-  // `place`: "cameras.json: frame 3". The objects must outlive this.
+  // `place`: e.g. "cameras.json: frame 3". Both JSON objects must outlive this.
   FrameFields(const nlohmann::json& root, const nlohmann::json& frame, std::string place);
 
   const std::string& place() const { return place_; }
@@ -23,7 +22,7 @@ class FrameFields {
   double NumberOr(const char* key, double absent) const { return Number(key).value_or(absent); }
   std::string TextOr(const char* key, const std::string& absent) const;
   bool IsTrue(const char* key) const;
-  // Null where there is none.
+  // Returns null if there is none.
   const nlohmann::json* Find(const char* key) const;
 
  private:
@@ -32,17 +31,18 @@ class FrameFields {
   std::string place_;
 };
 
-// The whole file. Throws unless it is an object with a list "frames".
+// Parses the whole file. Throws unless it is an object with a list "frames".
 nlohmann::json ParseFrames(std::string_view text, const std::string& file_name);
 
-// w, h, fl_x, fl_y, cx, cy, camera_angle_x, camera_angle_y. `width`, `height`: where it says none.
+// Reads w, h, fl_x, fl_y, cx, cy, camera_angle_x, camera_angle_y. `width`, `height`: defaults for w
+// and h.
 Camera ReadIntrinsics(const FrameFields& fields, int width, int height);
 
-// transform_matrix: OpenGL camera-to-world (x right, y up, z backward), which may be scaled.
+// Reads transform_matrix: OpenGL camera-to-world (x right, y up, z backward). It may be scaled.
 Pose ReadTransform(const FrameFields& fields);
 
-// All of it, lens distortion too (camera_model, k1 to k6, p1, p2): the captured camera of a view,
-// calibrated at any size. `width`, `height`: as above.
+// Reads intrinsics, pose and lens distortion (camera_model, k1 to k6, p1, p2) into the captured
+// camera of a view, calibrated at any size. `width`, `height`: as above.
 void ReadFrameCamera(const FrameFields& fields, int width, int height, View* view);
 
 }  // namespace color3d

@@ -42,7 +42,7 @@ std::string NamesOf(const std::vector<Source>& sources) {
   return names;
 }
 
-// A frame and what its file names, before its photo is looked at.
+// A frame and the names in its file, before its photo is looked up.
 struct Frame {
   const json* root = nullptr;
   const json* frame = nullptr;
@@ -65,7 +65,7 @@ std::vector<Frame> FramesOf(const std::vector<Source>& sources) {
   return frames;
 }
 
-// The photo of each frame; empty where there is none.
+// Returns the photo of each frame; empty if there is none.
 std::vector<std::string> FilesOf(const std::vector<Frame>& frames, const fs::path& scene_folder) {
   std::vector<std::string> names;
   for (const Frame& frame : frames) names.push_back(frame.photo);
@@ -83,7 +83,7 @@ View ReadView(const FrameFields& fields, const std::string& file, const fs::path
   return view;
 }
 
-// When and by which camera, of the frame itself: no file says that of all its frames.
+// Time and camera of the frame itself; the top of a file has no defaults for them.
 FrameTime ReadTime(const json& frame, const std::string& place, const std::string& file) {
   const FrameFields own(frame, frame, place);
   FrameTime time{place, file, own.Number("time"), ""};
@@ -104,7 +104,7 @@ void NoteMissing(const std::vector<std::string>& missing,
         file_name,
         total,
         found,
-        missing.empty() ? "" : fmt::format(" (missing: {})", SomeOf(missing)));
+        missing.empty() ? "" : fmt::format(" (missing: {})", SummarizeNames(missing)));
   }
   if (missing.empty() || warnings == nullptr) return;
   warnings->push_back(
@@ -113,7 +113,7 @@ void NoteMissing(const std::vector<std::string>& missing,
                   missing.size(),
                   total,
                   file_name,
-                  SomeOf(missing)));
+                  SummarizeNames(missing)));
 }
 
 void RefuseTwice(const std::vector<Frame>& frames,

@@ -90,7 +90,7 @@ TEST_F(TransformsFile, NerfFieldOfViewAndNamesWithoutExtension) {
   EXPECT_LT((view.cam_from_world.Center() - Eigen::Vector3d(0.5, 0, 4)).norm(), 1e-12);
 }
 
-TEST_F(TransformsFile, FramesOverrideAndSizesAreScaled) {
+TEST_F(TransformsFile, FramesOverrideDefaultsAndSizesScale) {
   const Scene scene = Read(Json("\"fl_x\":1,\"w\":480,\"h\":320,\"k1\":0.5,\"cx\":200",
                                 "\"fl_x\":500,\"fl_y\":510,\"k1\":0.01"));
   EXPECT_NEAR(scene.views[1].captured_camera.fx, 50.0, 1e-9);
@@ -109,12 +109,12 @@ TEST_F(TransformsFile, FisheyeByEitherName) {
   }
 }
 
-TEST_F(TransformsFile, ScaledRotationsAreAccepted) {
+TEST_F(TransformsFile, AcceptsScaledRotations) {
   const Scene scene = Read(Json("\"fl_x\":50", "", "[1.001,0,0,0.5]"));
   EXPECT_NEAR(scene.views[0].cam_from_world.rotation.norm(), 1.0, 1e-12);
 }
 
-TEST_F(TransformsFile, MissingPhotosAreLeftOutWithAWarning) {
+TEST_F(TransformsFile, LeavesOutMissingPhotosWithWarning) {
   std::string text = Json("\"fl_x\":50");
   text.replace(text.find("\"frames\":[") + 10,
                0,
@@ -157,7 +157,7 @@ TEST_F(TransformsFile, FramesHaveTimes) {
   EXPECT_THAT(warnings.at(0), HasSubstr("stands still"));
 }
 
-TEST_F(TransformsFile, BadTimesAreRefusedByFrame) {
+TEST_F(TransformsFile, NamesFrameOfBadTime) {
   EXPECT_THAT(Said(TimedJson("\"time\":0,", "")),
               HasSubstr("frame 1 (images/b.png) has no time, but transforms.json: frame 0"));
   EXPECT_THAT(Said(TimedJson("\"time\":0,", "\"time\":null,")), HasSubstr("has no time"));
@@ -169,7 +169,7 @@ TEST_F(TransformsFile, BadTimesAreRefusedByFrame) {
               HasSubstr("frame 0: camera must be a text"));
 }
 
-TEST_F(TransformsFile, WhatOtherProgramsWriteIsRead) {
+TEST_F(TransformsFile, ReadsFilesOfOtherPrograms) {
   std::string text = "\xef\xbb\xbf" + Json("\"fl_x\":50,\"aabb_scale\":NaN,\"offset\":[1e999,],");
   text.replace(text.find(",,"), 2, ",");
   EXPECT_EQ(Read(text).views.size(), 2u);
@@ -178,7 +178,7 @@ TEST_F(TransformsFile, WhatOtherProgramsWriteIsRead) {
               HasSubstr("frame 0: transform_matrix has an element that is not a finite number"));
 }
 
-TEST_F(TransformsFile, NamesMayDifferInCaseEndingAndSeparators) {
+TEST_F(TransformsFile, MatchesNamesDespiteCaseAndExtension) {
   for (const char* name :
        {"images\\\\b.png", "IMAGES/B.PNG", "b.jpg", "C:\\\\x\\\\images\\\\b", "../images/b"}) {
     std::string text = Json("\"fl_x\":50");
@@ -189,7 +189,7 @@ TEST_F(TransformsFile, NamesMayDifferInCaseEndingAndSeparators) {
   }
 }
 
-TEST_F(TransformsFile, FilesOutsideOfTheSceneAreNotRead) {
+TEST_F(TransformsFile, IgnoresFilesOutsideOfScene) {
   const ScratchFolder other;
   const fs::path secret = other.path() / "secret.png";
   WriteFileAtomic(secret, EncodePng8(GradientPhoto(48, 32, 1)));
@@ -201,7 +201,7 @@ TEST_F(TransformsFile, FilesOutsideOfTheSceneAreNotRead) {
   }
 }
 
-TEST_F(TransformsFile, BrokenFilesAreRefusedByPlace) {
+TEST_F(TransformsFile, NamesPlaceInBrokenFile) {
   EXPECT_THAT(Said("{\"frames\":"), HasSubstr("transforms.json is not JSON"));
   EXPECT_THAT(Said("{}"), HasSubstr("no list of frames"));
   EXPECT_THAT(Said("{\"frames\":[]}"), HasSubstr("at least 2"));

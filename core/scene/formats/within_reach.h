@@ -1,4 +1,4 @@
-// Places of cameras as files give them. For this folder only.
+// Range check for camera positions in files. For this folder only.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,8 +8,8 @@
 
 namespace color3d {
 
-// Throws Error{kInvalidArgument} that names `place` for a position so far from the origin that sums
-// of coordinates would not be numbers any more.
+// Throws Error{kInvalidArgument} that names `place` if a position is so far from the origin that
+// sums of coordinates would overflow.
 inline void RequireWithinReach(const Eigen::Vector3d& position, const std::string& place) {
   constexpr double kFarthest = 1e100;
   if (position.cwiseAbs().maxCoeff() < kFarthest) return;

@@ -15,8 +15,8 @@ namespace {
 constexpr int64_t kFewestInBlock = 2;
 constexpr int64_t kFewestBeside = 2;
 
-// Times of which a view is learnt from.
-std::set<double> TimesLearntFrom(const Scene& scene) {
+// Times of training views.
+std::set<double> TrainingTimes(const Scene& scene) {
   std::set<double> times;
   for (const int view : scene.TrainingViews()) times.insert(scene.views[view].time_s());
   return times;
@@ -44,12 +44,12 @@ const char* NameOf(HeldOutAs how) {
   return "";
 }
 
-std::vector<HeldOutAs> HowHeldOut(const Scene& scene) {
+std::vector<HeldOutAs> HeldOutKinds(const Scene& scene) {
   std::vector<HeldOutAs> how(scene.views.size(), HeldOutAs::kNot);
   if (!AllHaveTimes(scene)) return how;
   const std::vector<double> times = scene.Times();
-  const std::set<double> learnt_from = TimesLearntFrom(scene);
-  std::set<int> cameras;  // learnt from
+  const std::set<double> learnt_from = TrainingTimes(scene);
+  std::set<int> cameras;  // of training views
   for (const int view : scene.TrainingViews()) cameras.insert(scene.views[view].moment->shot);
   const auto is_open = [&](std::ptrdiff_t i) {
     return i >= 0 && i < std::ssize(times) && !learnt_from.contains(times[i]);
@@ -89,7 +89,7 @@ void HoldOutBlock(double share, Scene* scene) {
   for (View& view : scene->views) {
     view.held_out |= view.time_s() >= begin_s && view.time_s() <= end_s;
   }
-  const std::set<double> left = TimesLearntFrom(*scene);
+  const std::set<double> left = TrainingTimes(*scene);
   const auto before = std::distance(left.begin(), left.lower_bound(begin_s));
   const auto behind = std::distance(left.upper_bound(end_s), left.end());
   if (before >= kFewestBeside && behind >= kFewestBeside) return;

@@ -1,5 +1,4 @@
-// Which views of a scene whose views have times are kept for scoring, and how far each is from what
-// is learnt from.
+// Views with times that are held out for evaluation, and how far each is from the training views.
 #pragma once
 
 #include <vector>
@@ -8,23 +7,23 @@
 
 namespace color3d {
 
-// Why nothing is learnt from a view.
+// How a view is held out of training.
 enum class HeldOutAs {
-  kNot,     // it is learnt from, or has no time
-  kCamera,  // nothing is learnt from its camera
-  kMoment,  // ... from any view of its moment, but from the moments before and behind it
-  kBlock,   // ... from a run of two moments or more, of which its own is one
+  kNot,     // it is a training view, or has no time
+  kCamera,  // no view of its camera is a training view
+  kMoment,  // no view of its moment is; views of the moments before and after it are
+  kBlock,   // no view of a run of two or more moments is, its own among them
 };
 // "camera", "moment" or "block"; "" for kNot.
 const char* NameOf(HeldOutAs how);
 
-// Of each view. Shots of a film without poses are no cameras.
-std::vector<HeldOutAs> HowHeldOut(const Scene& scene);
+// Returns one entry for each view. Shots of a film without poses do not count as cameras.
+std::vector<HeldOutAs> HeldOutKinds(const Scene& scene);
 
-// Marks all views of a run of moments as held out: `share`, 0..0.5, of all moments, in the middle
-// of the scene's time. Comes after whatever else is held out. Throws Error{kInvalidArgument} with
-// the remedy: the views have no times, the run has less than two moments, less than two moments to
-// learn from are left on either side of it.
+// Holds out all views of a run of moments in the middle of the scene's time: `share`, 0..0.5, of
+// all moments. Call it after all other ways of holding out. Throws Error{kInvalidArgument} with the
+// remedy if views have no times, the run has fewer than two moments, or fewer than two training
+// moments are left on either side.
 void HoldOutBlock(double share, Scene* scene);
 
 }  // namespace color3d

@@ -37,7 +37,7 @@ std::string Said(double share, Scene scene) {
   return "";
 }
 
-TEST(HoldOutBlockTest, IsInTheMiddleWithAllCameras) {
+TEST(HoldOutBlockTest, IsInMiddleWithAllCameras) {
   Scene scene = SceneOf(3, 20);
   HoldOutBlock(0.2, &scene);
   for (const View& view : scene.views) {
@@ -46,7 +46,7 @@ TEST(HoldOutBlockTest, IsInTheMiddleWithAllCameras) {
   }
 }
 
-TEST(HoldOutBlockTest, IsRefusedWhereItLeavesTooLittle) {
+TEST(HoldOutBlockTest, IsRefusedIfTooFewMomentsRemain) {
   EXPECT_EQ(Said(0.5, SceneOf(2, 8)), "");
   EXPECT_THAT(Said(0.05, SceneOf(2, 20)),
               HasSubstr("0.05 of 20 moments, which is less than two of them; give 0.1 or more"));
@@ -59,14 +59,14 @@ TEST(HoldOutBlockTest, IsRefusedWhereItLeavesTooLittle) {
   EXPECT_THAT(Said(0.2, scene), HasSubstr("and 1 behind it"));
 }
 
-TEST(HowHeldOutTest, TellsCamerasMomentsAndBlocksApart) {
+TEST(HeldOutKindsTest, TellsCamerasMomentsAndBlocksApart) {
   Scene scene = SceneOf(3, 40);
   for (View& view : scene.views) {
     const int t = static_cast<int>(2.0 * view.moment->time_s);
     view.held_out = t % 8 == 4 || view.moment->shot == 1;
   }
   HoldOutBlock(0.1, &scene);  // 18 to 21, and 20 was held out before
-  const std::vector<HeldOutAs> how = HowHeldOut(scene);
+  const std::vector<HeldOutAs> how = HeldOutKinds(scene);
   for (size_t i = 0; i < how.size(); ++i) {
     const View& view = scene.views[i];
     const int t = static_cast<int>(2.0 * view.moment->time_s);
@@ -79,15 +79,15 @@ TEST(HowHeldOutTest, TellsCamerasMomentsAndBlocksApart) {
   EXPECT_STREQ(NameOf(HeldOutAs::kBlock), "block");
 }
 
-TEST(HowHeldOutTest, ShotsOfAFilmAreNoCamerasAndPhotosHaveNoTag) {
+TEST(HeldOutKindsTest, ShotsAreBlocksAndPhotosAreNot) {
   Scene film = SceneOf(1, 30, /*film=*/true);
   for (int t = 10; t < 20; ++t) film.views[t].held_out = true;  // a whole shot
   ASSERT_FALSE(film.capture().is_reconstructed);
-  EXPECT_EQ(HowHeldOut(film)[12], HeldOutAs::kBlock);
+  EXPECT_EQ(HeldOutKinds(film)[12], HeldOutAs::kBlock);
   Scene photos = SceneOf(1, 8);
   for (View& view : photos.views) view.moment.reset();
   photos.views[0].held_out = true;
-  EXPECT_EQ(HowHeldOut(photos)[0], HeldOutAs::kNot);
+  EXPECT_EQ(HeldOutKinds(photos)[0], HeldOutAs::kNot);
 }
 
 }  // namespace

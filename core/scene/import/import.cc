@@ -35,13 +35,13 @@ constexpr uint64_t kRandomPointSeed = 1;
 constexpr int kHoldOutEvery = 8;
 constexpr size_t kMinTrainingViews = 2;
 
-// Where no point would be left, as without most of the photos that saw them, those count into whose
-// picture a point falls.
+// If no point would be left, e.g. because most photos that saw the points were removed, points get
+// the views whose picture they fall into.
 void DropWeakPoints(Scene* scene) {
   auto weak = [](const SparsePoint& point) { return point.views.size() < 2; };
   if (std::all_of(scene->points.begin(), scene->points.end(), weak)) {
     for (SparsePoint& point : scene->points) {
-      if (point.position.allFinite()) point.views = ViewsThatFace(*scene, point.position, 0.0);
+      if (point.position.allFinite()) point.views = ViewsFacing(*scene, point.position, 0.0);
     }
   }
   scene->points.erase(std::remove_if(scene->points.begin(), scene->points.end(), weak),
@@ -75,7 +75,7 @@ void Normalise(ImportResult* result) {
   }
 }
 
-// Finds the photos' masks, for structure-from-motion already, and refuses bad ones.
+// Finds the masks of the photos, before structure-from-motion, and refuses bad ones.
 void FindPhotoMasks(const fs::path& scene_folder,
                     const CancellationToken& cancel,
                     std::vector<Photo>* photos,
@@ -159,7 +159,7 @@ void ImportPhotos(const fs::path& scene_folder,
                   few ? "only " : "",
                   result->scene.views.size(),
                   photos.size(),
-                  SomeOf(sfm.unplaced)));
+                  SummarizeNames(sfm.unplaced)));
 }
 
 void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
@@ -173,12 +173,12 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
     if (!std::binary_search(files.begin(), files.end(), photo.file)) unposed.push_back(photo.name);
   }
   if (unposed.empty()) return;
-  result->warnings.push_back(
-      fmt::format("{} photos have no pose and were left out: {}", unposed.size(), SomeOf(unposed)));
+  result->warnings.push_back(fmt::format(
+      "{} photos have no pose and were left out: {}", unposed.size(), SummarizeNames(unposed)));
 }
 
-// The poses that lie beside the photos: of the kind that places most of them, COLMAP's before
-// others. False where there are none.
+// Reads the poses beside the photos: of the format that places most of them, COLMAP's if no other
+// places more. Returns false if there are none.
 bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
   const std::optional<ColmapChoice> colmap = ChooseColmapModel(scene_folder);
   const bool is_nerfies = IsNerfiesFolder(scene_folder);
@@ -233,8 +233,8 @@ void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
                       : "; transforms.json and metadata.json have times of their own"));
 }
 
-// Of a scene that may move, what all cameras took at every eighth moment from the fifth on: each
-// has moments before and after it.
+// Dynamic scenes: holds out the views of all cameras at every eighth moment from the fifth on, so
+// that each has moments before and after it.
 void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
   std::set<double> times;
   for (const View& view : scene->views) times.insert(view.time_s());
@@ -260,14 +260,14 @@ void HoldOutCamera(const std::string& camera, ImportResult* result) {
   if (found == result->cameras.end()) {
     throw InvalidArgument("hold_out_camera: there is no camera '{}'; the scene has {}",
                           camera,
-                          SomeOf(result->cameras, 8));
+                          SummarizeNames(result->cameras, 8));
   }
   const int shot = static_cast<int>(found - result->cameras.begin());
   for (View& view : result->scene.views) view.held_out |= view.moment && view.moment->shot == shot;
 }
 
-// Throws unless a scene whose frames have times shows what it is from several places.
-void CheckMoves(const Scene& scene) {
+// Throws if the scene has times but all its frames are from one place.
+void RequireSeveralPositions(const Scene& scene) {
   if (scene.capture().is_reconstructed) return;
   throw InvalidArgument(
       "the frames are all of one camera that stands still: nothing can be reconstructed of them. "
@@ -346,7 +346,7 @@ void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
     throw InvalidArgument("the scene has only {} posed view; at least 2 are needed",
                           scene.views.size());
   }
-  CheckMoves(scene);
+  RequireSeveralPositions(scene);
   result->photos_registered = static_cast<int>(scene.views.size());
   result->masked_views = static_cast<int>(std::count_if(
       scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));

@@ -37,7 +37,7 @@ class Import : public testing::Test {
   QuietRun run_;
 };
 
-TEST_F(Import, BadInputsSayWhatIsWrong) {
+TEST_F(Import, NamesFaultsOfInput) {
   EXPECT_THAT(Said(),
               HasSubstr("the scene contains no photographs (" + ReadableImageFormats() + ")"));
   WriteFileAtomic(folder_.path() / "readme.txt", "hello");
@@ -52,7 +52,7 @@ TEST_F(Import, BadInputsSayWhatIsWrong) {
   EXPECT_THROW(ImportScene("/no/such/folder", scratch_.path(), options_, run_.control()), Error);
 }
 
-TEST_F(Import, OptionsAreChecked) {
+TEST_F(Import, ChecksOptions) {
   options_.sfm_max_features = 10;
   EXPECT_THAT(Said(), HasSubstr("sfm_max_features is 10; it must be 512 to 16384"));
   options_ = {};
@@ -66,7 +66,7 @@ TEST_F(Import, OptionsAreChecked) {
   EXPECT_THAT(Said(), HasSubstr("sfm_neighbors is 1; it must be 2 to 100"));
 }
 
-TEST_F(Import, ColmapWinsOverTransforms) {
+TEST_F(Import, PrefersColmapToTransforms) {
   const Scene scene = ArcScene(9);
   WritePhotos(scene, folder_.path());
   WritePhoto("images/extra.png");
@@ -84,7 +84,7 @@ TEST_F(Import, ColmapWinsOverTransforms) {
   }
 }
 
-TEST_F(Import, EveryEighthIsHeldOut) {
+TEST_F(Import, HoldsOutEveryEighthView) {
   const Scene scene = ArcScene(17);
   WritePhotos(scene, folder_.path());
   WriteColmapText(scene, folder_.path());
@@ -93,7 +93,7 @@ TEST_F(Import, EveryEighthIsHeldOut) {
   EXPECT_EQ(Run().scene.HeldOutViews(), std::vector<int>({0, 8, 16}));
 }
 
-TEST_F(Import, TwoViewsAreNotHeldOut) {
+TEST_F(Import, HoldsOutNoneOfTwoViews) {
   const Scene scene = ArcScene(2);
   WritePhotos(scene, folder_.path());
   WriteColmapText(scene, folder_.path());
@@ -123,7 +123,7 @@ Scene RigScene(int steps, const fs::path& folder) {
   return scene;
 }
 
-TEST_F(Import, TimeStepsOfARigAreHeldOutWithAllTheirCameras) {
+TEST_F(Import, HoldsOutTimeStepsWithAllCameras) {
   RigScene(14, folder_.path());
   options_.hold_out_every_eighth = true;
   const ImportResult result = Run();
@@ -138,7 +138,7 @@ TEST_F(Import, TimeStepsOfARigAreHeldOutWithAllTheirCameras) {
   }
 }
 
-TEST_F(Import, AWholeCameraIsHeldOut) {
+TEST_F(Import, HoldsOutOneCamera) {
   RigScene(3, folder_.path());
   options_.hold_out_every_eighth = true;
   options_.hold_out_camera = "cam01";
@@ -151,7 +151,7 @@ TEST_F(Import, AWholeCameraIsHeldOut) {
   EXPECT_THAT(Said(), HasSubstr("no camera 'cam09'; the scene has cam00, cam01, cam02"));
 }
 
-TEST_F(Import, AColmapModelWithTimesMovesAsAnyOther) {
+TEST_F(Import, ColmapModelWithTimesIsDynamic) {
   const Scene rig = RigScene(14, folder_.path());
   WriteColmapText(rig, folder_.path() / "sparse/0");
   EXPECT_FALSE(Run().scene.capture().is_dynamic);
@@ -176,14 +176,14 @@ TEST_F(Import, AColmapModelWithTimesMovesAsAnyOther) {
   }
 }
 
-TEST_F(Import, TimesWithoutAColmapModelAreNotRead) {
+TEST_F(Import, IgnoresTimesWithoutColmapModel) {
   RigScene(3, folder_.path());
   WriteFileAtomic(folder_.path() / "times.txt", "not read");
   EXPECT_THAT(Run().warnings,
               testing::Contains(HasSubstr("times.txt is not read: it goes with a COLMAP model")));
 }
 
-TEST_F(Import, ABlockOfTimeIsHeldOutBesideCamerasAndMoments) {
+TEST_F(Import, HoldsOutBlockBesideCamerasAndMoments) {
   RigScene(20, folder_.path());
   options_.hold_out_every_eighth = true;
   options_.hold_out_camera = "cam01";
@@ -200,7 +200,7 @@ TEST_F(Import, ABlockOfTimeIsHeldOutBesideCamerasAndMoments) {
   EXPECT_THAT(Said(), HasSubstr("less than two of them"));
 }
 
-TEST_F(Import, TimesWithoutPosesAreAFilm) {
+TEST_F(Import, RefusesTimesWithOnePose) {
   Scene scene = ArcScene(3);
   for (View& view : scene.views) {
     view.cam_from_world = scene.views[0].cam_from_world;
@@ -211,7 +211,7 @@ TEST_F(Import, TimesWithoutPosesAreAFilm) {
   EXPECT_THAT(Said(), HasSubstr("one camera that stands still"));
 }
 
-TEST_F(Import, GeographicCoordinatesAreRecentred) {
+TEST_F(Import, RecentersGeographicCoordinates) {
   Scene scene = ArcScene(4);
   WritePhotos(scene, folder_.path());
   scene.world_offset = {4.5e5, 5.3e6, 410.0};
@@ -233,7 +233,7 @@ TEST_F(Import, GeographicCoordinatesAreRecentred) {
   }
 }
 
-TEST_F(Import, PointsThatOneViewSeesAreDropped) {
+TEST_F(Import, DropsPointsOfOneView) {
   Scene scene = ArcScene(3);
   scene.points[0].views = {1};
   scene.points[1].views = {0, 2};
@@ -242,7 +242,7 @@ TEST_F(Import, PointsThatOneViewSeesAreDropped) {
   EXPECT_EQ(Run().scene.points.size(), 49u);
 }
 
-TEST_F(Import, PosesWithoutPointsGetRandomOnesThatViewsSee) {
+TEST_F(Import, AddsRandomVisiblePointsToPoses) {
   const Scene scene = ArcScene(8);
   WritePhotos(scene, folder_.path());
   WriteTransformsJson(scene, folder_.path() / "transforms.json");

@@ -45,7 +45,7 @@ void CheckWithinReach(const Scene& scene, const Eigen::Vector3d& mean, double de
   }
 }
 
-// The largest coordinate of cameras and points.
+// Largest coordinate of cameras and points.
 double LargestCoordinate(const Scene& scene) {
   double largest = 0.0;
   for (const View& view : scene.views) {
@@ -114,7 +114,7 @@ std::vector<std::string> NormaliseScene(Scene* scene) {
   }
   CheckWithinReach(*scene, mean, std::max(depth, 1e-300));
   std::vector<std::string> notes;
-  // All cameras in one place with one direction have no scale.
+  // Cameras with one position and direction have no scale.
   const bool in_band = !(depth > 0.0) || (depth >= kMinDepth && depth <= kMaxDepth);
   const double scale = in_band ? 1.0 : depth / kStandardDepth;
   const bool far = LargestCoordinate(*scene) / scale > kFarFromOrigin &&

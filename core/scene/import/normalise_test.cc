@@ -28,7 +28,7 @@ Scene Moved(Scene scene, double scale, const Eigen::Vector3d& offset) {
   return scene;
 }
 
-TEST(NormaliseScene, OrdinaryScenesKeepEveryBit) {
+TEST(NormaliseScene, KeepsOrdinaryScenesBitForBit) {
   for (const double scale : {0.3, 1.0, 200.0}) {  // depths 1.2 to 800
     Scene scene = Moved(ArcScene(5), scale, {0.1, -0.2, 0.3});
     const std::string before = SceneToJson(scene);
@@ -37,7 +37,7 @@ TEST(NormaliseScene, OrdinaryScenesKeepEveryBit) {
   }
 }
 
-TEST(NormaliseScene, VerySmallLargeAndFarScenesComeToTheSameAndGoBack) {
+TEST(NormaliseScene, RescalesExtremeScenesAndInverts) {
   const Scene original = ArcScene(5);
   for (const double scale : {1e-6, 1e-3, 1e6}) {
     for (const Eigen::Vector3d& offset :
@@ -65,7 +65,7 @@ TEST(NormaliseScene, VerySmallLargeAndFarScenesComeToTheSameAndGoBack) {
   }
 }
 
-TEST(NormaliseScene, WithoutPointsTheCamerasGiveTheScale) {
+TEST(NormaliseScene, CamerasGiveScaleWithoutPoints) {
   Scene scene = Moved(ArcScene(6), 1e-6, {0, 0, 0});
   scene.points.clear();
   EXPECT_THAT(NormaliseScene(&scene), ElementsAre(HasSubstr("put back on export")));
@@ -73,7 +73,7 @@ TEST(NormaliseScene, WithoutPointsTheCamerasGiveTheScale) {
   EXPECT_NEAR(scene.world_from_scene_scale, 4e-7, 1e-8);
 }
 
-TEST(NormaliseScene, WhatNoScaleCanBearIsRefusedByName) {
+TEST(NormaliseScene, NamesViewsAndPointsOutOfRange) {
   Scene scene = ArcScene(4);
   scene.points[7].position.x() = 1e14;
   EXPECT_THAT(Refusal([&] { NormaliseScene(&scene); }), HasSubstr("sparse point 7 lies 1e+14"));
@@ -88,7 +88,7 @@ TEST(NormaliseScene, WhatNoScaleCanBearIsRefusedByName) {
   EXPECT_THAT(Refusal([&] { NormaliseScene(&scene); }), HasSubstr("too large"));
 }
 
-TEST(NormaliseScene, PointsBehindAllCamerasAreRefused) {
+TEST(NormaliseScene, RefusesPointsBehindAllCameras) {
   Scene scene = ArcScene(4);
   EXPECT_EQ(ShareBehindCameras(scene), 0.0);
   for (View& view : scene.views) {  // turn every camera round
@@ -121,7 +121,7 @@ class ImportedScene : public testing::Test {
   QuietRun run_;
 };
 
-TEST_F(ImportedScene, WritersGoBackToTheWorld) {
+TEST_F(ImportedScene, WritersUseWorldCoordinates) {
   Write(Moved(ArcScene(4), 1e-6, {3.0, 4.0, 5.0}));
   const Scene scene = Import().scene;
   EXPECT_NEAR(TypicalDepth(scene), 10.0, 1e-6);
@@ -141,7 +141,7 @@ TEST_F(ImportedScene, WritersGoBackToTheWorld) {
   EXPECT_LT((colmap.points[3].position - written.points[3].position).norm(), 1e-12);
 }
 
-TEST_F(ImportedScene, NumbersThatAreNotFiniteAreNamedByTheirPlace) {
+TEST_F(ImportedScene, NamesPlaceOfNonFiniteNumbers) {
   const Scene scene = ArcScene(3);
   const auto said = [&](const char* file, const char* from, const char* to) {
     Write(scene, file, from, to);
@@ -171,7 +171,7 @@ Scene TwoCameras() {
   return scene;
 }
 
-TEST_F(ImportedScene, WrongIntrinsicsAreNamed) {
+TEST_F(ImportedScene, NamesWrongIntrinsics) {
   Write(TwoCameras());
   EXPECT_THAT(Import().warnings, IsEmpty());
   Write(TwoCameras(), "cameras.txt", "PINHOLE 48 32 47 51", "PINHOLE 48 32 80 87");
@@ -185,7 +185,7 @@ TEST_F(ImportedScene, WrongIntrinsicsAreNamed) {
   EXPECT_THAT(Import().warnings, IsEmpty());
 }
 
-TEST_F(ImportedScene, PosesTheWrongWayRoundAreSaid) {
+TEST_F(ImportedScene, WarnsOfInvertedPoses) {
   Scene scene = ArcScene(4);
   for (int i = 0; i < 2; ++i) {
     const Eigen::Vector3d c = scene.views[i].cam_from_world.Center();

@@ -1,4 +1,4 @@
-// What users want to know of how their photos are read. For this folder only.
+// Notes for the user on how photos are read. For this folder only.
 #pragma once
 
 #include <filesystem>
@@ -10,9 +10,9 @@
 
 namespace color3d {
 
-// PictureNotes (codec.h) of the views' photos, equal ones told once: "a.tif has 2 pages; the
-// largest is read (200 x 133 px); the same of 13 more photos". Of many views 500, evenly spread,
-// are looked at.
+// Returns the PictureNotes (codec.h) of the photos of the views, equal ones merged: "a.tif has 2
+// pages; the largest is read (200 x 133 px); the same of 13 more photos". Reads at most 500 views,
+// evenly spread.
 std::vector<std::string> NotesOnPictures(const std::filesystem::path& scene_folder,
                                          const std::vector<View>& views,
                                          const CancellationToken& cancel);

@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::ElementsAre;
 
-TEST(PictureNotesTest, EqualNotesAreToldOnce) {
+TEST(PictureNotesTest, MergesEqualNotes) {
   const ScratchFolder folder;
   const Image picture(40, 30, 1, 0.5f), preview(10, 8, 1, 0.5f);
   const std::string scan = TiffFile({{.image = preview}, {.image = picture}});

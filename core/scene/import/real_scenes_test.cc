@@ -27,7 +27,7 @@ class RealScenes : public testing::TestWithParam<const char*> {
   }
 };
 
-TEST_P(RealScenes, PointsReprojectToTheStoredObservations) {
+TEST_P(RealScenes, PointsReprojectToStoredObservations) {
   const fs::path folder = Folder(GetParam());
   if (!fs::exists(folder / "sparse/0")) GTEST_SKIP() << "no " << folder;
   const Scene scene = ReadColmapModel(folder / "sparse/0", folder);

@@ -8,7 +8,7 @@ namespace color3d {
 
 std::vector<SparsePoint> UnmaskedPoints(const Scene& scene, const ViewImages& images) {
   std::vector<SparsePoint> points = scene.points;
-  // View by view, so that each mask is read once.
+  // By view, so that each mask is read once.
   for (int view = 0; view < static_cast<int>(scene.views.size()); ++view) {
     const std::shared_ptr<const Image> mask = images.Mask(view);
     if (mask == nullptr) continue;

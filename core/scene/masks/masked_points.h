@@ -1,4 +1,4 @@
-// Sparse points of what masks leave out. Thread-safe.
+// Removes observations of sparse points in masked parts of photos. Thread-safe.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace color3d {
 
-// The points without the observations that lie where their photo is masked out. A point that keeps
-// fewer than two of at least two is left out; one that never had two stays as it is.
+// Returns the points without the observations in masked parts. A point with at least two
+// observations is dropped if fewer than two are left; one that never had two is kept.
 std::vector<SparsePoint> UnmaskedPoints(const Scene& scene, const ViewImages& images);
 
 }  // namespace color3d

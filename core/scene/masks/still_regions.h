@@ -1,4 +1,4 @@
-// What of a film's frame stands still, as its import saw it (DYNAMIC.md "Poses of films"). Pure
+// Static regions of a film's frames, as found by import (DYNAMIC.md "Poses of films"). Pure
 // functions, thread-safe.
 #pragma once
 
@@ -7,8 +7,8 @@
 
 namespace color3d {
 
-// 1 channel of the working size of `images`: 1 where nothing of `moving` is, else 0. `moving`: 1
-// channel of any size, of the whole frame as captured; above 0.5 something moves on its own.
+// Returns 1 channel at the working size of `images`: 0 where a pixel shows a part of `moving` above
+// 0.5, else 1. `moving`: moving objects, 1 channel of any size, of the whole frame as captured.
 Image StillRegion(const ViewImages& images, const Scene& scene, int view, const Image& moving);
 
 }  // namespace color3d

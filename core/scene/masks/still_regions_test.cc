@@ -35,7 +35,7 @@ Image Moving() {
   return moving;
 }
 
-TEST(StillRegionTest, LeavesOutWhateverShowsSomethingThatMoves) {
+TEST(StillRegionTest, LeavesOutMovingObjects) {
   const ScratchFolder scratch;
   const Scene scene = SceneOf(scratch.path(), 0.0);
   const Image still = StillRegion(ViewImages(scene, scratch.path(), 40), scene, 0, Moving());

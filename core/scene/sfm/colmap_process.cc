@@ -19,23 +19,23 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Of the database of thousands of photos; never seen.
+// Limits for the database of thousands of photos; never reached in practice.
 constexpr int64_t kMaxFileBytes = int64_t{16} << 30;
-// The least that is worth trying, though less may be free at the moment.
+// Minimum memory that is worth an attempt, even if less is free at present.
 constexpr int64_t kLeastMemoryBytes = int64_t{1} << 30;
 
 ProcessLimits LimitsOf(std::chrono::seconds timeout) {
   ProcessLimits limits;
   limits.memory_bytes = std::max(AvailableMemoryBytes(), kLeastMemoryBytes);
   limits.file_bytes = kMaxFileBytes;
-  // Every thread may compute all the time; the time limit of the whole comes first.
+  // Every thread may use the CPU all the time; the overall time limit applies first.
   limits.cpu_seconds = (timeout.count() + 60) * std::max(1u, std::thread::hardware_concurrency());
   limits.descriptors = 1024;
   limits.processes = 8192;
   return limits;
 }
 
-// Counts new lines that hold `mark` in a growing log.
+// Counts new lines that contain `mark` in a growing log.
 class LogCounter {
  public:
   LogCounter(const fs::path& log, std::string mark) : log_(log), mark_(std::move(mark)) {
@@ -47,7 +47,7 @@ class LogCounter {
     std::ifstream in(log_, std::ios::binary);
     in.seekg(at_);
     std::string line;
-    // A line without an end is not finished and is read again next time.
+    // An incomplete line is read again next time.
     while (std::getline(in, line) && !in.eof()) {
       if (line.find(mark_) != std::string::npos) ++count_;
       at_ = in.tellg();
@@ -82,7 +82,7 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   SubprocessOptions child;
   child.arguments = {"colmap"};
   child.arguments.insert(child.arguments.end(), arguments.begin(), arguments.end());
-  // Its work lies beside its log, and nothing else is its business.
+  // The process may write beside its log only.
   const fs::path folder = fs::absolute(log_).parent_path();
   child.environment = {"QT_QPA_PLATFORM=offscreen", "TMPDIR=" + folder.string()};
   if (IsSandboxing()) {
@@ -95,8 +95,8 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   child.limits = LimitsOf(child.timeout);
   LogCounter counter(log_, phase.mark);
   run_.progress.OnProgress(0, phase.total, phase.message);
-  // The child runs on a thread of its own, so that progress is reported from ours, and with a token
-  // of its own, so that it stops as well when an observer throws.
+  // The child runs on a thread of its own, so that progress is reported from the calling thread,
+  // and with a token of its own, so that it also stops if an observer throws.
   CancellationToken stop;
   auto running =
       std::async(std::launch::async, [&child, &stop] { return RunSubprocess(child, stop); });
@@ -111,7 +111,7 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
           done, phase.total, fmt::format("{} {}/{}", phase.message, done, phase.total));
     }
   } catch (...) {
-    stop.Cancel();  // the future's destructor waits for the child to be gone
+    stop.Cancel();  // the future's destructor waits for the child to exit
     throw;
   }
   const SubprocessResult result = running.get();
@@ -173,7 +173,7 @@ std::string ColmapProcess::LastLogLine() const {
   while (std::getline(in, line)) {
     if (!line.empty()) last = line;
   }
-  // Where our files lie is nobody's business.
+  // Messages do not disclose server paths.
   const std::string folder = fs::absolute(log_).parent_path().string() + "/";
   for (size_t at = last.find(folder); at != last.npos; at = last.find(folder, at)) {
     last.erase(at, folder.size());

@@ -1,5 +1,5 @@
-// COLMAP's program as a child process: one log, one time limit for all commands, progress counted
-// from the log. For this folder only. Not thread-safe.
+// Runs COLMAP as a child process: one log, one time limit for all commands, progress counted from
+// the log. For this folder only. Not thread-safe.
 #pragma once
 
 #include <chrono>
@@ -12,7 +12,7 @@
 
 namespace color3d {
 
-// What one command prints while it works, and how often in all.
+// Line that one command prints as it works, and how often in total.
 struct ColmapPhase {
   std::string message;  // "matching photos"
   std::string mark;     // in the log, once per step
@@ -21,23 +21,23 @@ struct ColmapPhase {
 
 class ColmapProcess {
  public:
-  // What `run` refers to outlives the object. The clock of the time limit starts now.
+  // Objects that `run` refers to must outlive this. The time limit starts now.
   ColmapProcess(std::filesystem::path log, std::chrono::seconds timeout, const RunControl& run);
 
   const std::filesystem::path& log() const { return log_; }
   // Adds a line of our own to the log.
   void Note(const std::string& line) const;
-  // ... and tells the user.
+  // Adds a line to the log and warns the user.
   void Warn(const std::string& line) const;
-  // The value of COLMAP's thread options.
+  // Value for COLMAP's thread options.
   std::string Threads() const;
 
   // Runs `colmap arguments...` and returns the exit code. Throws Error: kDeadlineExceeded,
-  // kCancelled, kResourceExhausted when memory ran out, kUnavailable when another signal ended it
-  // (that is no answer, and worth another attempt), kFailedPrecondition when COLMAP is not
-  // installed.
+  // kCancelled, kResourceExhausted if memory ran out, kUnavailable if another signal ended it
+  // (another attempt may succeed), kFailedPrecondition if COLMAP is not installed.
   int Run(const std::vector<std::string>& arguments, const ColmapPhase& phase);
-  // Another exit code than 0 is Error{kInternal} with the last line of the log.
+  // As Run, but throws Error{kInternal} with the last line of the log for an exit code other than
+  // 0.
   void RunOrThrow(const std::vector<std::string>& arguments, const ColmapPhase& phase);
 
  private:

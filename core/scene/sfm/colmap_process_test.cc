@@ -37,12 +37,12 @@ class ColmapProcessTest : public testing::Test {
   std::string before_;
 };
 
-TEST_F(ColmapProcessTest, AnExitCodeIsAnAnswer) {
+TEST_F(ColmapProcessTest, ReturnsExitCode) {
   EXPECT_EQ(Run("exit 0"), 0);
   EXPECT_EQ(Run("exit 3"), 3);
 }
 
-TEST_F(ColmapProcessTest, DeathByASignalIsNone) {
+TEST_F(ColmapProcessTest, ThrowsWhenKilledBySignal) {
   for (const char* signal : {"KILL", "ABRT", "TERM"}) {
     try {
       Run(std::string("kill -") + signal + " $$");
@@ -54,7 +54,7 @@ TEST_F(ColmapProcessTest, DeathByASignalIsNone) {
   }
 }
 
-TEST_F(ColmapProcessTest, MemoryThatRanOutIsNamedWithItsLimit) {
+TEST_F(ColmapProcessTest, NamesMemoryLimitWhenExhausted) {
   try {
     Run("echo \"terminate called after throwing an instance of 'std::bad_alloc'\" >&2\n"
         "echo '*** Aborted' >&2\nkill -ABRT $$");
@@ -65,7 +65,7 @@ TEST_F(ColmapProcessTest, MemoryThatRanOutIsNamedWithItsLimit) {
   }
 }
 
-TEST_F(ColmapProcessTest, SeesNoTokenAndWritesBesideItsLogAlone) {
+TEST_F(ColmapProcessTest, SeesNoTokenAndWritesBesideLogOnly) {
   ::setenv("COLOR3D_TOKEN", "secret", 1);
   EXPECT_EQ(Run("test -z \"$COLOR3D_TOKEN\""), 0);
   ::unsetenv("COLOR3D_TOKEN");
@@ -78,7 +78,7 @@ TEST_F(ColmapProcessTest, SeesNoTokenAndWritesBesideItsLogAlone) {
   SetSandboxing(true);
 }
 
-TEST_F(ColmapProcessTest, WritingWithoutEndIsNamed) {
+TEST_F(ColmapProcessTest, NamesFileSizeLimitWhenExceeded) {
   try {
     Run("kill -XFSZ $$");
     FAIL();

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-// The same code for processors with and without AVX2; sanitizers do not bear its dispatch.
+// Compiled for processors with and without AVX2; sanitizers do not support the dispatch.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && \
     !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define COLOR3D_DISPATCHED __attribute__((target_clones("avx2", "default")))
@@ -15,7 +15,7 @@ namespace color3d {
 namespace {
 
 constexpr int kDimensions = SiftDescriptors::kDimensions;
-constexpr int kBlock = 64;  // rows whose 16 KiB stay in the first cache
+constexpr int kBlock = 64;  // rows: 16 KiB, which fit in the L1 cache
 
 // Scalar products of one row with `count` rows.
 COLOR3D_DISPATCHED void Products(const int16_t* row,
@@ -30,7 +30,7 @@ COLOR3D_DISPATCHED void Products(const int16_t* row,
   }
 }
 
-// The largest and second largest of a row or column of products.
+// The largest and second largest product in a row or column.
 struct Nearest {
   int index = -1;
   int32_t best = 0;

@@ -1,5 +1,5 @@
-// Which SIFT features of two photos are of one place: all are compared with all, so that the same
-// photos always give the same matches. For this folder only. Pure functions, thread-safe.
+// Exhaustive matching of SIFT features of two photos. Deterministic. For this folder only. Pure
+// functions, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -9,12 +9,13 @@
 
 namespace color3d {
 
-// COLMAP's descriptors of one photo.
+// SIFT descriptors of one photo, as COLMAP stores them.
 class SiftDescriptors {
  public:
   static constexpr int kDimensions = 128;
   SiftDescriptors() = default;
-  // A byte a dimension, one feature after the other; what is left over at the end is dropped.
+  // One byte for each dimension, one feature after the other; an incomplete feature at the end is
+  // dropped.
   explicit SiftDescriptors(std::string_view bytes);
 
   int count() const { return static_cast<int>(values_.size()) / kDimensions; }
@@ -24,8 +25,8 @@ class SiftDescriptors {
   std::vector<int16_t> values_;
 };
 
-// Features of a and b, by index, ascending in a, that are each other's nearest, at an angle of at
-// most 0.7 and less than 0.8 of that to the second: as COLMAP's exhaustive comparison on the CPU.
+// Returns mutual nearest neighbours by index, ascending in a, at an angle of at most 0.7 and less
+// than 0.8 of the angle to the second nearest: as COLMAP's exhaustive matcher on the CPU.
 std::vector<std::pair<int, int>> MatchDescriptors(const SiftDescriptors& a,
                                                   const SiftDescriptors& b);
 

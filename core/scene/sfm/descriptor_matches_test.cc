@@ -26,7 +26,7 @@ std::string RandomDescriptor(Random* random) {
   return bytes;
 }
 
-TEST(DescriptorMatches, MutualAndClearNearestOnesMatch) {
+TEST(DescriptorMatches, MatchesMutualUnambiguousNeighbors) {
   Random random(3);
   std::string a, b;
   for (int i = 0; i < 200; ++i) a += RandomDescriptor(&random);
@@ -44,7 +44,7 @@ TEST(DescriptorMatches, MutualAndClearNearestOnesMatch) {
   }
 }
 
-TEST(DescriptorMatches, TwoThatAreEquallyNearMatchNothing) {
+TEST(DescriptorMatches, AmbiguousNeighborsDoNotMatch) {
   Random random(5);
   const std::string one = RandomDescriptor(&random);
   EXPECT_EQ(MatchDescriptors(SiftDescriptors(one), SiftDescriptors(one)).size(), 1u);
@@ -52,7 +52,7 @@ TEST(DescriptorMatches, TwoThatAreEquallyNearMatchNothing) {
   EXPECT_TRUE(MatchDescriptors(SiftDescriptors(one + one), SiftDescriptors(one)).empty());
 }
 
-TEST(DescriptorMatches, NothingMatchesNothing) {
+TEST(DescriptorMatches, EmptySetsHaveNoMatches) {
   Random random(7);
   const SiftDescriptors none, one(RandomDescriptor(&random) + "rest");
   EXPECT_EQ(one.count(), 1);

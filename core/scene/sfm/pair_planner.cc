@@ -47,7 +47,7 @@ void AddSequence(const std::vector<int>& sequence, std::set<PhotoPair>* pairs) {
   }
 }
 
-// Kruskal's maximum spanning tree, again and again without the pairs that are taken.
+// Repeats Kruskal's maximum spanning tree without the pairs already taken.
 void AddSpanningTrees(const SimilarityTable& similarity, std::set<PhotoPair>* pairs) {
   std::vector<PhotoPair> edges = AllPairs(similarity.count());
   std::sort(edges.begin(), edges.end(), [&](const PhotoPair& a, const PhotoPair& b) {
@@ -87,7 +87,7 @@ std::pair<size_t, size_t> LastNumber(const std::string& name) {
 }  // namespace
 
 std::optional<std::vector<int>> SequenceOrder(const std::vector<std::string>& names) {
-  constexpr size_t kMaxDigits = 18;  // what 64 bits hold
+  constexpr size_t kMaxDigits = 18;  // fits in 64 bits
   std::vector<std::pair<int64_t, int>> numbered;
   std::string frame;
   for (size_t i = 0; i < names.size(); ++i) {
@@ -126,7 +126,7 @@ std::vector<std::vector<int>> FramesOf(const std::vector<int>& camera) {
   return all;
 }
 
-// Photos of which another one shows the same: unrelated ones match by chance, a few times.
+// Photos that another photo overlaps; a few matches of unrelated photos occur by chance.
 int CountRelated(const SimilarityTable& similarity) {
   constexpr float kRelated = 10.0f;
   int related = 0;
@@ -176,7 +176,7 @@ void AddPairsAcross(const std::vector<int>& camera,
                     const SimilarityTable& similarity,
                     PairPlan* plan) {
   constexpr size_t kAlike = 4, kAtAnyRate = 8;
-  // Of each frame and each other camera, and of each two cameras: how alike, and which.
+  // Similarity and index: for each frame and other camera, and for each pair of cameras.
   using Candidates = std::vector<std::pair<float, PhotoPair>>;
   std::map<std::pair<int, int>, Candidates> of_frame, of_cameras;
   for (int i = 0; i < similarity.count(); ++i) {
@@ -228,8 +228,8 @@ PairPlan PlanPairs(const SimilarityTable& similarity,
           CountRelated(similarity)};
 }
 
-std::vector<PhotoPair> PairsOfUnplaced(const std::vector<bool>& placed,
-                                       const std::vector<PhotoPair>& tried) {
+std::vector<PhotoPair> UnregisteredPairs(const std::vector<bool>& placed,
+                                         const std::vector<PhotoPair>& tried) {
   const std::set<PhotoPair> known(tried.begin(), tried.end());
   std::vector<PhotoPair> pairs;
   for (const PhotoPair& pair : AllPairs(static_cast<int>(placed.size()))) {

@@ -42,7 +42,7 @@ bool Has(const PairPlan& plan, int a, int b) {
       plan.pairs.begin(), plan.pairs.end(), PhotoPair{std::min(a, b), std::max(a, b)});
 }
 
-TEST(PairPlanner, SimilarPhotosAcrossTheRingsSeam) {
+TEST(PairPlanner, PairsSimilarPhotosAcrossSeamOfRing) {
   const PairPlan plan = PlanPairs(Ring(40), {}, 6);
   for (int i = 0; i < 40; ++i) {
     for (int apart = 1; apart <= 3; ++apart) EXPECT_TRUE(Has(plan, i, (i + apart) % 40));
@@ -54,7 +54,7 @@ TEST(PairPlanner, SimilarPhotosAcrossTheRingsSeam) {
 }
 
 // Nearest neighbours alone would leave two islands.
-TEST(PairPlanner, IslandsAreJoinedByTwoBridges) {
+TEST(PairPlanner, JoinsIslandsByTwoBridges) {
   SimilarityTable table(40);
   for (int i = 0; i < 40; ++i) {
     for (int j = i + 1; j < 40; ++j) table.Set(i, j, i / 20 == j / 20 ? 100.0f : 0.0f);
@@ -67,12 +67,12 @@ TEST(PairPlanner, IslandsAreJoinedByTwoBridges) {
   EXPECT_TRUE(Has(plan, 7, 25));
 }
 
-TEST(PairPlanner, ConnectedWithoutAnyEvidence) {
+TEST(PairPlanner, ConnectsPhotosWithoutSimilarity) {
   const PairPlan plan = PlanPairs(SimilarityTable(60), {}, 2);
   EXPECT_TRUE(Connected(60, plan.pairs));
 }
 
-TEST(PairPlanner, SequenceNeighboursAreAlwaysIn) {
+TEST(PairPlanner, AlwaysPairsNeighborsOfSequence) {
   std::vector<int> sequence;  // 0 17 34 11 28 5 ...
   for (int i = 0; i < 40; ++i) sequence.push_back(i * 17 % 40);
   const PairPlan plan = PlanPairs(Ring(40), sequence, 4);
@@ -83,7 +83,7 @@ TEST(PairPlanner, SequenceNeighboursAreAlwaysIn) {
   EXPECT_THAT(plan.reason, HasSubstr("sequence"));
 }
 
-TEST(PairPlanner, GrowsLinearlyAndFewPhotosAreMatchedCompletely) {
+TEST(PairPlanner, GrowsLinearlyAndMatchesAllOfFewPhotos) {
   EXPECT_EQ(PlanPairs(Ring(8), {}, 8).pairs.size(), 28u);
   EXPECT_EQ(PlanPairs(Ring(2), {}, 8).pairs.size(), 1u);
   EXPECT_EQ(PlanPairs(Ring(1), {}, 8).pairs.size(), 0u);
@@ -91,7 +91,7 @@ TEST(PairPlanner, GrowsLinearlyAndFewPhotosAreMatchedCompletely) {
   EXPECT_LT(static_cast<double>(PlanPairs(Ring(200), {}, 8).pairs.size()), 4.5 * small);
 }
 
-TEST(PairPlanner, FramesAreMatchedWithNearAndFarNeighbours) {
+TEST(PairPlanner, MatchesFramesWithNearAndFarNeighbors) {
   const auto one_camera = [](int count) { return std::vector<int>(count, 0); };
   EXPECT_EQ(PairsInSequence(one_camera(4)).pairs,
             (std::vector<PhotoPair>{{0, 1}, {0, 2}, {1, 2}, {1, 3}, {2, 3}}));
@@ -103,7 +103,7 @@ TEST(PairPlanner, FramesAreMatchedWithNearAndFarNeighbours) {
   EXPECT_TRUE(FramesToCompare(one_camera(100)).empty());
 }
 
-TEST(PairPlanner, CamerasAreMatchedWithinAndWhereTheySawTheSame) {
+TEST(PairPlanner, MatchesSimilarFramesAcrossCameras) {
   const std::vector<int> camera = {1, 1, 1, 2, 2, 2, 7};
   PairPlan plan = PairsInSequence(camera);
   EXPECT_EQ(plan.pairs, (std::vector<PhotoPair>{{0, 1}, {0, 2}, {1, 2}, {3, 4}, {3, 5}, {4, 5}}));
@@ -125,7 +125,7 @@ TEST(PairPlanner, CamerasAreMatchedWithinAndWhereTheySawTheSame) {
   EXPECT_THAT(plan.reason, HasSubstr("6 pairs of frames up to 16 apart, 14 across cameras"));
 }
 
-TEST(PairPlanner, SequenceOrderFromNames) {
+TEST(PairPlanner, FindsSequenceOrderFromNames) {
   EXPECT_THAT(SequenceOrder({"a/f10.png", "a/f9.png", "a/f8.png"}), Optional(ElementsAre(2, 1, 0)));
   EXPECT_THAT(SequenceOrder({"0001.jpg", "0003.jpg"}), Optional(ElementsAre(0, 1)));
   EXPECT_EQ(SequenceOrder({"left.jpg", "right.jpg"}), std::nullopt);
@@ -134,10 +134,10 @@ TEST(PairPlanner, SequenceOrderFromNames) {
   EXPECT_EQ(SequenceOrder({"f99999999999999999999.jpg"}), std::nullopt);
 }
 
-TEST(PairPlanner, PairsOfUnplacedPhotos) {
-  EXPECT_THAT(PairsOfUnplaced({true, true, false, true}, {{0, 2}}),
+TEST(PairPlanner, PairsUnregisteredPhotosWithAll) {
+  EXPECT_THAT(UnregisteredPairs({true, true, false, true}, {{0, 2}}),
               ElementsAre(PhotoPair{1, 2}, PhotoPair{2, 3}));
-  EXPECT_TRUE(PairsOfUnplaced({true, true}, {}).empty());
+  EXPECT_TRUE(UnregisteredPairs({true, true}, {}).empty());
 }
 
 }  // namespace

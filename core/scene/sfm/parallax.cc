@@ -18,22 +18,22 @@ namespace {
 
 constexpr int kMaxPhotos = 60;
 constexpr size_t kMaxPairs = 400;
-// Fewer matches are as good as none: features of unrelated photos match by chance.
+// Minimum number of matches; features of unrelated photos match by chance.
 constexpr int kMinMatches = 20;
-constexpr double kTolerance = 0.004;  // of the longer side
-constexpr int kSamples = 40;          // of two matches, for each focal length
-// Of the longer side; the best one is then refined by ratios.
+constexpr double kTolerance = 0.004;  // fraction of the longer side
+constexpr int kSamples = 40;          // samples of two matches for each focal length
+// Fractions of the longer side; the best one is then refined by ratios.
 constexpr std::array<double, 5> kFocalLengths = {0.6, 0.9, 1.3, 2.0, 3.5};
 constexpr std::array<double, 3> kRefinements = {1.2, 1.09, 1.04};
-// The rest may be something that moves before the camera, or mismatched.
-constexpr double kTurnedShare = 0.7;  // of a pair's matches
+// The other matches may be of moving objects, or wrong.
+constexpr double kTurnedShare = 0.7;  // fraction of a pair's matches
 constexpr double kTurnedPairs = 0.9;
 constexpr double kMatchedPairs = 0.2;
-constexpr double kOnePlace = 0.8;  // of the photos
+constexpr double kOnePlace = 0.8;  // fraction of the photos
 
 using Points = Eigen::Matrix2Xd;
 
-// Of the matched features, from the pictures' centres, in shares of their longer sides.
+// Matched features relative to the centre of the picture, in fractions of its longer side.
 struct Matched {
   Points a, b;
 };
@@ -59,7 +59,7 @@ Eigen::Matrix3Xd Rays(const Points& points, double focal) {
   return rays;
 }
 
-// The rotation that takes the rays of `a` nearest to those of `b` (Kabsch 1976).
+// Rotation that best aligns the rays of `a` with those of `b` (Kabsch 1976).
 Eigen::Matrix3d Rotation(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(b * a.transpose(),
                                               Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -100,7 +100,7 @@ int MostExplained(const Matched& points, double focal, Random* random) {
   return static_cast<int>(std::max(best.size(), Explained(points, from, refined, focal).size()));
 }
 
-// Which photos turned pairs tie together.
+// Groups of photos that are connected by pairs with pure rotation.
 class Groups {
  public:
   explicit Groups(int count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }

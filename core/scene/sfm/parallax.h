@@ -1,6 +1,6 @@
-// Whether photos were taken from different places, judged from their local features before
-// structure-from-motion starts: where nothing but the camera's direction changes, no depth can
-// follow. Pure functions, thread-safe. For this folder only.
+// Detects photos taken from a single place by their local features, before structure-from-motion
+// starts: if the camera only rotates, there is no depth. Pure functions, thread-safe. For this
+// folder only.
 #pragma once
 
 #include <string>
@@ -12,15 +12,15 @@
 
 namespace color3d {
 
-// Two photos as seen through the features that they share.
+// Motion between two photos, measured from shared features.
 struct PairMotion {
   int matches = 0;
   double turned = 0.0;        // share of the matches that a turn of the camera explains, 0..1
   double median_shift = 0.0;  // of the matches, as a share of the photos' longer side
 };
 
-// A turn: one rotation and one focal length, by random samples of two matches, always the same.
-// Matches count as explained within 0.4 % of the longer side.
+// Fits a pure rotation and a focal length by random samples of two matches (deterministic). Matches
+// within 0.4 % of the longer side count as inliers.
 PairMotion MeasureMotion(const LocalFeatures& a, const LocalFeatures& b);
 
 struct ParallaxEvidence {
@@ -31,8 +31,8 @@ struct ParallaxEvidence {
   int largest_place = 0;      // photos that turned pairs tie together, in the largest group
   double median_shift = 0.0;  // over the matched pairs, as a share of the longer side
 
-  // Nearly all pairs that show the same show it from the same place, and nearly all photos are of
-  // that place. False when too few pairs can be told.
+  // True if nearly all overlapping pairs are explained by rotation, and they include nearly all
+  // photos. False if too few pairs can be judged.
   bool IsFromOnePlace() const;
 };
 

@@ -59,7 +59,7 @@ ParallaxEvidence Look(const std::vector<LocalFeatures>& photos) {
   return LookForParallax(photos, pool, {});
 }
 
-TEST(Parallax, ACameraThatStandsStillOrTurnsIsFoundOut) {
+TEST(Parallax, DetectsStaticOrRotatingCamera) {
   Points room(1);
   std::vector<LocalFeatures> still, turning;
   for (int i = 0; i < 20; ++i) {
@@ -76,7 +76,7 @@ TEST(Parallax, ACameraThatStandsStillOrTurnsIsFoundOut) {
   EXPECT_THAT(Describe(Look(still)), testing::HasSubstr("190 of 190 pairs"));
 }
 
-TEST(Parallax, ACameraThatMovesIsNot) {
+TEST(Parallax, AcceptsMovingCamera) {
   Points room(2);
   std::vector<LocalFeatures> sideways, slowly, ahead;
   for (int i = 0; i < 20; ++i) {
@@ -90,7 +90,7 @@ TEST(Parallax, ACameraThatMovesIsNot) {
   }
 }
 
-TEST(Parallax, PhotosThatShareNothingOrNothingAtAllTellNothing) {
+TEST(Parallax, UnrelatedOrFlatPhotosAreUndecided) {
   std::vector<LocalFeatures> strangers;
   for (uint64_t i = 0; i < 6; ++i) strangers.push_back(Points(10 + i).Seen({0, 0, 0}, 0.0));
   EXPECT_FALSE(Look(strangers).IsFromOnePlace());

@@ -1,5 +1,5 @@
-// How much photos have in common, judged from a few local features each. Pure functions,
-// thread-safe. For this folder only.
+// Similarity of photos, from a few local features each. Pure functions, thread-safe. For this
+// folder only.
 #pragma once
 
 #include <utility>
@@ -28,10 +28,10 @@ class SimilarityTable {
   std::vector<float> values_;
 };
 
-// How many MutualMatches there are.
+// Number of MutualMatches.
 int CountMutualMatches(const LocalFeatures& a, const LocalFeatures& b);
 
-// Matches of every pair, as pre-emptive matching does it (Wu 2013, "Towards linear-time incremental
+// Counts matches of every pair by pre-emptive matching (Wu 2013, "Towards linear-time incremental
 // structure from motion"). Cost: n^2 / 2 pairs of about 1 ms. Checks `cancel` for every photo.
 SimilarityTable CompareAll(const std::vector<LocalFeatures>& photos,
                            ThreadPool& pool,

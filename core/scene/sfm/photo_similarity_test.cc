@@ -23,7 +23,7 @@ LocalFeatures RandomFeatures(int count, uint64_t seed) {
   return features;
 }
 
-TEST(PhotoSimilarity, CountsWhatPhotosShare) {
+TEST(PhotoSimilarity, CountsSharedFeatures) {
   const LocalFeatures a = RandomFeatures(40, 1);
   LocalFeatures b = RandomFeatures(30, 2);
   EXPECT_LE(CountMutualMatches(a, b), 2);
@@ -37,7 +37,7 @@ TEST(PhotoSimilarity, CountsWhatPhotosShare) {
 }
 
 // Repeated structure says nothing: of two equal features none is clearly the nearest.
-TEST(PhotoSimilarity, AmbiguousFeaturesDoNotCount) {
+TEST(PhotoSimilarity, IgnoresAmbiguousFeatures) {
   const LocalFeatures a = RandomFeatures(10, 1);
   LocalFeatures twice = a;
   twice.descriptors.insert(twice.descriptors.end(), a.descriptors.begin(), a.descriptors.end());

@@ -24,9 +24,9 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Up to here matching all pairs is the answer to every doubt; beyond it takes hours.
+// Up to this number of photos, all pairs are matched as a fallback; beyond it that takes hours.
 constexpr size_t kExhaustiveLimit = 60;
-// Enough to tell photos apart; fewer where the number of pairs makes up for it.
+// Enough features to compare photos; fewer are used if there are many pairs.
 constexpr int kMaxLocalFeatures = 300;
 constexpr int kMinLocalFeatures = 100;
 
@@ -49,7 +49,7 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// The stages of one run, the best model so far, and what was done for it.
+// Stages of one run, the best model so far, and how it was obtained.
 class Solver {
  public:
   Solver(ColmapProcess& colmap,
@@ -67,7 +67,7 @@ class Solver {
         run_(run),
         report_(report) {}
 
-  // An empty model when nothing was placed.
+  // Empty model if no photo was registered.
   ColmapModel Solve(const PairPlan& plan) {
     const bool planned = plan.pairs.size() < AllPairs(Count()).size();
     if (planned) {
@@ -101,13 +101,13 @@ class Solver {
   bool AreNearlyAllPlaced() const {
     return IsHalfPlaced() && 10 * Placed() >= 9 * copies_.names.size();
   }
-  // What is left are pairs between placed photos, and finer features if there are any.
+  // True if further attempts could only add pairs of registered photos, or finer features.
   bool PlannedIsEnough() const {
     return AreNearlyAllPlaced() ||
            (IsHalfPlaced() && (!has_coarse_features_ || copies_.names.size() > kExhaustiveLimit));
   }
 
-  // The most similar pairs gave nothing, and they are not similar.
+  // The most similar pairs failed, and they are not similar.
   bool IsHopeless(const PairPlan& plan) const {
     return Placed() == 0 && plan.related < static_cast<int>(kMinPlaced);
   }
@@ -142,7 +142,7 @@ class Solver {
     Match(plan.pairs);
     Attempt("planned", Strictness::kDefault);
     if (Placed() == copies_.names.size() || IsHopeless(plan)) return;
-    const std::vector<PhotoPair> more = PairsOfUnplaced(PlacedPhotos(), plan.pairs);
+    const std::vector<PhotoPair> more = UnregisteredPairs(PlacedPhotos(), plan.pairs);
     if (AreWorthMatching(more)) {
       colmap_.Note(
           fmt::format("{} photos found a place; matching the others with all: {} more pairs",
@@ -154,7 +154,7 @@ class Solver {
     if (!AreNearlyAllPlaced()) Attempt("straight", Strictness::kStraight);
   }
 
-  // Not when finer features of all photos come next anyway; and frames far apart share nothing.
+  // Skipped if finer features of all photos come next anyway; distant frames share nothing.
   bool AreWorthMatching(const std::vector<PhotoPair>& pairs) const {
     if (pairs.empty() || order_ == PhotoOrder::kSequence) return false;
     return IsHalfPlaced() || !has_coarse_features_;
@@ -193,7 +193,7 @@ class Solver {
   bool is_loose_ = false;
 };
 
-// Before anything that takes minutes.
+// Runs before any step that takes minutes.
 void RequireParallax(const std::vector<LocalFeatures>& features,
                      const ColmapProcess& colmap,
                      PhotoOrder order,
@@ -262,7 +262,8 @@ void RequirePlaced(size_t placed, size_t count, PhotoOrder order, const fs::path
       log.filename().string());
 }
 
-// From COLMAP's cameras for the copies to cameras for the photos, and from its numbers to views.
+// Converts COLMAP's cameras for the copies to cameras for the photos, and its image numbers to
+// views.
 SfmResult SceneOfModel(const ColmapModel& model,
                        const std::vector<Photo>& photos,
                        const std::vector<std::string>& copies) {
@@ -282,7 +283,7 @@ SfmResult SceneOfModel(const ColmapModel& model,
     view.name = photos[i].name;
     view.image_file = photos[i].file;
     view.mask_file = photos[i].mask_file;
-    // The copies are turned upright already, so no more turning.
+    // The copies are already upright: no further rotation.
     view.captured_camera = camera.camera.Scaled(photos[i].width, photos[i].height);
     view.distortion = camera.distortion;
     view.camera = UndistortedCamera(view.captured_camera, view.distortion);
@@ -305,7 +306,7 @@ SfmResult SceneOfModel(const ColmapModel& model,
   return result;
 }
 
-// What an earlier, interrupted run left would be mixed with ours.
+// Files of an earlier, interrupted run must not be mixed with new ones.
 void RemoveEarlierRun(const fs::path& scratch_folder) {
   std::error_code error;
   fs::create_directories(scratch_folder, error);

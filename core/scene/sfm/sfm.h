@@ -18,18 +18,18 @@ struct SfmResult {
   SfmReport report;
 };
 
-// Photos of a place, or frames of films in their order: those are matched with their neighbours, at
-// distances of 1 to 16, and with what other cameras saw alike; all pairs are never tried.
+// kAny: photos of a place. kSequence: consecutive frames of films, matched with their neighbours at
+// distances of 1 to 16 and with similar frames of other cameras; all pairs are never tried.
 enum class PhotoOrder { kAny, kSequence };
 
-// `photos` have been probed and are at least 2. Reduced 8-bit grey copies, COLMAP's database and
-// sfm.log are left in `scratch_folder`. Matches planned pairs, then the photos that found no place
-// with all. While fewer than nine tenths of the photos find a place, tries a straight lens and a
-// small first angle; then, with coarse features and not very many photos, all pairs of fine ones.
-// While fewer than half find a place: all pairs in any case, and loose thresholds last. Models with
-// too few points or an absurd lens do not count. Throws Error: photos that were all taken from one
-// place, which is found out first, fewer than 3 placed (kInvalidArgument), COLMAP not installed
-// (kFailedPrecondition), too slow (kDeadlineExceeded), cancelled.
+// Requires: at least 2 `photos`, probed. Leaves reduced 8-bit grey copies, COLMAP's database and
+// sfm.log in `scratch_folder`. Matches planned pairs, then the unregistered photos with all others.
+// While fewer than nine tenths are registered, tries a straight lens and a smaller initial angle;
+// then, with coarse features and not too many photos, all pairs of fine features. While fewer than
+// half are registered, tries all pairs in any case, and loose thresholds last. Models with too few
+// points or an absurd lens are rejected. Throws Error: photos taken from one place (detected
+// first), fewer than 3 registered (kInvalidArgument), COLMAP not installed (kFailedPrecondition),
+// too slow (kDeadlineExceeded), cancelled.
 SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& scratch_folder,

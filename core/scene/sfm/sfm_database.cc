@@ -24,14 +24,14 @@ SfmDatabase::SfmDatabase(const std::filesystem::path& file)
       SQLITE_OK) {
     throw connection_->Failed("open");
   }
-  // A worker in its sandbox may write beside the database, and in no folder for temporary files.
+  // A sandboxed worker may write beside the database, but not in folders for temporary files.
   connection_->Run("PRAGMA temp_store = MEMORY");
 }
 
 SfmDatabase::~SfmDatabase() = default;
 
 void SfmDatabase::NumberPhotosByName() {
-  // Numbers that are out of the way first: they are unique at every moment.
+  // First assigns numbers out of range, since numbers must be unique at all times.
   connection_->Run(
       "BEGIN;"
       "CREATE TEMP TABLE numbers AS SELECT image_id AS old, 1000000000 + "
@@ -47,7 +47,7 @@ void SfmDatabase::NumberPhotosByName() {
       "COMMIT");
 }
 
-std::string SfmDatabase::DescriptorsOf(const std::string& photo) {
+std::string SfmDatabase::ReadDescriptors(const std::string& photo) {
   sqlite3_stmt* statement = nullptr;
   if (sqlite3_prepare_v2(connection_->db,
                          "SELECT data FROM descriptors JOIN images USING (image_id) WHERE name = ?",

@@ -1,5 +1,5 @@
-// What COLMAP keeps of photos and features, in a database of its own that nobody else sees (SQLite;
-// COLMAP 3.8, src/base/database.h). For this folder only. Not thread-safe.
+// COLMAP's database of photos and features (SQLite; COLMAP 3.8, src/base/database.h). For this
+// folder only. Not thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -11,19 +11,19 @@ namespace color3d {
 
 class SfmDatabase {
  public:
-  // No program of COLMAP's may be running on it. Throws Error{kInternal}, also below, for what is
-  // no database of COLMAP's.
+  // Requires: no COLMAP process uses the file. All functions throw Error{kInternal} if it is no
+  // database of COLMAP's.
   explicit SfmDatabase(const std::filesystem::path& file);
   ~SfmDatabase();
   SfmDatabase(const SfmDatabase&) = delete;
   SfmDatabase& operator=(const SfmDatabase&) = delete;
 
-  // Gives photos numbers in the order of their names. COLMAP's follow from which thread was ready
-  // first, and what the mapper does follows from them. To be called before photos are matched.
+  // Numbers the photos in the order of their names. COLMAP numbers them in the order in which
+  // threads finish, and the mapper's results depend on it. Requires: photos are not matched yet.
   void NumberPhotosByName();
 
-  // The bytes of a photo's descriptors; empty for a photo without any.
-  std::string DescriptorsOf(const std::string& photo);
+  // Descriptors of a photo as bytes; empty if it has none.
+  std::string ReadDescriptors(const std::string& photo);
 
  private:
   struct Connection;

@@ -46,19 +46,19 @@ class SfmDatabaseTest : public testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(SfmDatabaseTest, PhotosAreNumberedByName) {
+TEST_F(SfmDatabaseTest, NumbersPhotosByName) {
   SfmDatabase(file()).NumberPhotosByName();
   EXPECT_EQ(Run("SELECT image_id, name FROM images ORDER BY image_id"), "1|a 2|b 3|c 4|d ");
   EXPECT_EQ(Run("SELECT image_id, data FROM keypoints ORDER BY image_id"), "1|ka 2|kb 4|kd ");
   EXPECT_EQ(Run("SELECT image_id, data FROM descriptors ORDER BY image_id"), "1|da 2|db 4|dd ");
   SfmDatabase database(file());
-  EXPECT_EQ(database.DescriptorsOf("d"), "dd");
-  EXPECT_EQ(database.DescriptorsOf("c"), "");
-  EXPECT_EQ(database.DescriptorsOf("nothing"), "");
+  EXPECT_EQ(database.ReadDescriptors("d"), "dd");
+  EXPECT_EQ(database.ReadDescriptors("c"), "");
+  EXPECT_EQ(database.ReadDescriptors("nothing"), "");
 }
 
 // As a worker: it may write beside the database and nowhere else.
-TEST_F(SfmDatabaseTest, NeedsNoFolderForTemporaryFiles) {
+TEST_F(SfmDatabaseTest, NeedsNoTemporaryFolder) {
   SandboxRules rules;
   rules.writable = {folder_.path()};
   const Sandbox sandbox(rules);
@@ -79,7 +79,7 @@ TEST_F(SfmDatabaseTest, NeedsNoFolderForTemporaryFiles) {
   EXPECT_EQ(Run("SELECT image_id, name FROM images WHERE image_id = 1"), "1|a ");
 }
 
-TEST_F(SfmDatabaseTest, WhatIsNoDatabaseIsSaid) {
+TEST_F(SfmDatabaseTest, RefusesOtherFiles) {
   WriteFileAtomic(file(), std::string(5000, 'x'));
   EXPECT_THROW(SfmDatabase(file()).NumberPhotosByName(), Error);
   EXPECT_THROW(SfmDatabase(folder_.path() / "none.db"), Error);

@@ -32,7 +32,7 @@ std::vector<std::string> MapperThresholds(Strictness strictness) {
   return arguments;
 }
 
-// False for models that only look like one: a handful of points, or a lens that no one builds.
+// Returns false for degenerate models: very few points, or an absurd lens.
 bool IsPlausible(const ColmapModel& model) {
   constexpr size_t kPointsPerPhoto = 10;
   if (model.points.size() < kPointsPerPhoto * model.images.size()) return false;
@@ -49,7 +49,7 @@ bool IsPlausible(const ColmapModel& model) {
   return true;
 }
 
-// The plausible model with the most photos below `folder`; nullopt when there is none.
+// Returns the plausible model with the most photos below `folder`; nullopt if there is none.
 std::optional<ColmapModel> BestModel(const fs::path& folder, fs::path* where) {
   std::optional<ColmapModel> best;
   std::set<fs::path> candidates;
@@ -95,11 +95,11 @@ std::optional<ColmapModel> MapPhotos(ColmapProcess& colmap,
   const ColmapPhase phase{"placing cameras (" + attempt + " attempt)",
                           "Registering image",
                           static_cast<int64_t>(count)};
-  colmap.Run(std::move(arguments), phase);  // another exit code than 0 says: no model
+  colmap.Run(std::move(arguments), phase);  // a nonzero exit code means no model
   fs::path where;
   std::optional<ColmapModel> best = BestModel(output, &where);
   if (!best || strictness == Strictness::kDefault) return best;
-  // Now that the cameras stand, the lens may bend.
+  // Once cameras are registered, distortion is estimated.
   const fs::path refined = work.folder / ("models_" + attempt + "_refined") / "0";
   fs::create_directories(refined);
   const int code = colmap.Run(

@@ -1,5 +1,4 @@
-// From matched features to cameras: COLMAP's mapper, as strict or loose as it takes. For this
-// folder only.
+// Runs COLMAP's mapper, with thresholds as strict as the photos allow. For this folder only.
 #pragma once
 
 #include <cstddef>
@@ -12,18 +11,18 @@
 
 namespace color3d {
 
-// How much the mapper insists on. Straight: a smaller angle between the first two photos, and no
-// lens distortion until all cameras stand, because on walks straight ahead distortion and motion
-// explain each other and the mapper gives up with an absurd lens. Loose: fewer common points, too,
-// which may join what does not belong together.
+// Thresholds of the mapper. Straight: a smaller angle between the first two photos, and no lens
+// distortion until all cameras are registered; for forward motion, distortion and motion explain
+// each other and the mapper fails with an absurd lens. Loose: fewer common points, too, which may
+// join unrelated photos.
 enum class Strictness { kDefault, kStraight, kLoose };
 
-// Fewer photos than this make no scene.
+// Minimum number of registered photos.
 inline constexpr size_t kMinPlaced = 3;
 
-// The plausible model with the most photos; nullopt when there is none: models with too few points
-// or an absurd lens do not count. `attempt` names the run in messages and folders, `count` is the
-// number of photos. Throws Error: cancelled, too slow.
+// Returns the plausible model with the most photos; nullopt if there is none. Models with too few
+// points or an absurd lens are rejected. `attempt` names the run in messages and folders, `count`
+// is the number of photos. Throws Error: cancelled, too slow.
 std::optional<ColmapModel> MapPhotos(ColmapProcess& colmap,
                                      const SfmWorkspace& work,
                                      size_t count,

@@ -15,12 +15,12 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Photos at least this long have enough features without being enlarged.
+// Photos of at least this size have enough features without being enlarged.
 constexpr int kCoarseFromSidePx = 900;
-// Pairs per call: what happens between two reports of progress.
+// Pairs matched between two reports of progress.
 constexpr size_t kPairsPerCall = 100;
 
-// COLMAP's parameters f, cx, cy, k of a camera with a known focal length.
+// COLMAP's parameters f, cx, cy, k of a camera with known focal length.
 std::string CameraParameters(const FeatureImages::Group& group) {
   return fmt::format(
       "{:.3f},{:.1f},{:.1f},0", group.focal_px, 0.5 * group.width, 0.5 * group.height);
@@ -32,7 +32,8 @@ void WriteLines(const fs::path& file, const std::vector<std::string>& lines) {
   WriteFileAtomic(file, text);
 }
 
-// With the log of a program that was stopped: SQLite would play it into the next database.
+// Also removes the write-ahead log of an interrupted run, which SQLite would apply to the new
+// database.
 void RemoveDatabase(const SfmWorkspace& work) {
   for (const char* suffix : {"", "-wal", "-shm", "-journal"}) {
     std::error_code error;
@@ -40,7 +41,7 @@ void RemoveDatabase(const SfmWorkspace& work) {
   }
 }
 
-// The descriptors of photos that some pairs name, by number of the photo; of the others none.
+// Descriptors of the photos in the pairs, by number; empty for all other photos.
 std::map<int, SiftDescriptors> DescriptorsFor(const SfmWorkspace& work,
                                               const FeatureImages& photos,
                                               const std::vector<PhotoPair>& pairs) {
@@ -49,18 +50,18 @@ std::map<int, SiftDescriptors> DescriptorsFor(const SfmWorkspace& work,
   for (const PhotoPair& pair : pairs) {
     for (const int photo : {pair.first, pair.second}) {
       if (descriptors.contains(photo)) continue;
-      descriptors.emplace(photo, SiftDescriptors(database.DescriptorsOf(photos.names[photo])));
+      descriptors.emplace(photo, SiftDescriptors(database.ReadDescriptors(photos.names[photo])));
     }
   }
   return descriptors;
 }
 
-// A pair's matches as COLMAP imports them: the names, a line for each match, an empty line. Nothing
-// where there are too few to say anything.
+// Matches of a pair in COLMAP's import format: the names, a line for each match, an empty line.
+// Empty if there are too few matches.
 std::string TextOfMatches(const FeatureImages& photos,
                           const PhotoPair& pair,
                           const std::vector<std::pair<int, int>>& matches) {
-  constexpr size_t kFewest = 15;  // as the mapper's
+  constexpr size_t kFewest = 15;  // as in the mapper
   if (matches.size() < kFewest) return "";
   std::string text = photos.names[pair.first] + " " + photos.names[pair.second] + "\n";
   for (const auto& [x, y] : matches) text += fmt::format("{} {}\n", x, y);
@@ -142,7 +143,8 @@ void MatchPairs(ColmapProcess& colmap,
     if (text.empty()) continue;
     const fs::path list = work.folder / "matches.txt";
     WriteFileAtomic(list, text);
-    // It verifies one pair after the other, on one thread: what is random follows from the seed.
+    // COLMAP verifies pairs in sequence on one thread, so that its random numbers follow from the
+    // seed.
     colmap.RunOrThrow({"matches_importer",
                        "--random_seed",
                        "0",

@@ -1,5 +1,4 @@
-// Features of photos and matches between them: COLMAP's programs up to the mapper. For this folder
-// only.
+// Features of photos and their matches: COLMAP's commands before the mapper. For this folder only.
 #pragma once
 
 #include <filesystem>
@@ -13,7 +12,7 @@
 
 namespace color3d {
 
-// Where one run keeps its files.
+// Files of one run.
 struct SfmWorkspace {
   std::filesystem::path folder;
   std::filesystem::path images() const { return folder / "photos"; }
@@ -21,21 +20,21 @@ struct SfmWorkspace {
   std::filesystem::path database() const { return folder / "database.db"; }
 };
 
-// Coarse: without the octave of enlarged photos, which costs three quarters of the time and whose
-// features repeat less well. Small photos need it, so they are always fine.
+// Coarse: without the octave of enlarged photos, which takes three quarters of the time and whose
+// features are less repeatable. Small photos need it and are always fine.
 enum class FeatureDetail { kCoarse, kFine };
 
-// SIFT of all photos into a new database, which numbers them by name. Photos of one folder share a
-// camera. True when some got coarse features.
+// Extracts SIFT features of all photos into a new database, which numbers them by name. Photos of
+// one folder share a camera. Returns true if some got coarse features.
 bool ExtractFeatures(ColmapProcess& colmap,
                      const SfmWorkspace& work,
                      const FeatureImages& photos,
                      const ImportOptions& options,
                      FeatureDetail detail);
 
-// Matches and verifies what the database does not hold yet. The same photos and pairs always give
-// the same matches, whatever the number of threads: COLMAP's own matcher does not (its trees of
-// features are random).
+// Matches and verifies the pairs that the database lacks. Deterministic for the same photos and
+// pairs, whatever the number of threads, unlike COLMAP's own matcher (its feature trees are
+// random).
 void MatchPairs(ColmapProcess& colmap,
                 const SfmWorkspace& work,
                 const FeatureImages& photos,

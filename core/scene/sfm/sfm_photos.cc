@@ -15,7 +15,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Small enough to be cheap, large enough that photos of the same things have features in common.
+// Small enough to be cheap, large enough that photos of the same objects share features.
 constexpr int kSimilaritySidePx = 384;
 constexpr int kMaxPhotosInMemory = 4;
 
@@ -42,7 +42,7 @@ std::string GroupFolder(const FeatureImages::Group& group) {
   return name;
 }
 
-// The features that do not lie where `mask`, of any size, is 0.
+// Drops features where `mask`, of any size, is 0.
 LocalFeatures Unmasked(const LocalFeatures& features, const Image& mask) {
   LocalFeatures kept;
   kept.side_px = features.side_px;
@@ -78,7 +78,7 @@ Image FeatureImage(const Image& photo, int max_side_px) {
   }
   const auto [low, high] = UsedRange(gray);
   if (high - low < 0.5f) {
-    // A flat picture stays flat: noise is not stretched more than 16-fold.
+    // Flat pictures stay flat: noise is amplified at most 16-fold.
     const float scale = 1.0f / std::max(high - low, 1.0f / 16.0f);
     for (float& v : gray.data) v = (v - low) * scale;
   }
@@ -122,7 +122,7 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
       if (!mask.Empty()) written.features[i] = Unmasked(written.features[i], mask);
     }
   };
-  // Observers are called from one thread; large photos take memory, hence not too many at a time.
+  // Observers are called from one thread. The number of photos in memory is limited.
   const int64_t batch = std::min(run.pool.thread_count(), kMaxPhotosInMemory);
   for (int64_t begin = 0; begin < count; begin += batch) {
     run.progress.OnProgress(begin, count, fmt::format("reading photos {}/{}", begin + 1, count));

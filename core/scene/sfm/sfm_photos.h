@@ -1,4 +1,4 @@
-// Copies of the photos that COLMAP can read whatever the originals are. For this folder only.
+// Copies of the photos in a format that COLMAP reads. For this folder only.
 #pragma once
 
 #include <filesystem>
@@ -12,13 +12,14 @@
 
 namespace color3d {
 
-// 1 channel, 0..1, for feature detection: luma, reduced to max_side_px, and stretched when the
-// photo uses less than half of the range (16-bit scans often do; SIFT's threshold is absolute).
+// Returns luma for feature detection: 1 channel, 0..1, reduced to max_side_px, and stretched if the
+// photo uses less than half of the range (16-bit scans often do; the threshold of SIFT is
+// absolute).
 Image FeatureImage(const Image& photo, int max_side_px);
 
-// The copies on disk and what was seen on the way.
+// The copies on disk, and facts found while they were written.
 struct FeatureImages {
-  // Photos that share a folder and with it a lens: one camera, the same size and focal length.
+  // Photos of one folder, size and focal length: they share a camera.
   struct Group {
     int width = 0;  // of the copies, px
     int height = 0;
@@ -33,9 +34,9 @@ struct FeatureImages {
 };
 
 // Writes photo i as <width>x<height>[_f<focal>][_c<camera>]/<i + 1 as 6 digits>.png below `folder`,
-// EXIF orientation applied, and its mask, if it has one, as the same name with .png added below
-// `mask_folder`, as COLMAP wants it. `local_features` > 0: also finds so many features in each
-// photo, of which those that are masked out are dropped.
+// with EXIF orientation applied, and its mask, if any, under the same name with .png added below
+// `mask_folder`, as COLMAP expects. If `local_features` > 0, also finds that many features in each
+// photo, without masked ones.
 FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& folder,

@@ -16,7 +16,7 @@
 namespace color3d {
 namespace {
 
-TEST(FeatureImages, DullPhotosAreStretchedOthersNot) {
+TEST(FeatureImages, StretchesLowContrastPhotosOnly) {
   Image dull = GradientPhoto(64, 64, 1);
   for (float& v : dull.data) v = 0.4f + 0.1f * v;
   const Image stretched = FeatureImage(dull, 1000);

@@ -56,7 +56,7 @@ class Sfm : public testing::Test {
   QuietRun run_;
 };
 
-TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
+TEST_F(Sfm, FindsCamerasOfRenderedRoom) {
   const std::vector<Pose> truth = RoomPoses(7);
   for (int i = 0; i < 7; ++i) {
     Image photo = RenderCorner(kRoomCamera, truth[i]);
@@ -103,7 +103,7 @@ TEST_F(Sfm, FindsTheCamerasOfARenderedRoom) {
 
 // Something that goes along with the camera, as a bonnet does, would tell that it stands still.
 // Whatever the number of threads, and whichever of them is ready first.
-TEST_F(Sfm, TheSamePhotosAlwaysGiveTheSameCameras) {
+TEST_F(Sfm, IsDeterministic) {
   const std::vector<Pose> poses = RoomPoses(6);
   for (int i = 0; i < 6; ++i) {
     WriteFileAtomic(folder_.path() / PhotoName(i),
@@ -118,7 +118,7 @@ TEST_F(Sfm, TheSamePhotosAlwaysGiveTheSameCameras) {
   }
 }
 
-TEST_F(Sfm, WhatIsMaskedOutDoesNotPlaceCameras) {
+TEST_F(Sfm, IgnoresMaskedFeatures) {
   const std::vector<Pose> truth = RoomPoses(7);
   Random random(5);
   Image bonnet(400, 150, 1);
@@ -151,7 +151,7 @@ TEST_F(Sfm, WhatIsMaskedOutDoesNotPlaceCameras) {
 }
 
 // Enough photos that most pairs are left out, from a camera that says its focal length.
-TEST_F(Sfm, PlannedPairsOfPhotosWithAFocalLength) {
+TEST_F(Sfm, MatchesPlannedPairsWithFocalLength) {
   constexpr int kCount = 14;
   const Camera camera = kRoomCamera.Scaled(320, 240);
   const std::vector<Pose> poses = RoomPoses(kCount);
@@ -173,7 +173,7 @@ TEST_F(Sfm, PlannedPairsOfPhotosWithAFocalLength) {
   EXPECT_THAT(log, HasSubstr("(Prior)"));
 }
 
-TEST_F(Sfm, PhotosThatShareNothingAreRefusedInOneLine) {
+TEST_F(Sfm, RefusesUnrelatedPhotosInOneLine) {
   Random random(1);
   for (int i = 0; i < 4; ++i) {
     Image photo(200, 150, 1);
@@ -188,7 +188,7 @@ TEST_F(Sfm, PhotosThatShareNothingAreRefusedInOneLine) {
 }
 
 // Many: comparing all pairs would take minutes and find nothing.
-TEST_F(Sfm, ManyPhotosThatShareNothingAreNotComparedForLong) {
+TEST_F(Sfm, RefusesManyUnrelatedPhotosQuickly) {
   for (int i = 0; i < 24; ++i) {
     Random random(static_cast<uint64_t>(i + 1));
     Image coarse(32, 24, 1);
@@ -202,7 +202,7 @@ TEST_F(Sfm, ManyPhotosThatShareNothingAreNotComparedForLong) {
 }
 
 // A film of a fixed camera: noise, and something that passes by. COLMAP has not even started.
-TEST_F(Sfm, ACameraThatStandsStillIsRefusedAtOnce) {
+TEST_F(Sfm, RefusesStaticCameraAtOnce) {
   const Image background = RenderCorner(kRoomCamera, RoomPoses(3)[1]);
   Random random(4);
   for (int i = 0; i < 40; ++i) {
@@ -225,14 +225,14 @@ TEST_F(Sfm, ACameraThatStandsStillIsRefusedAtOnce) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
 }
 
-TEST_F(Sfm, FlatPhotosAndTwoPhotosAreRefused) {
+TEST_F(Sfm, RefusesFlatPhotosAndTwoPhotos) {
   for (int i = 0; i < 2; ++i) {
     WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(Image(64, 48, 1, 0.5f)));
   }
   EXPECT_THAT(Refusal([&] { Run(); }), HasSubstr("2 photos could be placed"));
 }
 
-TEST_F(Sfm, CancellationStopsTheChild) {
+TEST_F(Sfm, CancellationStopsChild) {
   const std::vector<Pose> poses = RoomPoses(6);
   for (int i = 0; i < 6; ++i) {
     WriteFileAtomic(folder_.path() / PhotoName(i), EncodePng8(RenderCorner(kRoomCamera, poses[i])));
@@ -253,7 +253,7 @@ std::vector<LocalFeatures> FeaturesOf(const fs::path& folder) {
   return features;
 }
 
-TEST(Parallax, RealCapturesAreToldFromAFixedCamera) {
+TEST(Parallax, TellsRealCapturesFromStaticCamera) {
   const fs::path data = COLOR3D_SHARED_DATA;
   if (!fs::exists(data / "scenes/fern/images")) GTEST_SKIP() << "no " << data;
   ThreadPool pool(2);
@@ -276,7 +276,7 @@ TEST(Parallax, RealCapturesAreToldFromAFixedCamera) {
   }
 }
 
-TEST_F(Sfm, RealPhotosAgreeWithTheirModel) {
+TEST_F(Sfm, AgreesWithModelOfRealPhotos) {
   const fs::path sceaux = fs::path(COLOR3D_SHARED_DATA) / "scenes/sceaux";
   if (!fs::exists(sceaux / "sparse/0")) GTEST_SKIP() << "no " << sceaux;
   for (const auto& entry : fs::directory_iterator(sceaux / "images")) {

@@ -25,7 +25,7 @@ GaussianModel OneGaussian(double l, double a, double b) {
 double AOf(const GaussianModel& model) { return model.sh_a[0] * kShDc * 255.0; }
 double BOf(const GaussianModel& model) { return model.sh_b[0] * kShDc * 255.0; }
 
-TEST(ChromaAdjustment, NoneLeavesTheModelBitForBit) {
+TEST(ChromaAdjustment, DefaultKeepsModelBitForBit) {
   GaussianModel model = OneGaussian(40.0, 12.3, -7.7);
   AdjustChroma({}, &model);
   const GaussianModel same = OneGaussian(40.0, 12.3, -7.7);
@@ -33,7 +33,7 @@ TEST(ChromaAdjustment, NoneLeavesTheModelBitForBit) {
   EXPECT_EQ(model.sh_b, same.sh_b);
 }
 
-TEST(ChromaAdjustment, SaturationIsAFactorOnChroma) {
+TEST(ChromaAdjustment, SaturationScalesChroma) {
   GaussianModel model = OneGaussian(40.0, 12.0, -8.0);
   AdjustChroma({.saturation = 1.5}, &model);
   EXPECT_NEAR(AOf(model), 18.0, 1e-4);
@@ -42,7 +42,7 @@ TEST(ChromaAdjustment, SaturationIsAFactorOnChroma) {
   EXPECT_EQ(AOf(model), 0.0);
 }
 
-TEST(ChromaAdjustment, AMiddleGrayBecomesTheTintAndWarmthAskedFor) {
+TEST(ChromaAdjustment, MiddleGrayTakesTintAndWarmth) {
   GaussianModel model = OneGaussian(50.0, 0.0, 0.0);
   AdjustChroma({.tint = -6.0, .warmth = 14.0}, &model);
   EXPECT_NEAR(AOf(model), -6.0, 1e-4);
@@ -74,7 +74,7 @@ TEST(ChromaAdjustment, WhiteBalanceIsVonKriesInXyz) {
   }
 }
 
-TEST(ChromaAdjustment, RefusesWhatIsOutOfRange) {
+TEST(ChromaAdjustment, RejectsOutOfRangeValues) {
   GaussianModel model = OneGaussian(50.0, 1.0, 1.0);
   EXPECT_THROW(AdjustChroma({.saturation = -0.1}, &model), Error);
   EXPECT_THROW(AdjustChroma({.saturation = std::nan("")}, &model), Error);

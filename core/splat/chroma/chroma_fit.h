@@ -18,22 +18,22 @@
 namespace color3d {
 
 // Target chroma of one training view at the working size: 2 channels (Lab units), an optional
-// 1-channel weight 0..1 (empty: all 1), and how sure the colour is, 1 channel 0..1 (empty:
+// 1-channel weight 0..1 (empty: all 1), and the confidence of the colour, 1 channel 0..1 (empty:
 // unknown).
 struct ChromaTarget {
   Image ab;
   Image weight;
   Image confidence;
 };
-// May return null for a view that has no colours. The same each time that it is asked for a view,
-// which may be often, by several threads at once.
+// Returns null for a view without colours. Must return the same target for a view at every call;
+// called often and by several threads at once.
 using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
 
 struct ChromaProblem {
   std::vector<PosedCamera> training;
   ChromaTargetSource targets;
-  // For measurements, may be empty: called after the closed form, after every round of conjugate
-  // gradients and at growing intervals of Adam, with a way to get the model of that moment.
+  // For measurements, may be empty. Called after the closed form, after every round of conjugate
+  // gradients and at growing intervals of Adam, with a function that returns the current model.
   std::function<void(int64_t iteration, const std::function<GaussianModel()>& model)> snapshot;
 };
 
@@ -45,12 +45,12 @@ ChromaProblem ChromaProblemOf(const Scene& scene,
 // Expands a 1-channel model to L', a', b' and fits chroma with geometry fixed: closed form first
 // (visibility-weighted mean per Gaussian), then least absolute residuals of a', b' by
 // ordered-subsets sweeps and reweighted conjugate gradients, or Adam on 0.8 L1 + 0.2 (1 - SSIM).
-// Gaussians that no training view sees get their nearest seen neighbours' chroma. When all targets
-// say their confidence, the model's is its mean over the pixels that show the Gaussian, weighted as
-// in the closed form, and 0 for one that no view sees. Curves:
-// "train_l1_ab" (Lab units) and, of conjugate gradients, "chroma_residual" (relative). Throws
-// Error{kInvalidArgument} for targets of another size than the view's camera or with values that
-// are not finite, Error{kCancelled}.
+// Gaussians that no training view sees take the chroma of their nearest visible neighbours. If all
+// targets have a confidence, the model's confidence is its mean over the pixels that show the
+// Gaussian, weighted as in the closed form, and 0 for Gaussians that no view sees. Curves:
+// "train_l1_ab" (Lab units) and, with conjugate gradients, "chroma_residual" (relative). Throws
+// Error{kInvalidArgument} for targets whose size differs from the view's camera or whose values are
+// not finite, Error{kCancelled}.
 GaussianModel FitChroma(const GaussianModel& geometry,
                         const ChromaProblem& problem,
                         const ChromaOptions& options,

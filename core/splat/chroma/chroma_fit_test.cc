@@ -75,7 +75,7 @@ double AbError(const GaussianModel& model, const ProceduralScene& s, int view, T
   return sum / (2.0 * static_cast<double>(r.lab.PlaneSize()));
 }
 
-TEST(FitChromaTest, ClosedFormIsCloseAndAdamGetsCloser) {
+TEST(FitChromaTest, AdamImprovesOnClosedForm) {
   const ProceduralScene s = MakeRoomCorner(5, 80, 60, 3000);
   ThreadPool pool(2);
   NoCheckpoints none;
@@ -95,7 +95,7 @@ TEST(FitChromaTest, ClosedFormIsCloseAndAdamGetsCloser) {
   EXPECT_LT(errors[1], 0.7 * errors[0]);
 }
 
-TEST(FitChromaTest, UnseenGaussiansTakeTheirNeighborsColors) {
+TEST(FitChromaTest, UnseenGaussiansTakeNeighborColors) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 48, 1500);
   GaussianModel geometry = GreyRoom(s);
   // One far behind all cameras, and one on the floor before them but transparent.
@@ -117,7 +117,7 @@ TEST(FitChromaTest, UnseenGaussiansTakeTheirNeighborsColors) {
   EXPECT_GT(std::hypot(a, b), 10.0);  // some wall's colour, not grey
 }
 
-TEST(FitChromaTest, PixelsOfNoWeightDoNotCount) {
+TEST(FitChromaTest, IgnoresPixelsOfZeroWeight) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 48, 1500);
   ThreadPool pool(2);
   NoCheckpoints none;
@@ -137,7 +137,7 @@ TEST(FitChromaTest, PixelsOfNoWeightDoNotCount) {
   EXPECT_LT(AbError(model, s, 2, pool), 8.0);
 }
 
-TEST(FitChromaTest, ConfidenceIsTheMeanOverThePixelsThatShowTheGaussian) {
+TEST(FitChromaTest, ConfidenceIsMeanOverVisiblePixels) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 48, 1500);
   ThreadPool pool(2);
   NoCheckpoints none;
@@ -180,7 +180,7 @@ TEST(FitChromaTest, ConfidenceIsTheMeanOverThePixelsThatShowTheGaussian) {
   EXPECT_TRUE(fit().confidence.empty());
 }
 
-TEST(FitChromaTest, ATargetOfAnotherSizeIsRefused) {
+TEST(FitChromaTest, RejectsTargetOfWrongSize) {
   const ProceduralScene s = MakeRoomCorner(2, 64, 48, 100);
   ThreadPool pool(1);
   NoCheckpoints none;
@@ -195,7 +195,7 @@ TEST(FitChromaTest, ATargetOfAnotherSizeIsRefused) {
                Error);
 }
 
-TEST(FitChromaTest, NoWeightAnywhereLeavesNeutralChroma) {
+TEST(FitChromaTest, ZeroWeightsGiveNeutralChroma) {
   ChromaProblem problem = RandomProblem(2, 6);
   problem.targets = [](int) {
     auto target = std::make_shared<ChromaTarget>();
@@ -206,19 +206,19 @@ TEST(FitChromaTest, NoWeightAnywhereLeavesNeutralChroma) {
   ExpectFiniteAndBelow(Fit(RandomGaussians(30, 4), problem, {}), 0.0);
 }
 
-TEST(FitChromaTest, NoViewHasColors) {
+TEST(FitChromaTest, NoColoredViewGivesNeutralChroma) {
   ChromaProblem problem = RandomProblem(2, 6);
   problem.targets = [](int) { return nullptr; };
   ExpectFiniteAndBelow(Fit(RandomGaussians(30, 4), problem, {}), 0.0);
 }
 
-TEST(FitChromaTest, OnePixelColorsAllGaussiansAlike) {
+TEST(FitChromaTest, OnePixelColorsAllGaussiansEqually) {
   const GaussianModel model =
       Fit(RandomGaussians(30, 4), ConstantProblem(1, 40.0f, -20.0f, 1, 1), {});
   ExpectFiniteAndBelow(model, 100.0);  // the pixel is half transparent
 }
 
-TEST(FitChromaTest, AConstantTargetGivesItsColorWhereTheSceneIsSolid) {
+TEST(FitChromaTest, ConstantTargetGivesConstantColor) {
   for (const int degree : {0, 1}) {
     ChromaOptions options;
     options.chroma_sh_degree = degree;
@@ -235,7 +235,7 @@ TEST(FitChromaTest, AConstantTargetGivesItsColorWhereTheSceneIsSolid) {
   }
 }
 
-TEST(FitChromaTest, CopiesOfOneGaussianShareItsColor) {
+TEST(FitChromaTest, IdenticalGaussiansGetSameColor) {
   GaussianModel copies;
   for (int i = 0; i < 20; ++i) {
     copies.position.insert(copies.position.end(), {0.0f, 0.0f, 3.0f});
@@ -247,7 +247,7 @@ TEST(FitChromaTest, CopiesOfOneGaussianShareItsColor) {
   ExpectFiniteAndBelow(Fit(copies, ConstantProblem(2, 40.0f, -20.0f, kWidth, kHeight), {}), 128.1);
 }
 
-TEST(FitChromaTest, ValuesThatAreNotFiniteAreRefusedWithTheirPlace) {
+TEST(FitChromaTest, NamesPositionOfNonFiniteValue) {
   for (const bool in_weight : {false, true}) {
     ChromaProblem problem = RandomProblem(2, 6);
     const ChromaTargetSource good = problem.targets;
@@ -270,7 +270,7 @@ TEST(FitChromaTest, ValuesThatAreNotFiniteAreRefusedWithTheirPlace) {
   }
 }
 
-TEST(FitChromaTest, ATimeLimitEndsBothSolversEarlyWithSoundChroma) {
+TEST(FitChromaTest, TimeLimitEndsBothSolversEarly) {
   for (const auto solver :
        {ChromaOptions::Solver::kConjugateGradients, ChromaOptions::Solver::kAdam}) {
     ChromaOptions options;
@@ -286,7 +286,7 @@ TEST(FitChromaTest, ATimeLimitEndsBothSolversEarlyWithSoundChroma) {
   }
 }
 
-TEST(FitChromaTest, CancellationIsHeard) {
+TEST(FitChromaTest, CanBeCancelled) {
   ThreadPool pool(1);
   NoCheckpoints none;
   NullObserver observer;

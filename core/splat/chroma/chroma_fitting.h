@@ -1,5 +1,5 @@
-// One fit of chroma as both solvers are given it. Internal to the splat module. References outlive
-// the fit.
+// Inputs of one chroma fit, common to both solvers. Internal to the splat module. References
+// outlive the fit.
 #pragma once
 
 #include <chrono>
@@ -31,7 +31,7 @@ struct ChromaFitting {
     if (!problem.snapshot) return;
     problem.snapshot(iteration, [&] { return parameters.ToModel(geometry); });
   }
-  // True when `seconds` of this attempt and the earlier ones are beyond the limit.
+  // Returns true if the seconds of this attempt and the earlier ones exceed the limit.
   bool OutOfTime(double seconds) const {
     return options.time_limit_seconds > 0.0 && seconds >= options.time_limit_seconds;
   }

@@ -10,12 +10,12 @@
 namespace color3d {
 
 struct ChromaParameters {
-  // Geometry rows, then the coefficients of a' and of b' where luminance stands in a full model.
+  // Geometry rows, followed by the coefficients of a' and of b' in place of those of luminance.
   ParameterBlock block;
   ColorSpec color;  // two channels, neutral when all coefficients are zero
 
   static ChromaParameters From(const GaussianModel& geometry, int chroma_sh_degree);
-  // `geometry` with these chroma coefficients.
+  // Returns `geometry` with these chroma coefficients.
   GaussianModel ToModel(const GaussianModel& geometry) const;
 
   int coefficients() const { return color.channel[0].coefficients; }

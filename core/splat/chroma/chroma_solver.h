@@ -1,7 +1,7 @@
-// Least absolute residuals of chroma (chroma_system.h): a few ordered-subsets sweeps, which take a
-// step per view and so are quick at first, then rounds of reweighting with block-Jacobi
-// preconditioned conjugate gradients on the normal equations of all views. A pull to the closed
-// form keeps Gaussians that few pixels see well-posed. Internal to the splat module.
+// Least absolute residuals of chroma (chroma_system.h): a few ordered-subsets sweeps, which step
+// once per view and converge fast at first, then rounds of reweighting with block-Jacobi
+// preconditioned conjugate gradients on the normal equations of all views. Regularization towards
+// the closed form keeps Gaussians that few pixels see well-posed. Internal to the splat module.
 #pragma once
 
 #include <vector>
@@ -11,9 +11,9 @@
 
 namespace color3d {
 
-// Improves `parameters` (the closed form) in place; Gaussians that are not `seen` are left alone.
-// Reports the curves "train_l1_ab" (Lab units, of single pixels) and "chroma_residual" (norm of the
-// gradient by that of the right side, in the preconditioner's metric).
+// Improves `parameters` (the closed form) in place; Gaussians that are not `seen` are unchanged.
+// Reports the curves "train_l1_ab" (Lab units, per pixel) and "chroma_residual" (norm of the
+// gradient relative to the right-hand side, in the preconditioner's metric).
 void SolveChroma(const ChromaFitting& fitting,
                  const std::vector<char>& seen,
                  ChromaSystem& system,

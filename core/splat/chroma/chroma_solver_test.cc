@@ -78,7 +78,7 @@ Eigen::VectorXd DenseSolution(const GaussianModel& geometry,
 
 class ChromaSolverTest : public testing::TestWithParam<int> {};
 
-TEST_P(ChromaSolverTest, LeastSquaresAgreesWithADenseFactorisation) {
+TEST_P(ChromaSolverTest, AgreesWithDenseFactorization) {
   const GaussianModel geometry = RandomGaussians(40, 3);
   const ChromaProblem problem = RandomProblem(3, 5);
   ChromaOptions options;
@@ -107,7 +107,7 @@ TEST_P(ChromaSolverTest, LeastSquaresAgreesWithADenseFactorisation) {
 
 INSTANTIATE_TEST_SUITE_P(Degrees, ChromaSolverTest, testing::Values(0, 1));
 
-TEST(FitChromaTest, ConjugateGradientsBeatTheClosedFormAndAFewStepsOfAdam) {
+TEST(FitChromaTest, ConjugateGradientsBeatClosedFormAndAdam) {
   const GaussianModel geometry = RandomGaussians(60, 4);
   const ChromaProblem problem = RandomProblem(3, 6);
   std::vector<double> l1;
@@ -133,7 +133,7 @@ TEST(FitChromaTest, ConjugateGradientsBeatTheClosedFormAndAFewStepsOfAdam) {
   EXPECT_LE(l1[1], l1[2] * 1.001);
 }
 
-TEST(FitChromaTest, ViewsBeyondTheMemoryBudgetGiveTheSameBytes) {
+TEST(FitChromaTest, MemoryBudgetDoesNotChangeBytes) {
   const GaussianModel geometry = RandomGaussians(60, 4);
   const ChromaProblem problem = RandomProblem(3, 6);
   ChromaOptions options;
@@ -151,7 +151,7 @@ TEST(FitChromaTest, ViewsBeyondTheMemoryBudgetGiveTheSameBytes) {
 
 // However many views there are, what is kept of them is within the budgets; the rest is asked for
 // again, by each pass.
-TEST(FitChromaTest, WhatIsKeptDoesNotGrowWithTheNumberOfViews) {
+TEST(FitChromaTest, CacheSizeIsIndependentOfViewCount) {
   const GaussianModel geometry = RandomGaussians(60, 4);
   constexpr int64_t kBudget = 150'000, kTargetBudget = 40'000;
   for (const int views : {12, 48}) {
@@ -205,7 +205,7 @@ class LastSave : public CheckpointStore {
   std::optional<std::string> state_;
 };
 
-TEST(FitChromaTest, GoesOnFromACheckpointWithTheSameBytes) {
+TEST(FitChromaTest, ResumesFromCheckpointWithSameBytes) {
   const GaussianModel geometry = RandomGaussians(60, 4);
   const ChromaProblem problem = RandomProblem(3, 6);
   for (const auto solver :

@@ -1,5 +1,5 @@
-// First chroma of both solvers, and chroma for Gaussians that no target sees. Internal to the splat
-// module. Stateless but for the pool's threads.
+// Initial chroma of both solvers, and chroma of Gaussians that no target sees. Internal to the
+// splat module. Stateless except for the pool's threads.
 #pragma once
 
 #include <vector>
@@ -20,8 +20,8 @@ std::vector<char> SetClosedForm(const ChromaSystem& system,
 // Visibility-weighted mean of the targets' confidence, 0..1; 0 for Gaussians that are not seen.
 std::vector<float> MeanConfidence(const ChromaSystem& system, const std::vector<char>& seen);
 
-// Gaussians that no target pixel sees take the mean of their nearest seen neighbours (degree 0),
-// nearer ones counting more. With no neighbour at all they stay as they are.
+// Gaussians that no target pixel sees take the mean of their nearest visible neighbours (degree 0),
+// weighted by proximity. Without any neighbour they are unchanged.
 void FillUnseen(const std::vector<char>& seen, ThreadPool& pool, ChromaParameters& parameters);
 
 }  // namespace color3d

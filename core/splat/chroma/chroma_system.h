@@ -1,11 +1,10 @@
-// The linear system of chroma on fixed geometry. A picture's chroma, measured from neutral, is
-// W c: blending weights times spherical harmonics (the background is neutral, so it drops out).
-// Weighted least squares asks for W^T D W c = W^T D t with the target t and pixel weights D. The
-// products are matrix-free over the views; blending weights (chroma_weights.h), targets and D are
-// kept as far as a byte budget reaches. For the other views they are made again each time from the
-// splats, the targets, and the coefficients of the last reweighting: the same to the bit.
-// Internal to the splat module. Not thread-safe; uses the pool's threads. Deterministic for a
-// thread count.
+// The linear system of chroma on fixed geometry. A picture's chroma, measured from neutral, is W c:
+// blending weights times spherical harmonics (the background is neutral and drops out). Weighted
+// least squares solves W^T D W c = W^T D t with the target t and pixel weights D. The products are
+// matrix-free over the views; blending weights (chroma_weights.h), targets and D are cached within
+// a byte budget. For other views they are recomputed from the splats, the targets, and the
+// coefficients of the last reweighting, with bitwise equal results. Internal to the splat module.
+// Not thread-safe; uses the pool's threads. Deterministic for a thread count.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +27,7 @@ using ChromaVector = std::vector<double>;
 class ChromaSystem {
  public:
   // `parameters` holds the geometry and has the rows of `color` (two channels of 1 or 4
-  // coefficients); `in_time` takes them to a view's moment; `targets` gives those of views that are
+  // coefficients); `in_time` moves them to a view's time; `targets` returns the targets of views
   // beyond the budget. All must outlive this object.
   ChromaSystem(const ParameterBlock& parameters,
                const ColorSpec& color,
@@ -38,8 +37,8 @@ class ChromaSystem {
                ThreadPool& pool);
   ~ChromaSystem();
 
-  // `planes`: what `targets` gives for the view, with its confidence. With `solve` false only the
-  // sums below are taken. Whether the view is within the budget.
+  // `planes`: the view's planes from `targets`, with confidence. With `solve` false only the sums
+  // below are computed. Returns true if the view is within the budget.
   bool AddView(const PosedCamera& view, const ChromaPlanes& planes, bool solve);
 
   int64_t count() const { return parameters_.count(); }
@@ -53,9 +52,9 @@ class ChromaSystem {
 
   // One ordered-subsets sweep: D and a step from each view alone (Andersen & Kak 1984; Hudson &
   // Larkin 1994). x += relaxation * B^-1 W_v^T D (t - W_v x), with B the larger of the row sums of
-  // W_v^T D W_v and their mean over the views. Quick at first, never exact. Gaussians that are not
-  // `seen` stay; `rest_weight` is the share of coefficients above degree 0. Returns the weighted
-  // mean of |t - W x|, each view before its step.
+  // W_v^T D W_v and their mean over the views. Fast at first, never exact. Gaussians that are not
+  // `seen` are unchanged; `rest_weight` is the share of coefficients above degree 0. Returns the
+  // weighted mean of |t - W x|, each view before its step.
   double Sweep(const RobustWeights& robust,
                double relaxation,
                double rest_weight,
@@ -111,20 +110,20 @@ class ChromaSystem {
   ColorSpec color_;
   GeometryInTime& in_time_;
   ChromaTargets& targets_;
-  const ParameterBlock* at_;  // parameters_ at the moment of the view at hand
+  const ParameterBlock* at_;  // parameters_ at the time of the current view
   int coefficients_;
   int64_t budget_bytes_;
-  bool is_full_ = false;  // a view did not fit
+  bool is_full_ = false;  // a view exceeded the budget
   ThreadPool& pool_;
   std::vector<std::unique_ptr<View>> views_;
   std::vector<double> seen_weight_, target_sum_, confidence_sum_;
   RobustWeights robust_;     // of the last reweighting
-  ChromaVector weighed_at_;  // where it was
+  ChromaVector weighed_at_;  // coefficients at that time
   // Work space.
   SplatBuffer splats_;
   TileBinner binner_;
   TileLists lists_;
-  AlignedFloats value_, weighed_value_;  // two per Gaussian, of the view at hand
+  AlignedFloats value_, weighed_value_;  // two per Gaussian, of the current view
   Sums sums_, squares_, right_;
   std::vector<PixelSums> pixel_sums_;  // per thread
 };

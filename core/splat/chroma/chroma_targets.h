@@ -1,5 +1,4 @@
-// Target chroma of the training views in the kernels' form, checked at the door. Internal to the
-// splat module.
+// Validated target chroma of the training views in the kernels' form. Internal to the splat module.
 #pragma once
 
 #include <cstdint>
@@ -19,22 +18,21 @@ struct ChromaPlanes {
   bool has_confidence = false;
 };
 
-// Reads the target of one view. False when it has none. Throws Error{kInvalidArgument} for another
-// size, chroma that is not finite and weights that are not in 0..1, with the view and the pixel.
+// Reads the target of one view. Returns false if it has none. Throws Error{kInvalidArgument} with
+// the view and the pixel for a wrong size, chroma that is not finite or weights outside 0..1.
 bool LoadChromaPlanes(const ChromaProblem& problem, const PosedCamera& view, ChromaPlanes* planes);
 
-// Targets that are asked for again and again: kept within a byte budget, first come first kept, and
-// read again where they are not, so that memory does not grow with the number of views. Thread-safe
-// as far as the problem's source is.
+// Cache of targets within a byte budget: the first ones are kept, the others are reread, so that
+// memory does not grow with the number of views. Thread-safe if the problem's source is.
 class ChromaTargets {
  public:
   // `problem` must outlive this object.
   ChromaTargets(const ChromaProblem& problem, int64_t budget_bytes)
       : problem_(problem), budget_bytes_(budget_bytes) {}
 
-  // Without their confidence. Null when the view has no colours. Throws as LoadChromaPlanes.
+  // Without confidence. Null if the view has no colours. Throws as LoadChromaPlanes.
   std::shared_ptr<const ChromaPlanes> Get(const PosedCamera& view);
-  // What has just been read of a view: kept as far as the budget reaches.
+  // Stores the planes just read of a view, as far as the budget allows.
   void Offer(const PosedCamera& view, ChromaPlanes planes);
   int64_t kept_bytes() const;
 

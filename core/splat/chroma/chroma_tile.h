@@ -20,15 +20,15 @@ struct RobustWeights {
       0.25 / 255.0;  // below it |residual| becomes quadratic: half a step of 8-bit chroma
 };
 
-// Of the tile whose first pixel is (x0, y0): kTileFloats targets and kTilePixels weights; pixels
-// outside, and those of weight 0, get zeros.
+// Reads the tile whose first pixel is (x0, y0): kTileFloats targets and kTilePixels weights. Pixels
+// outside the picture or of weight 0 get zeros.
 void LoadTile(const ChromaPlanes& planes, int x0, int y0, float* target, float* mask);
 
-// Of its weights `mask`: these in the first channel, times confidence in the second.
+// Reads the tile's weights `mask`: weights in the first channel, times confidence in the second.
 void LoadConfidence(const PlaneBuffer& confidence, int x0, int y0, const float* mask, float* sure);
 
-// D of a tile from the residuals target - picture, which become `picture`. Returns the sums of
-// weight * |residual| and of the weights.
+// Computes D of a tile from the residuals target - picture, which overwrite `picture`. Returns the
+// sums of weight * |residual| and of the weights.
 std::array<float, 2> WeighTile(
     const RobustWeights& robust, const float* target, const float* mask, float* picture, float* d);
 

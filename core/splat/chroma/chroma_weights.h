@@ -1,8 +1,8 @@
-// Blending weights of one 16x16 tile kept as numbers, so that the chroma solver multiplies with
-// them again and again without projecting, sorting or exponentials: the rows of W in
-// picture = W c. A weight is a 16-bit fixed-point number (step 1.5e-5). Both products use the same
-// rounded weights, so W^T D W stays symmetric and positive semidefinite. Internal to the splat
-// module; no Eigen here, because the source is compiled once per instruction set.
+// Stored blending weights of one 16x16 tile, so that the chroma solver multiplies with them
+// repeatedly without projecting, sorting or exponentials: the rows of W in picture = W c. A weight
+// is a 16-bit fixed-point number (step 1.5e-5). Both products use the same rounded weights, so W^T
+// D W stays symmetric and positive semidefinite. Internal to the splat module; no Eigen here,
+// because the source is compiled once per instruction set.
 //
 // A tile's picture is [block][channel][16]: blocks of 4x4 pixels, row by row in the tile, and two
 // channels.

@@ -20,7 +20,7 @@ using chroma_problems::RandomGaussians;
 
 using TileWeightsTest = InstructionSetTest<int>;
 
-TEST_P(TileWeightsTest, ProductsAgreeWithTheRasterizerAndWithEachOther) {
+TEST_P(TileWeightsTest, ProductsAgreeWithRasterizer) {
   const GaussianModel geometry = RandomGaussians(TestCase(), 7);
   ChromaParameters p = ChromaParameters::From(geometry, 0);
   Random random(2);

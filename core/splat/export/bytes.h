@@ -1,4 +1,4 @@
-// Numbers of viewers' files as bytes.
+// Number conversions of viewer file formats.
 #pragma once
 
 #include <algorithm>
@@ -9,11 +9,12 @@
 
 namespace color3d {
 
-// The nearest of 0..255.
+// Rounds to the nearest integer in 0..255.
 inline uint8_t Byte(float value) {
   return static_cast<uint8_t>(std::lround(std::clamp(value, 0.0f, 255.0f)));
 }
-// Of the .splat layout: a harmonic of degree 0, an opacity's logit, a number of a unit quaternion.
+// Bytes of the .splat layout: a harmonic of degree 0, an opacity's logit, a component of a unit
+// quaternion.
 inline uint8_t ColorByte(float sh) { return Byte(255.0f * (0.5f + kShDc * sh)); }
 inline uint8_t OpacityByte(float logit) { return Byte(255.0f / (1.0f + std::exp(-logit))); }
 inline uint8_t RotationByte(float q) { return Byte(128.0f + 128.0f * q); }

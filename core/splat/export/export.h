@@ -9,10 +9,10 @@
 namespace color3d {
 
 // Binary little-endian PLY bytes with x y z nx ny nz f_dc_* f_rest_* opacity scale_* rot_*. An
-// offset that was left out stands in a header comment "offset x y z". `with_confidence` adds a last
-// property "confidence" (the model's; 0 where it has none), which viewers that know only the
-// standard list may refuse. Throws Error{kInvalidArgument} when `rgb` is of another number of
-// Gaussians.
+// offset not added to the positions is in a header comment "offset x y z". `with_confidence` adds a
+// last property "confidence" (the model's; 0 if it has none), which viewers that accept the
+// standard properties only may reject. Throws Error{kInvalidArgument} if `rgb` has another number
+// of Gaussians.
 std::string EncodeGaussianPly(const GaussianModel& model,
                               const RgbHarmonics& rgb,
                               const ExportFrame& frame,

@@ -19,7 +19,7 @@ GaussianModel DullModel(size_t count, int degree, int chroma_degree) {
   return RandomModel({count, 3, degree, chroma_degree, /*chroma_size=*/0.03});
 }
 
-TEST(ExportTest, PlyHasTheStandardLayout) {
+TEST(ExportTest, PlyHasStandardLayout) {
   ThreadPool pool(2);
   GaussianModel m = DullModel(5, 1, 0);
   for (int k = 0; k < 4; ++k) m.rotation[k] = 0.0f;
@@ -56,7 +56,7 @@ TEST(ExportTest, PlyHasTheStandardLayout) {
       EncodeGaussianPly(m, DegreeZero(FitRgbHarmonics(DullModel(4, 1, 0), pool)), {}, pool), Error);
 }
 
-TEST(ExportTest, ConfidenceIsTheLastPropertyWhenAskedFor) {
+TEST(ExportTest, ConfidenceIsLastPropertyIfRequested) {
   ThreadPool pool(2);
   GaussianModel m = DullModel(4, 1, 0);
   const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
@@ -89,7 +89,7 @@ struct SplatRow {
 };
 static_assert(sizeof(SplatRow) == 32);
 
-TEST(ExportTest, SplatReadsBackSortedByImportance) {
+TEST(ExportTest, SplatIsSortedByImportance) {
   ThreadPool pool(1);
   const GaussianModel m = DullModel(50, 1, 0);
   const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
@@ -124,7 +124,7 @@ TEST(ExportTest, SplatReadsBackSortedByImportance) {
   EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), 50);
 }
 
-TEST(ExportTest, AnOffsetThatFloatsCannotCarryStaysInTheHeader) {
+TEST(ExportTest, LargeOffsetStaysInHeader) {
   ThreadPool pool(1);
   Scene scene = testing_scene::MakeRoomCorner(4, 32, 24, 10).scene;  // extent below 1
   scene.world_from_scene_scale = 0.5;

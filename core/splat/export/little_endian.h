@@ -1,4 +1,4 @@
-// Numbers of binary files.
+// Little-endian integers of binary files.
 #pragma once
 
 #include <cstdint>

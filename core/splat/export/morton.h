@@ -1,4 +1,4 @@
-// Where Gaussians stand, in a form that compresses well. Pure functions.
+// Quantized positions and Morton order of Gaussians, for compression. Pure functions.
 #pragma once
 
 #include <array>
@@ -14,10 +14,10 @@ struct LogGrid {
   std::vector<uint16_t> cell;  // 3 a Gaussian
 };
 
-// 3 finite numbers for each Gaussian.
+// Requires 3 finite numbers for each Gaussian.
 LogGrid LogGridOf(const std::vector<float>& position);
 
-// Indices of Gaussians such that neighbours in the list are neighbours in space; ties by index.
+// Indices of Gaussians in an order that keeps spatial neighbours close; ties by index.
 std::vector<uint32_t> MortonOrder(const LogGrid& grid);
 
 }  // namespace color3d

@@ -1,6 +1,6 @@
-// RGB spherical harmonics of Lab Gaussians: what viewers that know no Lab are given. Lab -> RGB is
-// not linear, so coefficients cannot be converted one by one; they are fitted per Gaussian here,
-// and may be refined against whole pictures (rgb_refine.h).
+// RGB spherical harmonics of Lab Gaussians, for viewers without Lab. Lab -> RGB is not linear, so
+// coefficients cannot be converted one by one; they are fitted per Gaussian here, and may be
+// refined against whole pictures (rgb_refine.h).
 #pragma once
 
 #include <Eigen/Core>
@@ -27,9 +27,9 @@ class RgbHarmonicsFitter {
   Eigen::MatrixX3d Colors(const GaussianModel& model, size_t index) const;
   // Coefficients f with RGB = 0.5 + sum f_k Y_k, one row per coefficient.
   Eigen::MatrixX3d Fit(const Eigen::MatrixX3d& colors) const;
-  // Y_k of the directions, for evaluating what Fit returns.
+  // Y_k of the directions, to evaluate the result of Fit.
   Eigen::MatrixXd Basis() const { return basis_.leftCols(coefficients_); }
-  // What Fit multiplies with: coefficients x directions.
+  // The matrix of Fit: coefficients x directions.
   const Eigen::MatrixXd& Solver() const { return solve_; }
 
  private:
@@ -39,11 +39,11 @@ class RgbHarmonicsFitter {
   Eigen::MatrixXd solve_;  // coefficients x directions
 };
 
-// Of the luminance's degree, by least squares over directions that are spread evenly over the
-// sphere. Throws Error{kInvalidArgument} when the model's buffers do not fit together.
+// Fits harmonics of the luminance's degree by least squares over directions spread evenly over the
+// sphere. Throws Error{kInvalidArgument} if the sizes of the model's buffers disagree.
 RgbHarmonics FitRgbHarmonics(const GaussianModel& model, ThreadPool& pool);
 
-// What is left without view dependence.
+// The colours without view dependence.
 RgbHarmonics DegreeZero(const RgbHarmonics& rgb);
 
 }  // namespace color3d

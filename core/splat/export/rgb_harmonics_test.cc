@@ -13,7 +13,7 @@ GaussianModel DullModel(size_t count, int degree, int chroma_degree) {
   return RandomModel({count, 3, degree, chroma_degree, /*chroma_size=*/0.03});
 }
 
-TEST(RgbHarmonicsTest, ReproduceTheColors) {
+TEST(RgbHarmonicsTest, ReproducesColors) {
   ThreadPool pool(2);
   const GaussianModel m = DullModel(40, 2, 1);
   const RgbHarmonicsFitter fitter(m.sh_degree);
@@ -36,7 +36,7 @@ TEST(RgbHarmonicsTest, ReproduceTheColors) {
   EXPECT_EQ(DegreeZero(rgb).sh[3], rgb.sh[27]);
 }
 
-TEST(RgbHarmonicsTest, ADiffuseColorIsExact) {
+TEST(RgbHarmonicsTest, DiffuseColorIsExact) {
   ThreadPool pool(1);
   GaussianModel m = DullModel(1, 0, 0);
   m.sh_l = {0.3f};

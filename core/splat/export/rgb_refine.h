@@ -1,5 +1,5 @@
-// What a viewer's RGB blending loses against our own Lab renders, and a short refinement of the RGB
-// harmonics that wins some of it back (EXPORT.md "Export").
+// Measures the error of RGB blending in viewers against our Lab renders, and refines the RGB
+// harmonics to reduce it (EXPORT.md "Export").
 #pragma once
 
 #include <vector>
@@ -23,7 +23,7 @@ struct RgbView {
 struct RgbLoss {
   double mean_psnr_db = 0.0;  // over the views
   double worst_psnr_db = 0.0;
-  int worst_view = -1;  // index into the views
+  int worst_view = -1;  // index of the view
 };
 
 struct RgbRefineOptions {
@@ -34,12 +34,12 @@ struct RgbRefineOptions {
 };
 
 struct RgbRefinement {
-  RgbHarmonics harmonics;  // the start when refinement gained nothing
+  RgbHarmonics harmonics;  // unchanged if refinement gained nothing
   RgbLoss before;
   RgbLoss after;
 };
 
-// Adam on the coefficients with geometry fixed, squared error against our own renders of the fitted
+// Adam on the coefficients with geometry fixed; squared error against our renders of the fitted
 // views. Renders every view once and keeps the pictures (12 bytes a pixel). Saves no checkpoints.
 // Throws Error{kInvalidArgument} without views, Error{kCancelled}.
 RgbRefinement RefineRgbHarmonics(const GaussianModel& model,

@@ -37,7 +37,7 @@ std::vector<RgbView> ThreeViews() {
   return views;
 }
 
-TEST(RefineRgbHarmonicsTest, WinsBackWhatBlendingInRgbLoses) {
+TEST(RefineRgbHarmonicsTest, ReducesErrorOfRgbBlending) {
   ThreadPool pool(2);
   NoCheckpoints none;
   NullObserver silent;
@@ -65,7 +65,7 @@ TEST(RefineRgbHarmonicsTest, WinsBackWhatBlendingInRgbLoses) {
   EXPECT_EQ(unchanged.after.mean_psnr_db, unchanged.before.mean_psnr_db);
 }
 
-TEST(RefineRgbHarmonicsTest, RefusesNonsenseAndCanBeCancelled) {
+TEST(RefineRgbHarmonicsTest, RejectsBadInputAndCanBeCancelled) {
   ThreadPool pool(1);
   NoCheckpoints none;
   NullObserver silent;

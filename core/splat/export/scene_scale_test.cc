@@ -104,7 +104,7 @@ FileStatistics Exported(const Trained& trained, const Scene& scene) {
       trained.model, FitRgbHarmonics(trained.model, pool), ExportFrameOf(scene), pool));
 }
 
-TEST(SceneScaleTest, AnyScaleAndPlaceTrainsAlikeAndExportsInItsOwnFrame) {
+TEST(SceneScaleTest, TrainingIsInvariantToScaleAndOrigin) {
   const ProceduralScene original = MakeRoomCorner(7, 96, 72, 800);
   const Trained reference = Train(original);
   const FileStatistics expected = Exported(reference, original.scene);

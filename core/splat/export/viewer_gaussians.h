@@ -1,4 +1,4 @@
-// What every format for viewers says of a Gaussian, in the file's own frame. Plain values.
+// Gaussians as viewer formats store them, in the file's frame. Plain values.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,16 +10,16 @@
 
 namespace color3d {
 
-// Where an exported scene stands: file = scale * scene + offset.
+// Transform of an exported scene: file = scale * scene + offset.
 struct ExportFrame {
   double scale = 1.0;
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();
-  // Not in the positions, because float32 cannot carry it: the user has to add it to them.
+  // Not added to the positions, because float32 cannot represent the sum: the user has to add it.
   Eigen::Vector3d left_out = Eigen::Vector3d::Zero();
 };
 
-// The world's own units, and its own origin too unless float32 would then round positions by more
-// than 1e-3 of the scene's extent.
+// The world's units and origin, unless float32 would round positions in them by more than 1e-3 of
+// the scene's extent; then another origin.
 ExportFrame ExportFrameOf(const Scene& scene);
 
 // Row i of an n-wide buffer is [i*n, (i+1)*n).
@@ -34,15 +34,15 @@ struct ViewerGaussians {
   size_t size() const { return opacity_logit.size(); }
 };
 
-// A rotation of length zero becomes the identity. Throws Error{kInvalidArgument} when the model's
-// buffers do not fit together or `rgb` is of another number of Gaussians.
+// Rotations of length zero become the identity. Throws Error{kInvalidArgument} if the sizes of the
+// model's buffers disagree or `rgb` has another number of Gaussians.
 ViewerGaussians ForViewers(const GaussianModel& model,
                            const RgbHarmonics& rgb,
                            const ExportFrame& frame,
                            ThreadPool& pool);
 
-// Throws Error{kInvalidArgument} that names the first value that is infinite or not a number: what
-// quantising formats cannot say.
+// Throws Error{kInvalidArgument} with the first value that is not finite, which quantizing formats
+// cannot represent.
 void CheckFinite(const ViewerGaussians& gaussians);
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// Zstandard, for the formats that are packed with it. A pure function.
+// Zstandard compression for viewer formats. A pure function.
 #pragma once
 
 #include <string>
@@ -6,7 +6,8 @@
 
 namespace color3d {
 
-// One frame of at most an 8 MiB window. Throws Error{kResourceExhausted} where memory is short.
+// Writes one frame with a window of at most 8 MiB. Throws Error{kResourceExhausted} if memory is
+// short.
 std::string Zstd(std::string_view plain);
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
-// Where Gaussians are added and removed while geometry is trained. Internal to the splat
-// module. Single-threaded and seeded, so deterministic.
+// Adds and removes Gaussians during training of geometry. Internal to the splat module.
+// Single-threaded and seeded, so deterministic.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace color3d {
 
-// What changes together; moments always have the parameters' shape.
+// Parameters and moments; both always have the same shape.
 struct DensifyTarget {
   ParameterBlock& parameters;
   AdamMoments& moments;
@@ -31,10 +31,10 @@ struct GradientDensifyOptions {
 // gradient reaches the threshold, steepest first while `max_gaussians` allows, and prunes.
 void DensifyByGradient(const GradientDensifyOptions& options, DensifyTarget& target);
 
-// Removes the least opaque ones beyond `count`. Statistics are for the caller to reset.
+// Removes the least opaque Gaussians beyond `count`. The caller resets the statistics.
 void KeepMostOpaque(int64_t count, DensifyTarget& target);
 
-// Caps all opacities at `max_opacity` and forgets their moments.
+// Caps all opacities at `max_opacity` and resets their moments.
 void ResetOpacity(double max_opacity, DensifyTarget& target);
 
 }  // namespace color3d

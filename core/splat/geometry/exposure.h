@@ -1,6 +1,6 @@
-// What a camera's automatic exposure did to each training photo: photo = gain * scene + offset,
-// fitted beside the geometry, so that the geometry need not explain it. Internal to the splat
-// module. Deterministic whatever the thread count.
+// Automatic exposure of the camera in each training photo: photo = gain * scene + offset, fitted
+// with the geometry so that the geometry does not absorb it. Internal to the splat module.
+// Deterministic whatever the thread count.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +12,7 @@
 
 namespace color3d {
 
-// Of one photo, with Adam's moments. The identity until it is fitted.
+// Exposure of one photo, with Adam's moments. The identity until fitted.
 struct PhotoExposure {
   double log_gain = 0.0;
   double offset = 0.0;  // of values 0..1
@@ -21,7 +21,7 @@ struct PhotoExposure {
   int64_t steps = 0;
 };
 
-// One for each training view, or none.
+// One for each training view, or empty.
 using Exposures = std::vector<PhotoExposure>;
 
 // gain * drawn + offset.
@@ -39,7 +39,7 @@ void FitExposure(const PlaneBuffer& drawn,
                  PlaneBuffer& d_exposed,
                  PhotoExposure& exposure);
 
-// Gains of mean ln 0, offsets of mean 0: what all photos have in common is the scene's.
+// Normalizes gains to mean ln 0 and offsets to mean 0: the common part belongs to the scene.
 void Recenter(Exposures& exposures);
 
 }  // namespace color3d

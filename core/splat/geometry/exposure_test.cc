@@ -37,7 +37,7 @@ double Squares(const PlaneBuffer& x, const PlaneBuffer& y, PlaneBuffer& d) {
   return sum;
 }
 
-TEST(ExposureTest, FindsTheGainAndTheOffsetOfAPhoto) {
+TEST(ExposureTest, FindsGainAndOffset) {
   ThreadPool pool(2);
   const PlaneBuffer scene = Noise(0.1, 0.9, 3);
   PhotoExposure truth, found;
@@ -55,7 +55,7 @@ TEST(ExposureTest, FindsTheGainAndTheOffsetOfAPhoto) {
   EXPECT_NEAR(found.offset, truth.offset, 2e-3);
 }
 
-TEST(ExposureTest, GradientByTheDrawnPictureIsThatOfFiniteDifferences) {
+TEST(ExposureTest, GradientAgreesWithFiniteDifferences) {
   ThreadPool pool(2);
   const PlaneBuffer photo = Noise(0.2, 0.8, 4);
   PlaneBuffer drawn = Noise(0.1, 0.9, 5), exposed, d, unused;
@@ -79,7 +79,7 @@ TEST(ExposureTest, GradientByTheDrawnPictureIsThatOfFiniteDifferences) {
   EXPECT_EQ(stepped.steps, 1);
 }
 
-TEST(ExposureTest, IsTheSameForEveryThreadCountAndCentred) {
+TEST(ExposureTest, IsCenteredForEveryThreadCount) {
   const PlaneBuffer photo = Noise(0.2, 0.8, 4), drawn = Noise(0.1, 0.9, 5);
   Exposures found(2);
   for (int k = 0; k < 2; ++k) {

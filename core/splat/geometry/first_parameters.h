@@ -1,4 +1,4 @@
-// What training begins with, in the kernels' form. Internal to the splat module. Pure.
+// Initial parameters of training, in the kernels' form. Internal to the splat module. Pure.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@
 
 namespace color3d {
 
-// `from` with `channels` channels of `coefficients` spherical harmonics each: its own are cut or
-// extended, a single channel serves for all. An evenly spaced part where it has more than `most`
-// Gaussians.
+// Returns `from` with `channels` channels of `coefficients` spherical harmonics each: existing ones
+// are cut or extended, a single channel is copied to all. Takes an evenly spaced subset if there
+// are more than `most` Gaussians.
 ParameterBlock FirstParameters(const GaussianModel& from,
                                int channels,
                                int coefficients,

@@ -1,5 +1,5 @@
-// How far away what moves is where no other camera tells: things stand on the ground. Internal to
-// the splat module.
+// Depth of moving objects that no other camera sees, assuming that objects stand on the ground.
+// Internal to the splat module.
 #pragma once
 
 #include <vector>
@@ -9,13 +9,13 @@
 
 namespace color3d {
 
-// Of each view, per pixel, the depth of the standing surface at the lowest pixel of its moving
-// region (where there is none, the view's median depth); 0 where nothing moves. Of one camera that
-// stands still, regions one above the other are one thing, and a thing's depth is the median over
-// 17 of its frames: what jumps to and fro in depth would be seen twice from beside. Deterministic.
+// For each view and pixel, the depth of the static surface at the lowest pixel of its moving region
+// (without such a surface, the view's median depth); 0 outside moving regions. For a static camera,
+// regions above each other form one object, and an object's depth is the median over 17 frames:
+// depths that jump back and forth would appear twice from the side. Deterministic.
 std::vector<Image> FootDepths(const std::vector<SurveyedView>& views, ThreadPool& pool);
 
-// Of the pixels that have one; 0 where none has.
+// Median over the pixels with a depth; 0 without any.
 double MedianDepth(const SurveyedView& view);
 
 }  // namespace color3d

@@ -36,7 +36,7 @@ class FootDepthsTest : public ::testing::Test {
   std::vector<SurveyedView> views_;
 };
 
-TEST_F(FootDepthsTest, EachRegionStandsWhereItEnds) {
+TEST_F(FootDepthsTest, RegionTakesDepthAtItsFoot) {
   views_ = {ViewAt(0.0), ViewAt(1.0, 0.5)};
   Move(5, 9, 10, 20, &views_[0]);
   Move(20, 24, 10, 25, &views_[0]);
@@ -47,14 +47,14 @@ TEST_F(FootDepthsTest, EachRegionStandsWhereItEnds) {
   EXPECT_EQ(depths[1].At(0, 12, 6), 0.0f);
 }
 
-TEST_F(FootDepthsTest, WithoutAStandingSurfaceTheUsualDepthIsTaken) {
+TEST_F(FootDepthsTest, FallsBackToUsualDepthWithoutGround) {
   views_ = {ViewAt(0.0), ViewAt(1.0, 0.5)};
   Move(5, 9, 10, 20, &views_[0]);
   for (int x = 0; x < kWidth; ++x) views_[0].depth.At(0, 20, x) = 0.0f;
   EXPECT_FLOAT_EQ(Find()[0].At(0, 12, 6), static_cast<float>(MedianDepth(views_[0])));
 }
 
-TEST_F(FootDepthsTest, OfACameraThatStandsStillATornLimbBelongsToWhatIsBelow) {
+TEST_F(FootDepthsTest, StaticCameraJoinsTornLimbs) {
   views_ = {ViewAt(0.0), ViewAt(1.0)};
   Move(5, 12, 15, 25, &views_[0]);
   Move(6, 8, 5, 8, &views_[0]);
@@ -64,7 +64,7 @@ TEST_F(FootDepthsTest, OfACameraThatStandsStillATornLimbBelongsToWhatIsBelow) {
   EXPECT_FLOAT_EQ(depths[0].At(0, 6, 31), GroundDepth(8));
 }
 
-TEST_F(FootDepthsTest, OfACameraThatStandsStillDepthDoesNotJump) {
+TEST_F(FootDepthsTest, StaticCameraDepthIsSmoothOverTime) {
   for (int i = 0; i < 9; ++i) {
     views_.push_back(ViewAt(0.1 * i));
     const int foot = i == 4 ? 15 : 24;  // the legs were not seen to move
@@ -78,7 +78,7 @@ TEST_F(FootDepthsTest, OfACameraThatStandsStillDepthDoesNotJump) {
   }
 }
 
-TEST_F(FootDepthsTest, NoViewsNothingMoving) {
+TEST_F(FootDepthsTest, AcceptsNoViewsAndNoMotion) {
   EXPECT_TRUE(Find().empty());
   views_ = {ViewAt(0.0)};
   const std::vector<Image> depths = Find();

@@ -1,5 +1,5 @@
-// What a user may choose about training geometry, and how a schedule is spent. Plain values. The
-// defaults are those of the service's preset "fast".
+// Options of training geometry and its schedule. Plain values. The defaults are those of the
+// service's preset "fast".
 #pragma once
 
 #include <cstdint>
@@ -7,26 +7,26 @@
 
 namespace color3d {
 
-// How a training spends its schedule; times are fractions of it. The defaults are those of
-// Recipe::kColor3d, measured.
+// Schedule of a training; times are fractions of it. The defaults are those of Recipe::kColor3d,
+// chosen by measurements.
 struct GeometryTuning {
-  double half_size_until = 0.15;  // trains at half of the working size until then
+  double half_size_until = 0.15;  // trains at half of the working size before
   double densify_from = 0.05;
   double densify_until = 0.6;
   int densify_rounds = 30;
   double opacity_reset_every = 0.0;  // 0: never; while densifying
-  double prune_scale = 0.0;          // of the extent, after the first opacity reset; 0: never
-  double opacity_penalty = 0.005;    // times the mean opacity of what stands still
-  double scale_penalty = 0.005;      // times the mean scale / extent of it
-  // Of Gaussians left out at random, growing from 0, where there are at most sparse_views views;
-  // in inverse proportion to their square where there are more.
+  double prune_scale = 0.0;  // relative to the extent, after the first opacity reset; 0: never
+  double opacity_penalty = 0.005;  // times the mean opacity of static Gaussians
+  double scale_penalty = 0.005;    // times their mean scale / extent
+  // Share of Gaussians dropped at random, growing from 0, for at most sparse_views views; for more
+  // views in inverse proportion to their square.
   double last_drop_rate = 0.2;
   double sparse_views = 12.0;
   double exposure_rate = 0.005;    // learning rate of each photo's gain and offset; 0: none
   double exposure_prior = 5.0;     // times the sum of their squares
   double max_needle_ratio = 10.0;  // longest to middle axis; 0: no limit
-  double sh_from = 0.15;           // degree 1 begins here
-  double sh_step = 0.15;           // and each further degree this much later
+  double sh_from = 0.15;           // start of degree 1
+  double sh_step = 0.15;           // interval of further degrees
   double position_rate_first = 6e-4;
   double position_rate_last = 4e-5;
   double dc_rate = 1e-2;
@@ -34,23 +34,24 @@ struct GeometryTuning {
   double opacity_rate = 0.1;
   double scale_rate = 2e-2;
   double rotation_rate = 4e-3;
-  // Under a time limit the number of Gaussians grows only while so many can be hoped for.
+  // With a time limit the number of Gaussians grows only to a count for which enough iterations
+  // fit.
   double wanted_iterations = 800;
-  // Of pictures for which what belongs to their own moment is left out, so that what belongs to the
-  // moments before and after learns to move there.
+  // Share of pictures that omit the Gaussians of their own time step, so that Gaussians of adjacent
+  // time steps learn to move there.
   double moment_drop_rate = 0.2;
-  double least_width = 0.9;    // of a window in time, of the interval between moments
-  double seed_width = 1.0;     // the first
-  double share_motion = 0.05;  // ShareMotion, every so many iterations; 0: never
+  double least_width = 0.9;    // of a time window, relative to the interval between time steps
+  double seed_width = 1.0;     // of the first window
+  double share_motion = 0.05;  // ShareMotion, at this interval of iterations; 0: never
   int share_motion_every = 10;
   int motion_neighbors = 24;
-  int mover_sh_degree = 0;  // of what moves: few views see it, each from a direction of its own
+  int mover_sh_degree = 0;  // of moving Gaussians: few views see each, from directions of their own
   double last_rate = 0.2;  // all rates but the position's fall to this multiple after densification
 
   bool operator==(const GeometryTuning&) const = default;
 };
 
-// visit(name, value) for every field, in order.
+// Calls visit(name, value) for every field, in order.
 template <class Tuning, class Visit>
 void VisitFields(Tuning& tuning, Visit&& visit) {
   visit("half_size_until", tuning.half_size_until);
@@ -90,12 +91,12 @@ struct GeometryOptions {
   // kColor3d: coarse to fine, measured on CPUs. kPaper: the schedule of Kerbl et al. 2023.
   enum class Recipe { kColor3d, kPaper };
   Recipe recipe = Recipe::kColor3d;
-  // kAuto: what moves is found where views have times. kStill: nothing is taken to move.
+  // kAuto: motion is detected if views have times. kStill: the scene is static.
   enum class Motion { kAuto, kStill };
   Motion motion = Motion::kAuto;
   int iterations = 1500;  // 0..100000
-  // Of training, 0: none, at most 86400. The whole schedule then fits into this time or the
-  // iterations, whichever is used up first; the same input gives similar results, not the same.
+  // Seconds of training, 0: none, at most 86400. The whole schedule fits into this time or the
+  // iterations, whichever ends first; equal inputs give similar results, not equal ones.
   double time_limit_seconds = 0.0;
   int max_gaussians = 40'000;        // hard cap, 1..10,000,000
   int sh_degree = 2;                 // of luminance at the end, 0..3
@@ -110,7 +111,7 @@ struct GeometryOptions {
   bool operator==(const GeometryOptions&) const = default;
 };
 
-// What these options train with: their own tuning, or the recipe's.
+// The tuning of these options: their own, or the recipe's.
 GeometryTuning TuningOf(const GeometryOptions& options);
 
 }  // namespace color3d

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-TEST(TrainGeometryTest, OptionsOutOfRangeAreNamed) {
+TEST(TrainGeometryTest, NamesOptionOutOfRange) {
   GeometryOptions options;
   options.ssim_weight = std::numeric_limits<double>::quiet_NaN();
   try {
@@ -22,7 +22,7 @@ TEST(TrainGeometryTest, OptionsOutOfRangeAreNamed) {
   }
 }
 
-TEST(TimeLimitTest, OutOfRangeIsRefused) {
+TEST(TimeLimitTest, RejectsOutOfRangeLimit) {
   for (const double bad : {-1.0, 86'401.0, std::numeric_limits<double>::quiet_NaN()}) {
     GeometryOptions options;
     options.time_limit_seconds = bad;

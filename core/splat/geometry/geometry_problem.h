@@ -1,4 +1,4 @@
-// What geometry is trained on: cameras, pictures and the first Gaussians.
+// Inputs of training geometry: cameras, pictures and initial Gaussians.
 #pragma once
 
 #include <cstdint>
@@ -17,18 +17,19 @@ struct GeometryProblem {
   std::vector<PosedCamera> held_out;
   PictureSource luminance;  // 1 channel, L in 0..100
   PictureSource colors;     // 3 channels, sRGB 0..1; when set, trained on in place of luminance
-  PictureSource mask;  // 1 channel, 1 where a pixel counts, else 0; may be empty or give null: all
-  // As `mask`: 0 where something was seen to move on its own; may be empty or give null: not known.
+  PictureSource
+      mask;  // 1 channel, 1 where a pixel counts, else 0; may be empty or return null: all
+  // As `mask`: 0 where motion was detected before; may be empty or return null: unknown.
   PictureSource still;
   // 1 or 3 channels of any degree; its spherical harmonics are cut or extended to the options'
   // degree.
   GaussianModel initial;
   double extent = 1.0;  // of the scene, world units
-  // All views have one pose, and z is the depth in it: what they cannot tell, depth and thickness
-  // along it, stays as it begins.
+  // All views have one pose, and z is the depth in it: depth and thickness along it cannot be
+  // observed and are not trained.
   bool is_relief = false;
-  // Of pictures that are kept in the kernels' form, and a quarter of it of masks; the others are
-  // asked for again.
+  // Byte budget of pictures kept in the kernels' form, and a quarter of it for masks; the others
+  // are read again.
   int64_t picture_cache_bytes = int64_t{512} << 20;
 };
 

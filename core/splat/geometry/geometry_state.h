@@ -1,4 +1,4 @@
-// All that the training of geometry has to remember. Internal to the splat module.
+// The complete state of training geometry. Internal to the splat module.
 #pragma once
 
 #include <string>
@@ -12,23 +12,22 @@
 namespace color3d {
 
 struct GeometryState : TrainingState {
-  DensifyStatistics statistics;  // of what stands still, then of what moves
+  DensifyStatistics statistics;  // of the static part, then of the moving part
   MovingPart moving;
   int64_t densified_at = 0;  // iteration
-  Exposures exposures;       // of the training views, in their order; empty: none are fitted
+  Exposures exposures;       // of the training views, in their order; empty: not fitted
 };
 
-// Everything that the course of training depends on, but for the pictures themselves. `moments`: 1
-// where nothing may move; `initial_count`: Gaussians at the beginning.
+// All inputs of training except the pictures. `moments`: number of time steps, 1 for static scenes;
+// `initial_count`: initial number of Gaussians.
 std::string GeometryFingerprint(const GeometryProblem& problem,
                                 const GeometryOptions& options,
                                 int moments,
                                 int64_t initial_count);
 
-// `fingerprint` says what the state belongs to (options, scene); a state is only read back with the
-// same one.
+// `fingerprint` identifies the options and the scene; a state is only restored with the same one.
 std::string SerializeGeometryState(const GeometryState& state, std::string_view fingerprint);
-// False, and `state` unchanged, when the bytes are damaged or belong to something else.
+// Returns false, with `state` unchanged, if the bytes are damaged or have another fingerprint.
 bool ParseGeometryState(std::string_view bytes, std::string_view fingerprint, GeometryState& state);
 
 }  // namespace color3d

@@ -5,7 +5,7 @@
 namespace color3d {
 namespace {
 
-TEST(GeometryStateTest, DamagedBytesAreRefusedAtEveryLength) {
+TEST(GeometryStateTest, RejectsDamagedBytesOfEveryLength) {
   GeometryState state;
   state.parameters = ParameterBlock(12, 5);
   state.moments = {ParameterBlock(12, 5), ParameterBlock(12, 5)};

@@ -15,8 +15,8 @@
 
 namespace color3d {
 
-// Quality over the held-out views, at a moment of training. Pictures are compared after clamping to
-// 0..1; each view counts the same.
+// Quality over the held-out views at a time of training. Pictures are clamped to 0..1 before the
+// comparison; all views have equal weight.
 struct HeldOutPoint {
   double seconds = 0.0;  // of training
   int64_t iteration = 0;
@@ -26,23 +26,23 @@ struct HeldOutPoint {
   double l1 = 0.0;  // of values 0..1
 };
 
-// What training leaves for whoever measures it.
+// Measurements of a training.
 struct TrainingTrace {
-  // Called at the end for each held-out view, in order, and then for each training view where
-  // `score_training` asks for them: the model's picture, clamped to 0..1.
+  // Called at the end for each held-out view, in order, and then for each training view if
+  // `score_training` is set: the model's picture, clamped to 0..1.
   std::function<void(int view, const Image& drawn)> on_picture;
-  double seconds = 0.0;  // of training in this attempt, held-out evaluation not counted
+  double seconds = 0.0;  // of training in this attempt, without held-out evaluation
   int64_t iterations = 0;
   int64_t gaussians = 0;
   PhaseSeconds phases{};
   std::vector<HeldOutPoint> held_out;
-  bool score_training = false;  // asks for the next one
+  bool score_training = false;  // computes `training`
   HeldOutPoint training;        // the same over the training views, at the end
 };
 
-// Reports curves "train_l1_l" (running mean of |L'-L'_true|) and "heldout_psnr_l_db" (when there
-// are held-out views, a few times). Resumes from and saves to the checkpoints. Non-finite values
-// never survive: the last good state is restored with a smaller step, and a warning tells. On
+// Reports curves "train_l1_l" (running mean of |L'-L'_true|) and "heldout_psnr_l_db" (a few times,
+// if there are held-out views). Resumes from and saves to the checkpoints. Non-finite values never
+// survive: the last good state is restored with a smaller step and a warning. When training on
 // colours the curves are "train_l1_rgb" and "heldout_psnr_rgb_db", and the result has 3 channels:
 // sh_l, sh_a, sh_b are those of R, G, B, all around 0.5. `trace` may be null. Throws
 // Error{kInvalidArgument} without training views, Error{kCancelled}.

@@ -70,7 +70,7 @@ GeometryOptions SmallOptions(int iterations) {
   return options;
 }
 
-TEST(TrainGeometryTest, RaisesThePsnrOfAViewItNeverSaw) {
+TEST(TrainGeometryTest, RaisesPsnrOfHeldOutView) {
   const ProceduralScene s = MakeRoomCorner(7, 96, 72, 800);
   const GeometryProblem problem = ProblemOf(s, 3);
   ThreadPool pool(2);
@@ -96,7 +96,7 @@ TEST(TrainGeometryTest, RaisesThePsnrOfAViewItNeverSaw) {
 
 // Something of its own stands before the room in every photo, elsewhere in each, which a view
 // without it tells.
-TEST(TrainGeometryTest, LearnsNothingFromWhatIsMaskedOut) {
+TEST(TrainGeometryTest, IgnoresMaskedPixels) {
   const ProceduralScene s = MakeRoomCorner(7, 96, 72, 800);
   std::vector<std::shared_ptr<const Image>> masks;
   for (int view = 0; view < 7; ++view) {
@@ -133,7 +133,7 @@ TEST(TrainGeometryTest, LearnsNothingFromWhatIsMaskedOut) {
 }
 
 // One camera tells nothing of depth: what is not told stays, whatever would draw as well.
-TEST(TrainGeometryTest, ARelief) {
+TEST(TrainGeometryTest, TrainsRelief) {
   ProceduralScene s = MakeRoomCorner(2, 96, 72, 800);
   const Pose looks_from = s.scene.views[0].cam_from_world;
   for (SparsePoint& point : s.scene.points) point.position = looks_from.Apply(point.position);
@@ -161,7 +161,7 @@ TEST(TrainGeometryTest, ARelief) {
   EXPECT_GT(moved, 0.0);
 }
 
-TEST(TrainGeometryTest, KeepsTheHardCap) {
+TEST(TrainGeometryTest, KeepsGaussianCap) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 64, 500);
   ThreadPool pool(2);
   NoCheckpoints none;
@@ -199,7 +199,7 @@ TEST(TrainGeometryTest, ResumesBitForBit) {
   EXPECT_EQ(TrainFor(s, second, CancellationToken()), straight);
 }
 
-TEST(TrainGeometryTest, ADamagedCheckpointStartsAfreshWithAWarning) {
+TEST(TrainGeometryTest, RestartsWithWarningOnDamagedCheckpoint) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
   SaveThenStop store(0, nullptr);
   store.saved =
@@ -211,7 +211,7 @@ TEST(TrainGeometryTest, ADamagedCheckpointStartsAfreshWithAWarning) {
   EXPECT_EQ(recorder.last_step, 5);
 }
 
-TEST(TrainGeometryTest, ACheckpointOfAnotherTuningStartsAfresh) {
+TEST(TrainGeometryTest, RestartsOnCheckpointOfOtherTuning) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
   CancellationToken cancel;
   SaveThenStop store(10, &cancel);
@@ -246,7 +246,7 @@ Refusal RefusalOf(const GeometryProblem& problem, Recorder& recorder) {
   return {};
 }
 
-TEST(TrainGeometryTest, RefusesAPictureWithANaNAndNamesItsPlace) {
+TEST(TrainGeometryTest, NamesPositionOfNaNInPicture) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
   GeometryProblem problem = ProblemOf(s, -1);
   problem.luminance = [&s](int view) {
@@ -261,7 +261,7 @@ TEST(TrainGeometryTest, RefusesAPictureWithANaNAndNamesItsPlace) {
 }
 
 // An extent that makes every step overflow, however often the rate is halved.
-TEST(TrainGeometryTest, RestoresTheLastGoodStateAndGivesUpAfterSeveralTries) {
+TEST(TrainGeometryTest, RestoresLastGoodStateThenGivesUp) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
   GeometryProblem problem = ProblemOf(s, -1);
   problem.extent = 1e60;
@@ -271,7 +271,7 @@ TEST(TrainGeometryTest, RestoresTheLastGoodStateAndGivesUpAfterSeveralTries) {
   EXPECT_THAT(recorder.errors["restored_non_finite"], testing::SizeIs(testing::Ge(1u)));
 }
 
-TEST(TrainGeometryTest, HugeLearningRatesNeverLeaveNonFiniteValues) {
+TEST(TrainGeometryTest, HugeLearningRatesStayFinite) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
   GeometryOptions options = SmallOptions(80);
   options.learning_rate_scale = 1000.0;
@@ -299,7 +299,7 @@ GeometryOptions ColorOptions() {
   return options;
 }
 
-TEST(TrainOnColorsTest, LearnsAViewItNeverSawInRgb) {
+TEST(TrainOnColorsTest, LearnsHeldOutViewInRgb) {
   const ProceduralScene s = MakeRoomCorner(6, 96, 72, 800);
   TrainingTrace trace;
   int pictures = 0;
@@ -330,7 +330,7 @@ TEST(TrainOnColorsTest, LearnsAViewItNeverSawInRgb) {
   EXPECT_EQ(trace.gaussians, static_cast<int64_t>(model.size()));
 }
 
-TEST(TrainOnColorsTest, PhasesAddUpToTrainingTimeWithoutEvaluation) {
+TEST(TrainOnColorsTest, PhasesAddUpToTrainingTime) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 48, 400);
   TrainingTrace trace;
   ThreadPool pool(2);
@@ -358,7 +358,7 @@ class LastMessage : public NullObserver {
   std::string message_;
 };
 
-TEST(TimeLimitTest, EndsTheWholeScheduleLongBeforeTheIterationsRunOut) {
+TEST(TimeLimitTest, CompletesScheduleWithinLimit) {
   const ProceduralScene s = MakeRoomCorner(4, 160, 130, 400);
   GeometryOptions options = ColorOptions();
   options.iterations = 100'000;
@@ -405,7 +405,7 @@ class Saved : public NoCheckpoints {
   std::string state_;
 };
 
-TEST(TimeLimitTest, EarlierAttemptsCount) {
+TEST(TimeLimitTest, CountsEarlierAttempts) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 48, 200);
   const GeometryProblem problem = ColorProblemOf(s, -1);
   GeometryOptions options = ColorOptions();

@@ -1,4 +1,4 @@
-// How good a drawn picture is. Internal to the splat module.
+// Error measures of a rendered picture. Internal to the splat module.
 #pragma once
 
 #include "core/base/image.h"
@@ -14,17 +14,17 @@ struct PictureQuality {
   double l1 = 0.0;
 };
 
-// `drawn` is clamped to 0..1 first, in place. `mask` (1 channel of 0 and 1, may be null): where
-// pixels count; `drawn` becomes the truth elsewhere.
+// Clamps `drawn` to 0..1 in place. `mask` (1 channel of 0 and 1, may be null): 1 where pixels
+// count; elsewhere `drawn` is set to the truth.
 PictureQuality CompareClamped(const PlaneBuffer& truth,
                               const PlaneBuffer* mask,
                               ImageLoss& loss,
                               ThreadPool& pool,
                               PlaneBuffer& drawn);
 
-// Sets all channels of `planes` to those of `other` where `mask` is 0. Of equal sizes.
+// Copies all channels of `other` to `planes` where `mask` is 0. Requires equal sizes.
 void TakeWhereMasked(const PlaneBuffer& mask, const PlaneBuffer& other, PlaneBuffer& planes);
-// To 0.
+// Sets all channels to 0 where `mask` is 0.
 void ClearWhereMasked(const PlaneBuffer& mask, PlaneBuffer& planes);
 
 Image ImageFromPlanes(const PlaneBuffer& planes);

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-TEST(CompareClampedTest, ClampsBeforeItCompares) {
+TEST(CompareClampedTest, ClampsBeforeComparing) {
   PlaneBuffer drawn(20, 18, 3), truth(20, 18, 3);
   for (int c = 0; c < 3; ++c) {
     for (int y = 0; y < 18; ++y) {
@@ -25,7 +25,7 @@ TEST(CompareClampedTest, ClampsBeforeItCompares) {
   EXPECT_EQ(drawn.Row(1, 3)[4], 1.0f);
 }
 
-TEST(CompareClampedTest, OnlyWhatTheMaskLeavesCounts) {
+TEST(CompareClampedTest, ComparesMaskedPixelsOnly) {
   PlaneBuffer drawn(32, 24, 1), truth(32, 24, 1), mask(32, 24, 1);
   for (int y = 0; y < 24; ++y) {
     for (int x = 0; x < 32; ++x) {

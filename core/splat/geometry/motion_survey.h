@@ -1,4 +1,4 @@
-// Where a scene moves: what Gaussians that stand still cannot explain (DYNAMIC.md "Motion").
+// Detection of motion as residuals that static Gaussians cannot explain (DYNAMIC.md "Motion").
 // Internal to the splat module. Deterministic whatever the thread count.
 #pragma once
 
@@ -15,28 +15,28 @@ namespace color3d {
 struct SurveyedView {
   PosedCamera posed;  // with the small camera
   Image luminance;    // 1 channel, 0..1
-  Image drawn;        // 1 channel, 0..1: by what stands still
-  Image depth;        // 1 channel, world units; 0: nothing is there
-  Image still;        // 1 channel: 0 where something was seen to move on its own; empty: not known
+  Image drawn;        // 1 channel, 0..1: render of the static part
+  Image depth;        // 1 channel, world units; 0: empty
+  Image still;        // 1 channel: 0 where motion was detected before; empty: unknown
   Image moving;       // 1 channel, 0 or 1; set by SurveyMotion
 };
 
-// Longer side of a surveyed picture, at most.
+// Maximum longer side of a surveyed picture.
 inline constexpr int kSurveySidePx = 192;
 
 struct MotionSurvey {
-  double moving_share = 0.0;    // motion energy: of all pixels, those that move
-  double residual_share = 0.0;  // of all pixels, those whose residual says so
+  double moving_share = 0.0;    // motion energy: share of moving pixels
+  double residual_share = 0.0;  // share of pixels whose residual exceeds the threshold
   double threshold = 0.0;       // of |residual| over 5x5 px, 0..1
-  double least_share = 0.0;     // a smaller residual_share is what still scenes have, too
+  double least_share = 0.0;     // smaller values of residual_share occur in static scenes, too
 };
 
-// Sets `moving` of every view: where the mean residual over 5x5 px is beyond five deviations of the
-// scene's (and 0.03). From the residuals of a camera that does not move the median over time is
-// taken away first: that is what stands still and is drawn badly; where no camera stands still and
-// nothing that was seen beforehand is confirmed, more is asked (`least_share`). Specks are none.
-// What `still` leaves out moves, too, where at least a tenth of all of it has such residuals. With
-// one time for all views nothing moves.
+// Sets `moving` of every view: the pixels whose mean residual over 5x5 px exceeds five standard
+// deviations of the scene's residuals (and 0.03). For a static camera the median residual over time
+// is subtracted first, because a constant residual is a badly drawn static region. Without a static
+// camera and without confirmation of earlier detections the evidence must be stronger
+// (`least_share`). Removes specks. The pixels excluded by `still` move, too, if at least a tenth of
+// them have such residuals. With one time for all views nothing moves.
 MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views);
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
-// How fast what moves is at first: by optical flow to a camera's frames before and after. Internal
-// to the splat module. Deterministic whatever the thread count.
+// Initial velocity of moving objects from optical flow to a camera's previous and next frames.
+// Internal to the splat module. Deterministic whatever the thread count.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace color3d {
 
-// A pixel of a surveyed view that moves, as a place in space.
+// A moving pixel of a surveyed view, as a point in space.
 struct MoverSeed {
   int x = 0;
   int y = 0;
@@ -18,9 +18,9 @@ struct MoverSeed {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  // world units per unit of GaussianMotion's t
 };
 
-// Sets the velocity of each view's seeds: the mean of those to the frame before and to the one
-// after, of those of the two that flow finds among what moves there. A place keeps its depth where
-// no seed is near the one that it comes to. `step`: distance of neighbouring seeds, px.
+// Sets the velocity of each view's seeds to the mean of those to the previous and the next frame,
+// as far as optical flow leads to a moving pixel there. A point keeps its depth if no seed is near
+// its destination. `step`: distance of neighbouring seeds, px.
 void FindVelocities(const std::vector<SurveyedView>& views,
                     const std::vector<float>& unit_time,
                     int step,

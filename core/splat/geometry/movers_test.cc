@@ -77,7 +77,7 @@ double Share(const Image& mask) {
   return sum / static_cast<double>(mask.data.size());
 }
 
-TEST(MotionSurveyTest, FindsWhatIsNotDrawn) {
+TEST(MotionSurveyTest, FindsRegionsMissingFromRender) {
   ThreadPool pool(2);
   std::vector<SurveyedView> views = Rig(4, true);
   const MotionSurvey survey = SurveyMotion(pool, views);
@@ -86,7 +86,7 @@ TEST(MotionSurveyTest, FindsWhatIsNotDrawn) {
   for (const SurveyedView& view : views) EXPECT_NEAR(Share(view.moving), disc, 0.6 * disc);
 }
 
-TEST(MotionSurveyTest, NothingMovesWhereAllIsDrawnOrThereIsOneMoment) {
+TEST(MotionSurveyTest, FindsNothingInWellDrawnOrSingleTime) {
   ThreadPool pool(2);
   std::vector<SurveyedView> still = Rig(4, false);
   EXPECT_EQ(SurveyMotion(pool, still).moving_share, 0.0);
@@ -95,7 +95,7 @@ TEST(MotionSurveyTest, NothingMovesWhereAllIsDrawnOrThereIsOneMoment) {
 }
 
 // What a camera that stands still always shows stands still, however badly it is drawn.
-TEST(MotionSurveyTest, WhatIsAlwaysDrawnBadlyDoesNotMove) {
+TEST(MotionSurveyTest, ConstantResidualIsNotMotion) {
   ThreadPool pool(2);
   std::vector<SurveyedView> views = Rig(7, false);
   for (SurveyedView& view : views) {
@@ -113,7 +113,7 @@ std::vector<SurveyedView> WithSeen(std::vector<SurveyedView> views, int first, i
   return views;
 }
 
-TEST(MotionSurveyTest, WhatWasSeenToMoveMovesAlsoWhereItIsDrawnWell) {
+TEST(MotionSurveyTest, KnownMotionIncludesWellDrawnPixels) {
   ThreadPool pool(2);
   std::vector<SurveyedView> without = Rig(4, true);
   std::vector<SurveyedView> views = WithSeen(without, 30, 48);  // with the ball's upper half
@@ -123,14 +123,14 @@ TEST(MotionSurveyTest, WhatWasSeenToMoveMovesAlsoWhereItIsDrawnWell) {
   EXPECT_EQ(views[2].moving.At(0, 30, 0), 1.0f);
 }
 
-TEST(MotionSurveyTest, WhatWasSeenToMoveAndIsAllDrawnWellStandsStill) {
+TEST(MotionSurveyTest, KnownMotionDrawnWellIsStatic) {
   ThreadPool pool(2);
   std::vector<SurveyedView> views = WithSeen(Rig(4, false), 0, 9);
   EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
 // One camera that moves has no median over time: what it draws badly looks like what moves.
-TEST(MotionSurveyTest, ACameraThatMovesMustShowMoreMotionUnlessItWasSeenBefore) {
+TEST(MotionSurveyTest, MovingCameraNeedsMoreEvidence) {
   ThreadPool pool(2);
   std::vector<SurveyedView> moving;
   for (int t = 0; t < 6; ++t) moving.push_back(ViewAt(0.1 * t, 0, t, true));
@@ -162,7 +162,7 @@ Seeded SeedsOf(std::vector<SurveyedView>& views, int64_t most) {
   return seeded;
 }
 
-TEST(MoverSeedsTest, StandWhereTheBallIsAndMoveAsItDoes) {
+TEST(MoverSeedsTest, SeedsFollowBall) {
   std::vector<SurveyedView> views = Rig(5, true);
   const Seeded seeds = SeedsOf(views, 600);
   const ParameterBlock& b = seeds.block;
@@ -180,7 +180,7 @@ TEST(MoverSeedsTest, StandWhereTheBallIsAndMoveAsItDoes) {
   EXPECT_GT(along, 0.6 * static_cast<double>(b.count()));
 }
 
-TEST(MoverSeedsTest, OneCameraPutsThemBeforeTheWall) {
+TEST(MoverSeedsTest, OneCameraSeedsInFrontOfWall) {
   std::vector<SurveyedView> views;
   for (int t = 0; t < 5; ++t) views.push_back(ViewAt(0.0, 0, t, true));
   const Seeded seeds = SeedsOf(views, 200);
@@ -200,7 +200,7 @@ std::vector<PosedCamera> PosedRig(int cameras, int times) {
   return views;
 }
 
-TEST(BlocksOfTimeTest, AreBoundedAndTearNoMomentApart) {
+TEST(BlocksOfTimeTest, BlocksAreBoundedAndKeepTimesWhole) {
   struct Case {
     int cameras, times;
     size_t blocks, largest;
@@ -231,7 +231,7 @@ TEST(BlocksOfTimeTest, AreBoundedAndTearNoMomentApart) {
 }
 
 // A long film is surveyed block by block: what moves is seeded in all of them.
-TEST(FindMovingPartTest, ALongFilmHasMoversAtAllTimes) {
+TEST(FindMovingPartTest, LongFilmHasMoversAtAllTimes) {
   constexpr int kFrames = 300, kMost = 3000;
   GeometryProblem problem;
   for (int t = 0; t < kFrames; ++t) {
@@ -267,7 +267,7 @@ TEST(FindMovingPartTest, ALongFilmHasMoversAtAllTimes) {
   EXPECT_EQ(tenths.size(), 10u);
 }
 
-TEST(MoverSeedsTest, NothingMovesNothingIsSeeded) {
+TEST(MoverSeedsTest, NoMotionGivesNoSeeds) {
   std::vector<SurveyedView> views = Rig(4, false);
   EXPECT_EQ(SeedsOf(views, 100).block.count(), 0);
 }

@@ -1,5 +1,5 @@
-// What moves while geometry is trained, beside what stands still: the two are drawn together and
-// trained apart, so that what stands still never meets time. Internal to the splat module.
+// The moving Gaussians during training of geometry. They are rendered together with the static ones
+// but trained apart, so that the static part is independent of time. Internal to the splat module.
 // Deterministic whatever the thread count.
 #pragma once
 
@@ -20,17 +20,17 @@
 
 namespace color3d {
 
-// Empty until something moves. Rows: those of what stands still, then kMotionRows.
+// Empty until motion is detected. Rows: those of the static part, then kMotionRows.
 struct MovingPart {
   ParameterBlock parameters;
   AdamMoments moments;
 };
 
-// The times of a problem's views.
+// Times of a problem's views.
 struct TimeSpan {
   double begin_s = 0.0;
   double end_s = 0.0;
-  int steps = 1;  // different times
+  int steps = 1;  // number of different times
 
   // From one time step to the next, in units of GaussianMotion's t; 1 with one step.
   double Interval() const { return steps > 1 ? 2.0 / (steps - 1) : 1.0; }
@@ -38,23 +38,23 @@ struct TimeSpan {
 };
 TimeSpan TimeSpanOf(const GeometryProblem& problem);
 
-// Motion is looked for in blocks of time, so that memory does not grow with the scene's length:
-// some blocks of about as many times each where there are more views than these, but not fewer
-// times than tell what stands still.
+// Motion is detected in blocks of time, so that memory does not grow with the scene's length:
+// blocks of about equal numbers of times if there are more views than this, but not fewer times
+// than static regions need.
 inline constexpr size_t kViewsAtOnce = 128;
 inline constexpr size_t kFewestTimesAtOnce = 24;
-// Each view once, in the given order; those of one time are in one block.
+// Contains each view once, in the given order; views of one time are in one block.
 std::vector<std::vector<PosedCamera>> BlocksOfTime(const std::vector<PosedCamera>& views);
 
-// The picture of a view at a level.
+// Returns the picture of a view at a level.
 using LevelTarget =
     std::function<std::shared_ptr<const PlaneBuffer>(const PosedCamera& view, int level)>;
 
 struct FoundMovers {
   double moving_share = 0.0;  // motion energy: share of the pixels
-  MovingPart moving;          // empty where so little moves that the scene stands still
+  MovingPart moving;          // empty if motion is negligible and the scene is static
 };
-// Decides whether the scene moves, and where: `still` draws what stands still well enough by now.
+// Decides if and where the scene moves; `still` renders the static part well enough at this time.
 FoundMovers FindMovingPart(const GeometryProblem& problem,
                            const TimeSpan& times,
                            const ParameterBlock& still,
@@ -63,14 +63,14 @@ FoundMovers FindMovingPart(const GeometryProblem& problem,
                            const GeometryOptions& options,
                            ThreadPool& pool);
 
-// Both at the moment `t`: those that stand still first. `hidden`: ApplyMotion.
+// Both parts at the time `t`, the static one first. `hidden`: see ApplyMotion.
 void ComposeAt(const ParameterBlock& still,
                const MovingPart& moving,
                float t,
                ThreadPool& pool,
                ParameterBlock& at,
                float hidden = 0.0f);
-// The adjoint; `gradient` comes as dL/d(at) and leaves as dL/d(still).
+// The adjoint; `gradient` is dL/d(at) on entry and dL/d(still) on return.
 void DecomposeGradient(const ParameterBlock& still,
                        const MovingPart& moving,
                        float t,
@@ -79,11 +79,11 @@ void DecomposeGradient(const ParameterBlock& still,
                        ParameterBlock& gradient,
                        ParameterBlock& moving_gradient);
 
-// DensifyByGradient on both; statistics are of both together, and what room there is is shared by
-// their numbers.
+// DensifyByGradient on both parts; statistics are of both together, and the remaining capacity is
+// shared in proportion to their counts.
 void DensifyParts(const GradientDensifyOptions& options, DensifyTarget& still, MovingPart& moving);
 
-// The trained model; on colours its channels all have the same degree.
+// The trained model; when training on colours all its channels have the same degree.
 GaussianModel ModelOfParts(const ParameterBlock& still,
                            const MovingPart& moving,
                            const TimeSpan& times,

@@ -1,6 +1,6 @@
-// What keeps Gaussians in shape beside the picture's loss: the penalties on opacity and scale of
-// 3DGS-MCMC (Kheradmand et al. 2024), and a limit on needles. Internal to the splat module;
-// deterministic whatever the thread count.
+// Regularization of Gaussian shapes: the penalties on opacity and scale of 3DGS-MCMC (Kheradmand et
+// al. 2024), and a limit on needles. Internal to the splat module; deterministic whatever the
+// thread count.
 #pragma once
 
 #include "core/base/parallel.h"

@@ -14,7 +14,7 @@ constexpr int kCount = kBlockCount;
 
 using RegularizeTest = InstructionSetTest<int>;  // of thread counts
 
-TEST_P(RegularizeTest, PenaltyGradientsAgreeWithTheirFormula) {
+TEST_P(RegularizeTest, PenaltyGradientsAgreeWithFormula) {
   ThreadPool pool(TestCase());
   const ParameterBlock p = RandomBlock(3, 2.0);
   ParameterBlock gradient(kRows, kCount);
@@ -30,7 +30,7 @@ TEST_P(RegularizeTest, PenaltyGradientsAgreeWithTheirFormula) {
   }
 }
 
-TEST_P(RegularizeTest, NeedlesAreShortenedAndFlatGaussiansAreNot) {
+TEST_P(RegularizeTest, ShortensNeedlesButNotFlatGaussians) {
   ThreadPool pool(TestCase());
   ParameterBlock p(kRows, kCount);
   for (int i = 0; i < kCount; ++i) {

@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST(TrainingScheduleTest, TheFartherOfTimeAndIterationsDrivesIt) {
+TEST(TrainingScheduleTest, FollowsFartherOfTimeAndIterations) {
   GeometryOptions options;
   options.iterations = 1000;
   const TrainingSchedule untimed(options, 1.0);
@@ -23,7 +23,7 @@ TEST(TrainingScheduleTest, TheFartherOfTimeAndIterationsDrivesIt) {
   EXPECT_DOUBLE_EQ(timed.Fraction(2000, 0.0), 1.0);
 }
 
-TEST(TrainingScheduleTest, EndsAtFullSizeWithTheLastRatesAndAllHarmonics) {
+TEST(TrainingScheduleTest, EndsAtFullSizeWithFinalRates) {
   const GeometryOptions options;
   const TrainingSchedule schedule(options, 2.0);
   Camera camera;
@@ -42,7 +42,7 @@ TEST(TrainingScheduleTest, EndsAtFullSizeWithTheLastRatesAndAllHarmonics) {
   EXPECT_EQ(schedule.Level(0.0, camera), 0);
 }
 
-TEST(TrainingScheduleTest, DropsMoreTheFewerViewsThereAreAndNothingInThePapersRecipe) {
+TEST(TrainingScheduleTest, DropoutGrowsWithFewerViews) {
   GeometryOptions options;
   const TrainingSchedule schedule(options, 1.0);
   EXPECT_EQ(schedule.DropRate(0.0, 9), 0.0);
@@ -55,7 +55,7 @@ TEST(TrainingScheduleTest, DropsMoreTheFewerViewsThereAreAndNothingInThePapersRe
 }
 
 // 2 % of the pixels, of few views counted at up to 500 px.
-TEST(GaussianCapTest, FollowsTheViewsWhereTheyAreFew) {
+TEST(GaussianCapTest, FollowsViewCountIfSparse) {
   const std::vector<Camera> nine(9, Camera{4000, 3000, 3000.0, 3000.0, 2000.0, 1500.0});
   EXPECT_EQ(GaussianCap(40'000, nine, 500), 33'750);
   EXPECT_EQ(GaussianCap(120'000, nine, 800), 33'750);
@@ -68,7 +68,7 @@ TEST(GaussianCapTest, FollowsTheViewsWhereTheyAreFew) {
   EXPECT_EQ(GaussianCap(40'000, {nine[0]}, 100), 5000);
 }
 
-TEST(IterationCapTest, GrowsWithTheViewsAndNeverBindsTheDefault) {
+TEST(IterationCapTest, GrowsWithViewsAndAllowsDefault) {
   EXPECT_EQ(IterationCap(1500, 3), 1500);
   EXPECT_EQ(IterationCap(5000, 3), 1500);
   EXPECT_EQ(IterationCap(5000, 12), 1800);
@@ -76,7 +76,7 @@ TEST(IterationCapTest, GrowsWithTheViewsAndNeverBindsTheDefault) {
   EXPECT_EQ(IterationCap(100'000, 1'000'000'000), 100'000);
 }
 
-TEST(TrainingScheduleTest, ThePapersTimesAreIterations) {
+TEST(TrainingScheduleTest, PaperRecipeSchedulesByIteration) {
   GeometryOptions options;
   options.recipe = GeometryOptions::Recipe::kPaper;
   options.iterations = 15'000;
@@ -101,7 +101,7 @@ TEST(TrainingScheduleTest, ThePapersTimesAreIterations) {
   EXPECT_EQ(schedule.Level(0.0, camera), 0);
 }
 
-TEST(TrainingScheduleTest, AShortTimeLimitHoldsBackTheNumberOfGaussians) {
+TEST(TrainingScheduleTest, ShortTimeLimitReducesGaussianCap) {
   GeometryOptions options;
   options.iterations = 100'000;
   options.max_gaussians = 50'000;

@@ -18,7 +18,7 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-TEST(GrayModelTest, LuminanceIsThatOfTheColor) {
+TEST(GrayModelTest, LuminanceMatchesColor) {
   ThreadPool pool(2);
   ViewerGaussians g = BallOnGround(300, 0.4f);
   for (float& sh : g.sh) sh = std::clamp(sh, -1.7f, 1.7f);  // sRGB 0..1
@@ -34,7 +34,7 @@ TEST(GrayModelTest, LuminanceIsThatOfTheColor) {
   }
 }
 
-TEST(GrayModelTest, GreyHarmonicsComeBackThroughTheExport) {
+TEST(GrayModelTest, GrayHarmonicsSurviveExport) {
   ThreadPool pool(2);
   ViewerGaussians g = BallOnGround(100, 0.0f, 3);
   for (size_t i = 0; i < g.sh.size(); i += 3) g.sh[i + 1] = g.sh[i + 2] = g.sh[i];
@@ -46,7 +46,7 @@ TEST(GrayModelTest, GreyHarmonicsComeBackThroughTheExport) {
   for (size_t i = 0; i < g.sh.size(); ++i) EXPECT_NEAR(rgb.sh[i], g.sh[i], 0.02) << i;
 }
 
-TEST(GrayModelTest, RendersInGreyAsViewersDo) {
+TEST(GrayModelTest, RendersGrayLikeViewers) {
   ThreadPool pool(2);
   const ViewerGaussians g = BallOnGround(4000);
   const GraySplat gray = GrayModelOf(g, "g", pool);
@@ -60,7 +60,7 @@ TEST(GrayModelTest, RendersInGreyAsViewersDo) {
       35.0);
 }
 
-TEST(GrayModelTest, WhatIsNoNumberIsLeftOutAndInfinitiesAreBounded) {
+TEST(GrayModelTest, DropsNaNsAndClampsInfinities) {
   ThreadPool pool(2);
   ViewerGaussians g = BallOnGround(10, 0.0f, 1);
   g.position[3 * 1] = kNan;
@@ -82,7 +82,7 @@ TEST(GrayModelTest, WhatIsNoNumberIsLeftOutAndInfinitiesAreBounded) {
   ParseGaussians(SerializeGaussians(gray.model));  // refuses what is not finite
 }
 
-TEST(GrayModelTest, NothingLeftIsRefused) {
+TEST(GrayModelTest, RejectsModelWithoutFiniteGaussians) {
   ThreadPool pool(1);
   ViewerGaussians g = BallOnGround(3);
   for (float& x : g.opacity_logit) x = kNan;

@@ -1,4 +1,4 @@
-// What the readers of this folder share.
+// Helpers of the readers of this folder.
 #pragma once
 
 #include <cmath>
@@ -11,7 +11,7 @@
 
 namespace color3d {
 
-// Little-endian; the caller has checked that the bytes are there.
+// Little-endian; the caller checks the size first.
 inline uint32_t LittleEndianAt(std::string_view bytes, size_t at, int width) {
   uint32_t value = 0;
   for (int k = width - 1; k >= 0; --k) value = value << 8u | static_cast<uint8_t>(bytes[at + k]);
@@ -39,7 +39,7 @@ inline ViewerGaussians EmptyGaussians(size_t count, int degree) {
   return g;
 }
 
-// Of an opacity in 0..1 that was rounded to 8 bits: 0 and 1 stay finite.
+// Logit of an opacity in 0..1 that was rounded to 8 bits; finite for 0 and 1.
 inline float LogitOf(float opacity) {
   const float inside = opacity < 1e-6f ? 1e-6f : opacity > 1.0f - 1e-6f ? 1.0f - 1e-6f : opacity;
   return std::log(inside / (1.0f - inside));

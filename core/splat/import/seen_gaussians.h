@@ -1,4 +1,4 @@
-// Which Gaussians a camera sees, and how well. Internal to this folder.
+// Visibility of Gaussians from a camera. Internal to this folder.
 #pragma once
 
 #include <Eigen/Core>
@@ -22,24 +22,24 @@ struct Ellipsoid {
 };
 Ellipsoid EllipsoidOf(const GaussianModel& model, size_t i);
 
-// Of the Gaussians that are drawn at all, at most `count`, spread evenly over the file's order.
+// Selects at most `count` of the visible Gaussians, spread evenly over the file's order.
 std::vector<size_t> SpreadSample(const GaussianModel& model, size_t count);
 
 // Not thread-safe.
 class SeenGaussians {
  public:
-  // `model` must outlive it. `picture`: what the camera will take in the end, px.
+  // `model` must outlive it. `picture`: size of the camera's final picture, px.
   SeenGaussians(const GaussianModel& model, const Camera& picture, ThreadPool& pool);
 
   struct Measure {
-    double seen = 0.0;     // sum over what is seen of opacity x share of its face x sharpness
+    double seen = 0.0;     // sum over visible Gaussians of opacity x share of the face x sharpness
     double covered = 0.0;  // share of the picture that is not empty
-    double near = 0.0;     // share of it that is filled by things much nearer than `focus`
+    double near = 0.0;     // share of it covered by objects much nearer than `focus`
   };
-  // `focus`: distance of what the camera is to look at.
+  // `focus`: distance of the point that the camera looks at.
   Measure At(const Pose& cam_from_world, double focus);
 
-  // Of these points those that the camera sees unhidden. For points on Gaussians.
+  // Returns the points that the camera sees unoccluded. For points on Gaussians.
   std::vector<char> Visible(const Pose& cam_from_world, const std::vector<Eigen::Vector3d>& points);
 
  private:

@@ -58,7 +58,7 @@ std::string Gzip(const std::string& plain) {
   return packed;
 }
 
-TEST(SplatFileTest, PlyIsReadAsItStandsThere) {
+TEST(SplatFileTest, ReadsPlyExactly) {
   for (const int degree : {0, 1, 2, 3}) {
     const ViewerGaussians g = BallOnGround(7, 0.3f, degree);
     const ViewerGaussians file = ReadSplat(SplatPly(g));
@@ -71,7 +71,7 @@ TEST(SplatFileTest, PlyIsReadAsItStandsThere) {
   }
 }
 
-TEST(SplatFileTest, PlyMayHaveOtherTypesOrdersLineEndsAndElements) {
+TEST(SplatFileTest, ReadsPlyVariants) {
   std::string text = Header(
       "comment by another program\nelement vertex 1\nproperty uchar red\nproperty uchar green\n"
       "property uchar blue\nproperty double x\nproperty float y\nproperty float z\n"
@@ -96,7 +96,7 @@ TEST(SplatFileTest, PlyMayHaveOtherTypesOrdersLineEndsAndElements) {
   EXPECT_NEAR(0.5f + kShDc * g.sh[2], 0.0f, 1e-6);
 }
 
-TEST(SplatFileTest, RefusesOtherPlys) {
+TEST(SplatFileTest, RejectsUnsupportedPly) {
   const std::string ply = SplatPly(BallOnGround(5, 0.0f, 1));
   EXPECT_THAT(Refusal(Header("element vertex 8\nproperty float x\nproperty float y\n"
                              "property float z\nelement face 6\n"
@@ -123,7 +123,7 @@ TEST(SplatFileTest, RefusesOtherPlys) {
   EXPECT_THAT(Refusal(ply.substr(0, ply.size() - 1)), HasSubstr("ends after 4 of its 5"));
 }
 
-TEST(SplatFileTest, SizesAreCheckedBeforeMemoryIsTaken) {
+TEST(SplatFileTest, ChecksSizesBeforeAllocating) {
   const std::string ply = SplatPly(BallOnGround(5));
   for (const char* count : {"4000000000", "18446744073709551615"}) {
     EXPECT_THAT(Refusal(Replaced(ply, "vertex 5", std::string("vertex ") + count)),
@@ -144,7 +144,7 @@ TEST(SplatFileTest, SizesAreCheckedBeforeMemoryIsTaken) {
   EXPECT_THAT(Refusal(Gzip(header + std::string(1000, '\0'))), HasSubstr("cut short"));
 }
 
-TEST(SplatFileTest, EveryCutOfEveryFormatIsRefused) {
+TEST(SplatFileTest, RejectsEveryTruncation) {
   ThreadPool pool(1);
   const ViewerGaussians g = BallOnGround(40, 0.2f, 1);
   for (const std::string& bytes : {SplatPly(g),
@@ -158,7 +158,7 @@ TEST(SplatFileTest, EveryCutOfEveryFormatIsRefused) {
   }
 }
 
-TEST(SplatFileTest, OtherVersionsAreNamed) {
+TEST(SplatFileTest, NamesUnsupportedVersion) {
   ThreadPool pool(1);
   const std::string meta = R"({"means":{"shape":[2,3]}})";
   EXPECT_THAT(Refusal(StoredZip({{"meta.json", meta}})), HasSubstr("SOG of version 1"));
@@ -176,7 +176,7 @@ TEST(SplatFileTest, OtherVersionsAreNamed) {
 }
 
 // A file is read from its archive or not at all.
-TEST(SplatFileTest, FilesOutsideOfTheArchiveAreNotRead) {
+TEST(SplatFileTest, DoesNotReadFilesOutsideArchive) {
   const ScratchFolder folder;
   const std::filesystem::path outside = folder.path() / "means.webp";
   WriteFileAtomic(outside, "RIFF");
@@ -191,7 +191,7 @@ TEST(SplatFileTest, FilesOutsideOfTheArchiveAreNotRead) {
   }
 }
 
-TEST(SplatFileTest, SpzOfVersion3HasTheRotationsOf4) {
+TEST(SplatFileTest, SpzVersion3UsesRotationsOfVersion4) {
   ThreadPool pool(1);
   const ViewerGaussians g = BallOnGround(20);
   const std::string four = EncodeSpz(g, SpzVersion::k4, pool);
@@ -217,14 +217,14 @@ TEST(SplatFileTest, SpzOfVersion3HasTheRotationsOf4) {
   EXPECT_NEAR(g3.rotation[0], 1.0f, 1e-6);
 }
 
-TEST(SplatFileTest, WhatIsNoSplatIsNamed) {
+TEST(SplatFileTest, NamesFileThatIsNoSplat) {
   EXPECT_THAT(Refusal(""), HasSubstr("empty"));
   EXPECT_THAT(Refusal("\x89PNG...."), HasSubstr("PNG picture"));
   EXPECT_THAT(Refusal("glTF...."), HasSubstr("glTF"));
   EXPECT_THAT(Refusal("some text"), HasSubstr("not a splat"));
 }
 
-TEST(SplatFileTest, ZipNamesAreCheckedAndBombsAreRefusedUnread) {
+TEST(SplatFileTest, RejectsUnsafeZipNamesAndBombs) {
   const auto refusal = [](const std::string& zip) -> std::string {
     try {
       const ZipReader reader(zip, "z");
@@ -253,7 +253,7 @@ TEST(SplatFileTest, ZipNamesAreCheckedAndBombsAreRefusedUnread) {
   EXPECT_THROW(ZipReader(StoredZip({{"a", "x"}}), "z").Read("../a", 7), Error);
 }
 
-TEST(SplatFileTest, ZipEntriesAreCheckedAndBounded) {
+TEST(SplatFileTest, ChecksZipEntries) {
   const std::string zip = StoredZip({{"a", "content"}});
   EXPECT_EQ(ZipReader(zip, "z").Read("a", 7), "content");
   EXPECT_THROW(ZipReader(zip, "z").Read("a", 6), Error);

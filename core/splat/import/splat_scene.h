@@ -1,5 +1,5 @@
-// A splat as a scene without photos: views chosen around it, and its Gaussians in grey, which need
-// no training (STILL.md "A splat without photos").
+// Builds a scene without photos from a splat: views chosen around it, and its Gaussians in grey,
+// which need no training (STILL.md "A splat without photos").
 #pragma once
 
 #include <cstdint>
@@ -16,23 +16,23 @@
 namespace color3d {
 
 struct SplatScene {
-  // Cameras, points on the Gaussians, and how the scene's frame lies in the file's. Views are named
-  // view_01.png, ...; there are no such files yet: `image_file` is the name.
+  // Cameras, points on the Gaussians, and the transform between the scene and the file. Views are
+  // named view_01.png, ...; these files do not exist yet: `image_file` is the name.
   Scene scene;
   GaussianModel geometry;             // luminance only, in the scene's frame
   int64_t gaussians = 0;              // in the file
-  int64_t dropped = 0;                // left out, because they cannot be drawn
-  bool had_color = false;             // it was removed
+  int64_t dropped = 0;                // dropped because they cannot be drawn
+  bool had_color = false;             // colour was removed
   std::vector<std::string> warnings;  // for the report; not sent to the observer
 };
 
-// Most memory that any stage takes for each Gaussian of a splat of this degree, bytes: of the
-// export, which fits colours to whole pictures.
+// Maximum memory of any stage per Gaussian of a splat of this degree, bytes: that of the export,
+// which fits colours to whole pictures.
 int64_t WorkBytesPerGaussian(int sh_degree);
 
-// `bytes`: of a file that ReadSplat reads. Throws Error as ReadSplat, GrayModelOf and
-// ChooseSplatCameras do, and Error{kResourceExhausted} with the numbers when work on so many
-// Gaussians takes more than `memory_bytes`. Keeps no checkpoints.
+// `bytes`: a file that ReadSplat reads. Throws Error as ReadSplat, GrayModelOf and
+// ChooseSplatCameras do, and Error{kResourceExhausted} with the numbers if the work needs more than
+// `memory_bytes`. Keeps no checkpoints.
 SplatScene ImportSplat(std::string_view bytes,
                        const std::string& name,
                        const SplatViewOptions& options,

@@ -25,7 +25,7 @@ SplatScene Import(const std::string& ply, SplatViewOptions options = Few()) {
   return ImportSplat(ply, "scene.ply", options, kPlenty, run.control());
 }
 
-TEST(SplatSceneTest, ViewsStandAboveTheGroundAndLookAtTheBall) {
+TEST(SplatSceneTest, ViewsAreAboveGroundAndFaceBall) {
   const SplatScene splat = Import(SplatPly(BallOnGround(6000, 0.5f, 1)));
   const Scene& scene = splat.scene;
   ASSERT_EQ(scene.views.size(), 8u);
@@ -59,7 +59,7 @@ TEST(SplatSceneTest, ViewsStandAboveTheGroundAndLookAtTheBall) {
   for (const SparsePoint& point : scene.points) EXPECT_GE(point.views.size(), 2u);
 }
 
-TEST(SplatSceneTest, UpIsWhatTheUserSaysOfTheFrame) {
+TEST(SplatSceneTest, UsesUpAxisGivenByUser) {
   ViewerGaussians g = BallOnGround(3000);  // turned: z is up
   for (size_t i = 0; i < g.size(); ++i) {
     float* p = g.position.data() + 3 * i;
@@ -78,12 +78,12 @@ TEST(SplatSceneTest, UpIsWhatTheUserSaysOfTheFrame) {
   }
 }
 
-TEST(SplatSceneTest, TheSameAgain) {
+TEST(SplatSceneTest, IsDeterministic) {
   const std::string ply = SplatPly(BallOnGround(500));
   EXPECT_EQ(SceneToJson(Import(ply).scene), SceneToJson(Import(ply).scene));
 }
 
-TEST(SplatSceneTest, AWallIsSeenFromTheSideThatShowsMore) {
+TEST(SplatSceneTest, ViewsWallFromMoreVisibleSide) {
   // A wall of small things in front of a curtain that hides them from behind.
   ViewerGaussians g = BallOnGround(2000);
   for (size_t i = 0; i < g.size(); ++i) {
@@ -102,7 +102,7 @@ TEST(SplatSceneTest, AWallIsSeenFromTheSideThatShowsMore) {
   }
 }
 
-TEST(SplatSceneTest, FramesThatFloatsCannotBearAreChangedAndNoted) {
+TEST(SplatSceneTest, RecentersLargeCoordinatesWithNote) {
   const ViewerGaussians plain = BallOnGround(400);
   for (const auto& [scale, offset] :
        {std::pair(1e-3f, 0.0f), std::pair(1.0f, 4096.0f), std::pair(1e4f, 0.0f)}) {
@@ -126,13 +126,13 @@ TEST(SplatSceneTest, FramesThatFloatsCannotBearAreChangedAndNoted) {
   EXPECT_EQ(Import(SplatPly(plain)).scene.world_from_scene_scale, 1.0);
 }
 
-TEST(SplatSceneTest, OneGaussianIsASceneToo) {
+TEST(SplatSceneTest, AcceptsOneGaussian) {
   const SplatScene one = Import(SplatPly(BallOnGround(1)));
   EXPECT_EQ(one.geometry.size(), 1u);
   EXPECT_GE(one.scene.views.size(), 2u);
 }
 
-TEST(SplatSceneTest, RefusesWhatCannotBeSeen) {
+TEST(SplatSceneTest, RejectsInvisibleModel) {
   ViewerGaussians g = BallOnGround(50);
   for (float& logit : g.opacity_logit) logit = -12.0f;
   try {
@@ -143,7 +143,7 @@ TEST(SplatSceneTest, RefusesWhatCannotBeSeen) {
   }
 }
 
-TEST(SplatSceneTest, MoreThanMemoryHoldsIsRefusedWithNumbers) {
+TEST(SplatSceneTest, NamesMemoryNeededIfTooLarge) {
   const std::string ply = SplatPly(BallOnGround(2000, 0.0f, 3));
   QuietRun run(1);
   const auto refusal = [&](int64_t memory) -> std::string {

@@ -1,4 +1,4 @@
-// Files out of a zip that nobody vouches for.
+// Reads files from untrusted zip archives.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +11,14 @@ namespace color3d {
 // `bytes` must outlive it. The directory is read at once; immutable after that.
 class ZipReader {
  public:
-  // `name`: of the archive, for complaints. Throws Error{kInvalidArgument} for what is no zip, is
-  // cut short, is encrypted, spans several files or is larger than 4 GB (zip64), and when a file's
-  // name is not a plain relative path, is there twice or claims to unpack to more than it can.
+  // `name`: the archive's, for messages. Throws Error{kInvalidArgument} if it is no zip, is
+  // truncated, is encrypted, spans several files or exceeds 4 GB (zip64), and if a file's name is
+  // not a plain relative path, occurs twice or claims an impossible unpacked size.
   ZipReader(std::string_view bytes, std::string name);
 
   bool Has(const std::string& file) const { return entries_.contains(file); }
-  // Stored or deflated, checked against its checksum. Throws Error{kInvalidArgument} when it is
-  // missing, damaged, not where the directory says, or says that it has more than `max_bytes`.
+  // Reads a stored or deflated file and verifies its checksum. Throws Error{kInvalidArgument} if it
+  // is missing, damaged, not at the position in the directory, or claims more than `max_bytes`.
   std::string Read(const std::string& file, uint64_t max_bytes) const;
 
  private:

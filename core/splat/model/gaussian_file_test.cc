@@ -26,7 +26,7 @@ TEST(GaussianFileTest, RoundTripsBitForBit) {
   }
 }
 
-TEST(GaussianFileTest, ConfidenceIsKeptAndFilesWithoutItStayAsTheyWere) {
+TEST(GaussianFileTest, KeepsConfidenceIfPresent) {
   GaussianModel m = RandomModel({5, 3, 1, 0});
   const std::string plain = SerializeGaussians(m);
   EXPECT_EQ(plain[8], 1) << "version 1, which older programs read";
@@ -56,7 +56,7 @@ void ExpectRefused(const std::string& bytes, const std::string& why) {
 
 std::string Signed(std::string content) { return content + Sha256Hex(content); }
 
-TEST(GaussianFileTest, HostileBytesAreRefused) {
+TEST(GaussianFileTest, RejectsHostileBytes) {
   const std::string good = SerializeGaussians(RandomModel({13, 3, 1, 0}));
   const std::string content = good.substr(0, good.size() - 64);
   ExpectRefused("", "only 0 bytes");

@@ -10,8 +10,8 @@
 
 namespace color3d {
 
-// How the last size() Gaussians of a model move and when they are there (DYNAMIC.md
-// "Motion"). With t = -1 at begin_s and 1 at end_s, and tau = t - center:
+// Motion and lifetime of the last size() Gaussians of a model (DYNAMIC.md "Motion"). With t = -1
+// at begin_s and 1 at end_s, and tau = t - center:
 //   position + velocity tau + acceleration tau^2,  rotation + spin tau,
 //   opacity exp(-(tau / exp(log_width))^2 / 2)
 struct GaussianMotion {
@@ -24,7 +24,7 @@ struct GaussianMotion {
   std::vector<float> log_width;     // 1
 
   size_t size() const { return center.size(); }
-  // 0 where begin and end are one moment. Moments outside are taken as they are: things move on.
+  // Returns t of a time; 0 if begin_s equals end_s. Times outside are extrapolated.
   float UnitTime(double time_s) const;
 };
 
@@ -43,10 +43,10 @@ struct GaussianModel {
   std::vector<float> sh_l;
   std::vector<float> sh_a;  // empty when channels == 1
   std::vector<float> sh_b;
-  // 1: how sure the colour is, 0..1 (1: seen in a key view, 0.5: inferred, 0: guessed). Empty when
-  // nobody knows; no kernel looks at it.
+  // 1: confidence of the colour, 0..1 (1: seen in a key view, 0.5: inferred, 0: guessed). Empty if
+  // unknown; no kernel uses it.
   std::vector<float> confidence;
-  // Of the last motion.size() Gaussians; those before stand still.
+  // Motion of the last motion.size() Gaussians; those before are static.
   GaussianMotion motion;
 
   size_t size() const { return opacity_logit.size(); }
@@ -56,8 +56,8 @@ struct GaussianModel {
 // 0.1, luminance 0.5. Throws Error{kInvalidArgument} when the scene has no points.
 GaussianModel InitialGaussians(const Scene& scene);
 
-// Native file, with a versioned header and a checksum: all of the model, bit for bit. Version 1
-// without confidence, version 2 with it, version 3 (with it or without) where something moves.
+// Native file with a versioned header and a checksum: the whole model, bit for bit. Version 1 has
+// no confidence, version 2 has it, version 3 (with or without it) has motion.
 std::string SerializeGaussians(const GaussianModel& model);
 // Throws Error{kInvalidArgument} on anything else (wrong magic, newer version, truncated, NaN).
 GaussianModel ParseGaussians(std::string_view bytes);

@@ -8,7 +8,7 @@
 namespace color3d {
 namespace {
 
-TEST(InitialGaussiansTest, ScaleIsTheMeanDistanceToTheNeighbours) {
+TEST(InitialGaussiansTest, ScaleIsMeanDistanceToNeighbors) {
   Scene scene;
   EXPECT_THROW(InitialGaussians(scene), Error);
   for (const double x : {0.0, 1.0, 2.0, 3.0}) {
@@ -24,7 +24,7 @@ TEST(InitialGaussiansTest, ScaleIsTheMeanDistanceToTheNeighbours) {
   EXPECT_EQ(m.sh_l[1], 0.0f);
 }
 
-TEST(InitialGaussiansTest, EqualPointsAndALonePointHaveASize) {
+TEST(InitialGaussiansTest, EqualPointsAndSinglePointHavePositiveScale) {
   Scene scene;
   scene.points.resize(1);
   EXPECT_TRUE(std::isfinite(InitialGaussians(scene).log_scale[0]));

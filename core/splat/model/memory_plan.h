@@ -1,4 +1,4 @@
-// What training geometry takes in memory, and how to stay within what there is. Pure functions.
+// Memory estimate of training geometry, and its reduction to the available memory. Pure functions.
 //
 // Per Gaussian, in floats, with R = 11 + (degree + 1)^2 parameters: parameters and two Adam moments
 // (3R), the last good state (3R), the gradient (R), one copy while densifying (R), a checkpoint
@@ -18,14 +18,14 @@ namespace color3d {
 
 struct MemoryDemand {
   struct View {
-    Camera captured;  // at full size: what decoding takes
-    Camera camera;    // undistorted, at full size: what the working size is derived from
+    Camera captured;  // at full size: determines the memory of decoding
+    Camera camera;    // undistorted, at full size: determines the working size
   };
-  std::vector<View> views;  // that are trained on or measured
+  std::vector<View> views;  // views that are trained on or measured
   int max_side_px = 0;      // wanted working size
   int max_gaussians = 0;    // wanted cap
   int sh_degree = 0;        // of luminance, 0..3
-  bool moves = false;       // the views are frames, maybe many: caches stay small
+  bool moves = false;       // the views are frames, possibly many: caches stay small
 };
 
 struct MemoryPlan {
@@ -35,17 +35,18 @@ struct MemoryPlan {
   int64_t target_cache_bytes = 0;  // for GeometryProblem::picture_cache_bytes
   int64_t estimated_bytes = 0;     // peak, of all of it
   int64_t budget_bytes = 0;
-  std::string note;  // what was reduced and why; empty when nothing was
+  std::string note;  // the reductions and their reason; empty if none
 };
 
 int64_t BytesPerGaussian(int sh_degree);
 
-// Peak of geometry training at this size with this many Gaussians and the smallest caches, bytes.
+// Peak memory of training geometry at this size with this many Gaussians and the smallest caches,
+// bytes.
 int64_t GeometryBytes(const MemoryDemand& demand, int max_side_px, int max_gaussians);
 
-// Keeps what was asked for when it fits; gives up caches first, then Gaussians down to a quarter,
-// then working size (not below 64 px) with them. Throws Error{kResourceExhausted} saying how much
-// memory is needed when even that does not fit, naming the photo's size when one alone is too
+// Keeps the requested values if they fit; else reduces caches first, then Gaussians down to a
+// quarter, then the working size (not below 64 px) with them. Throws Error{kResourceExhausted} with
+// the memory needed if even that does not fit, and with the photo's size if one photo alone is too
 // large.
 MemoryPlan PlanGeometryMemory(const MemoryDemand& demand, int64_t budget_bytes);
 

@@ -20,7 +20,7 @@ MemoryDemand DemandOf(int width, int height, int views) {
   return demand;
 }
 
-TEST(MemoryPlan, PlentyChangesNothing) {
+TEST(MemoryPlan, ChangesNothingWithEnoughMemory) {
   const MemoryPlan plan = PlanGeometryMemory(DemandOf(1600, 1200, 50), 8192 * kMiB);
   EXPECT_EQ(plan.max_side_px, 800);
   EXPECT_EQ(plan.max_gaussians, 150'000);
@@ -31,7 +31,7 @@ TEST(MemoryPlan, PlentyChangesNothing) {
   EXPECT_EQ(BytesPerGaussian(3), 1316);
 }
 
-TEST(MemoryPlan, MoreFramesOfASceneThatMovesTakeNoMoreMemory) {
+TEST(MemoryPlan, DynamicSceneMemoryIsIndependentOfFrames) {
   MemoryDemand demand = DemandOf(1600, 1200, 100);
   const int64_t of_photos = PlanGeometryMemory(demand, 8192 * kMiB).estimated_bytes;
   demand.moves = true;
@@ -44,7 +44,7 @@ TEST(MemoryPlan, MoreFramesOfASceneThatMovesTakeNoMoreMemory) {
   EXPECT_EQ(longer.target_cache_bytes, plan.target_cache_bytes);
 }
 
-TEST(MemoryPlan, LessMemoryGivesUpCachesThenGaussiansThenPixels) {
+TEST(MemoryPlan, ReducesCachesThenGaussiansThenPixels) {
   const MemoryDemand demand = DemandOf(1600, 1200, 50);
   const int64_t wanted = GeometryBytes(demand, 800, 150'000);
   const MemoryPlan tight = PlanGeometryMemory(demand, wanted);
@@ -83,14 +83,14 @@ std::string Refused(const MemoryDemand& demand, int64_t budget) {
   return "";
 }
 
-TEST(MemoryPlan, APhotoThatCannotEvenBeDecodedIsNamedBySize) {
+TEST(MemoryPlan, NamesSizeOfPhotoTooLargeToDecode) {
   EXPECT_THAT(Refused(DemandOf(30000, 20000, 3), 4096 * kMiB),
               testing::HasSubstr("most of it for a photo of 30000 x 20000 px"));
   EXPECT_THAT(Refused(DemandOf(640, 480, 3), 10 * kMiB), testing::HasSubstr("10 MiB may be used"));
   EXPECT_THAT(Refused(DemandOf(640, 480, 3), 0), testing::HasSubstr("0 MiB may be used"));
 }
 
-TEST(MemoryPlan, FewGaussiansAreNotRaised) {
+TEST(MemoryPlan, DoesNotRaiseSmallGaussianCap) {
   MemoryDemand demand = DemandOf(640, 480, 3);
   demand.max_gaussians = 7;
   EXPECT_EQ(PlanGeometryMemory(demand, 1024 * kMiB).max_gaussians, 7);

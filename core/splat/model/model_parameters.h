@@ -1,5 +1,5 @@
-// Between GaussianModel (files, interfaces) and the kernels' planar form. Internal to the splat
-// module. Stateless.
+// Conversion between GaussianModel (files, interfaces) and the kernels' planar form. Internal to
+// the splat module. Stateless.
 #pragma once
 
 #include "core/splat/model/gaussian_model.h"

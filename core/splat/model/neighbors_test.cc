@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST(NeighborTreeTest, AgreesWithSearchingAll) {
+TEST(NeighborTreeTest, AgreesWithExhaustiveSearch) {
   Random random(6);
   std::vector<NeighborTree::Point> points(500);
   for (auto& p : points) {
@@ -34,7 +34,7 @@ TEST(NeighborTreeTest, AgreesWithSearchingAll) {
 }
 
 // The order of equal distances is the points' own, whatever the tree looks like.
-TEST(NeighborTreeTest, TiesGoByIndex) {
+TEST(NeighborTreeTest, BreaksTiesByIndex) {
   std::vector<NeighborTree::Point> points;
   for (int i = 0; i < 1000; ++i) {  // a grid of ten to each side, in a scrambled order
     const int cell = i * 387 % 1000;

@@ -68,7 +68,7 @@ class ApplyMotionTest : public InstructionSetTest<int> {  // of thread counts
   ParameterBlock moving_ = RandomRows(kRows + kMotionRows, kMoving, 1);
 };
 
-TEST_P(ApplyMotionTest, IsThatOfItsTwinInFloat64) {
+TEST_P(ApplyMotionTest, AgreesWithFloat64Reference) {
   for (const float t : {-1.0f, -0.3f, 0.0f, 1.0f}) {
     const ParameterBlock at = At(t), still = RandomRows(kRows, kStill + kMoving, 3);
     for (int64_t i = 0; i < kStill; ++i) EXPECT_EQ(Column(at, i), Column(still, i));
@@ -79,7 +79,7 @@ TEST_P(ApplyMotionTest, IsThatOfItsTwinInFloat64) {
   }
 }
 
-TEST_P(ApplyMotionTest, GradientIsThatOfItsTwinInFloat64) {
+TEST_P(ApplyMotionTest, GradientAgreesWithFloat64Reference) {
   const ParameterBlock d_at = RandomRows(kRows, kStill + kMoving, 7);
   for (const float t : {-0.7f, 0.4f}) {
     ParameterBlock gradient;
@@ -105,7 +105,7 @@ TEST_P(ApplyMotionTest, GradientIsThatOfItsTwinInFloat64) {
   }
 }
 
-TEST_P(ApplyMotionTest, FarFromItsTimeNothingIsSeenAndNothingLearnsFromIt) {
+TEST_P(ApplyMotionTest, IsInvisibleFarFromItsTime) {
   for (int64_t i = 0; i < kMoving; ++i) {
     moving_.Row(kRows + kCenterRow)[i] = -1.0f;
     moving_.Row(kRows + kLogWidthRow)[i] = -20.0f;  // a window so narrow that its square overflows
@@ -119,7 +119,7 @@ TEST_P(ApplyMotionTest, FarFromItsTimeNothingIsSeenAndNothingLearnsFromIt) {
   }
 }
 
-TEST_P(ApplyMotionTest, WhatBelongsToTheMomentCanBeHidden) {
+TEST_P(ApplyMotionTest, HidesGaussiansOfOneTime) {
   constexpr float kMoment = 0.2f, kHidden = 0.4f;
   ParameterBlock at = RandomRows(kRows, kStill + kMoving, 3);
   ApplyMotion(moving_, kRows, kMoment, kStill, pool_, at, kHidden);

@@ -1,5 +1,5 @@
-// A model's Gaussians at one moment after another, in a buffer that is kept. Internal to the splat
-// module. Not thread-safe; uses the pool's threads.
+// A model's Gaussians at successive times, in a reused buffer. Internal to the splat module. Not
+// thread-safe; uses the pool's threads.
 #pragma once
 
 #include "core/base/parallel.h"
@@ -9,14 +9,14 @@ namespace color3d {
 
 class GeometryInTime {
  public:
-  // Of `model`'s motion. `pool` must outlive this object.
+  // Uses `model`'s motion. `pool` must outlive this object.
   GeometryInTime(const GaussianModel& model, ThreadPool& pool)
       : times_{model.motion.begin_s, model.motion.end_s, {}, {}, {}, {}, {}},
         motion_(MotionFromModel(model)),
         pool_(pool) {}
 
-  // `all`, which has the model's Gaussians and any colours, at a time of the scene, seconds: itself
-  // where nothing moves, else valid until the next call.
+  // Returns `all`, which has the model's Gaussians and any colours, at a time of the scene in
+  // seconds: `all` itself for static models, else a buffer that is valid until the next call.
   const ParameterBlock& At(const ParameterBlock& all, double time_s) {
     if (motion_.count() == 0) return all;
     at_ = all;

@@ -35,7 +35,7 @@ GaussianModel SmallModel() {
   return model;
 }
 
-TEST(MotionTest, OnlyTheLastGaussiansOfAModelMove) {
+TEST(MotionTest, OnlyLastGaussiansMove) {
   ThreadPool pool(2);
   const GaussianModel model = SmallModel();
   const GaussianModel at = ModelAt(model, 4.0, pool);
@@ -49,7 +49,7 @@ TEST(MotionTest, OnlyTheLastGaussiansOfAModelMove) {
   EXPECT_EQ(ModelAt(model, 3.0, pool).position, model.position);
 }
 
-TEST(MotionTest, ComesBackFromAFile) {
+TEST(MotionTest, RoundTripsThroughFile) {
   GaussianModel model = SmallModel();
   for (const bool confident : {false, true}) {
     if (confident) model.confidence.assign(6, 0.5f);
@@ -63,7 +63,7 @@ TEST(MotionTest, ComesBackFromAFile) {
   }
 }
 
-TEST(MotionTest, ADamagedFileOrModelIsRefused) {
+TEST(MotionTest, RejectsDamagedFileAndModel) {
   GaussianModel model = SmallModel();
   std::string bytes = SerializeGaussians(model);
   bytes[40] = 9;  // more Gaussians that move than there are

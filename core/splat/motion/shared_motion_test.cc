@@ -59,14 +59,14 @@ class SharedMotionTest : public testing::Test {
   ParameterBlock moving_ = ParameterBlock(kRow + kMotionRows, 0);
 };
 
-TEST_F(SharedMotionTest, ARigidThingKeepsItsMotion) {
+TEST_F(SharedMotionTest, KeepsRigidMotion) {
   const Rigid motion{{1.0, -2.0, 0.5}, {0.0, 3.0, 1.0}};
   AddThing(200, {0, 0, 10}, 0, motion, 0.0);
   Share(1.0);
   EXPECT_LT(Off(motion, 0, 200), 0.05 * Vector3d(0, 3, 1).norm());
 }
 
-TEST_F(SharedMotionTest, NoiseGoesAndWhatIsSharedStays) {
+TEST_F(SharedMotionTest, RemovesNoiseAndKeepsSharedMotion) {
   const Rigid motion{{1.0, -2.0, 0.5}, {0.0, 1.0, 0.0}};
   AddThing(300, {0, 0, 0}, 0, motion, 1.0);
   const double before = Off(motion, 0, 300);
@@ -74,7 +74,7 @@ TEST_F(SharedMotionTest, NoiseGoesAndWhatIsSharedStays) {
   EXPECT_LT(Off(motion, 0, 300), 0.4 * before);
 }
 
-TEST_F(SharedMotionTest, ThingsThatPassEachOtherDoNotDragEachOther) {
+TEST_F(SharedMotionTest, SeparatesObjectsThatPassEachOther) {
   const Rigid right{{2.0, 0.0, 0.0}, {0, 0, 0}}, left{{-2.0, 0.0, 0.0}, {0, 0, 0}};
   AddThing(200, {0, -2, 0}, 0, right, 0.05);
   AddThing(200, {0, 2, 0}, 0, left, 0.05);
@@ -83,7 +83,7 @@ TEST_F(SharedMotionTest, ThingsThatPassEachOtherDoNotDragEachOther) {
   EXPECT_LT(Off(left, 200, 400), 0.25);
 }
 
-TEST_F(SharedMotionTest, NeighborsOfTheStepsBesideCountWhereTheyAreThen) {
+TEST_F(SharedMotionTest, UsesNeighborsAtAdjacentTimeSteps) {
   const Rigid motion{{20.0, 0.0, 0.0}, {0, 0, 0}};
   AddThing(3, {0, 0, 0}, 0, {}, 0.0);
   AddThing(100, Vector3d(-2, 0, 0), -1, motion, 0.0);  // comes to the same place one step later
@@ -95,7 +95,7 @@ TEST_F(SharedMotionTest, NeighborsOfTheStepsBesideCountWhereTheyAreThen) {
 }
 
 // Unit time runs from -1 to 1: of 24 steps none lies at a whole number of intervals.
-TEST_F(SharedMotionTest, AnEvenNumberOfStepsHasStepsOfItsOwn) {
+TEST_F(SharedMotionTest, HandlesEvenNumberOfTimeSteps) {
   interval_ = 2.0 / 23.0;
   const Vector3d velocity(100.0, 0.0, 0.0);
   for (int step = 0; step < 23; ++step) {
@@ -116,7 +116,7 @@ TEST_F(SharedMotionTest, AnEvenNumberOfStepsHasStepsOfItsOwn) {
   }
 }
 
-TEST_F(SharedMotionTest, IsTheSameForAnyNumberOfThreadsAndAlwaysFinite) {
+TEST_F(SharedMotionTest, IsFiniteAndIndependentOfThreads) {
   AddThing(100, {0, 0, 0}, 0, {{1, 0, 0}, {0, 0, 1}}, 0.5);
   AddThing(50, {1e6, 0, 0}, 1, {{1, 0, 0}, {0, 0, 1}}, 1e6);
   for (int64_t i = 0; i < 30; ++i) Set(kPositionRow, i, {0.0, 0.0, 0.0});   // all in one place

@@ -1,4 +1,4 @@
-// Which splats touch which 16x16 tile, front to back. Internal to the splat module. The result does
+// Assignment of splats to 16x16 tiles, front to back. Internal to the splat module. The result does
 // not depend on the thread count.
 #pragma once
 
@@ -25,7 +25,7 @@ struct TileLists {
   size_t pair_count() const { return gaussian.size(); }
 };
 
-// Reused between calls, so that nothing is allocated per iteration.
+// Reused between calls to avoid allocations per iteration.
 class TileBinner {
  public:
   // Throws Error{kResourceExhausted} above 2^31 pairs.
@@ -42,14 +42,14 @@ class TileBinner {
     uint16_t rows = 0;
     uint16_t owner = 0;  // the thread
   };
-  struct Footprint {  // what FillLists needs of a Gaussian, in depth order
+  struct Footprint {  // inputs of FillLists for a Gaussian, in depth order
     const Span* spans = nullptr;
     uint32_t gaussian = 0;
     uint32_t first_pair = 0;
     uint16_t first_row = 0;
     uint16_t rows = 0;
   };
-  struct Piece {  // a thread's visible Gaussians
+  struct Piece {  // visible Gaussians of a thread
     size_t first = 0, count = 0;
     uint32_t low = std::numeric_limits<uint32_t>::max(), high = 0;
   };

@@ -1,6 +1,6 @@
-// Where training time goes. One phase runs at a time, so the phases add up to the whole; entering
-// one costs a clock reading. Internal to the splat module. Not thread-safe: for the thread that
-// trains.
+// Time measurement of training by phase. One phase runs at a time, so the phases add up to the
+// total; entering one costs a clock reading. Internal to the splat module. Not thread-safe: for the
+// training thread.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@ enum class Phase {
   kProjectionBackward,
   kAdam,
   kDensify,
-  kEvaluation,  // of held-out views: no part of training
+  kEvaluation,  // of held-out views: not part of training
 };
 inline constexpr int kPhaseCount = 10;
 inline constexpr const char* kPhaseNames[kPhaseCount] = {"other",

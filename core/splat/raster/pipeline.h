@@ -1,5 +1,5 @@
-// Forward and backward pass of one picture, with buffers that are kept between pictures. Internal
-// to the splat module. Not thread-safe; uses the pool's threads.
+// Forward and backward pass of one picture, with buffers reused between pictures. Internal to the
+// splat module. Not thread-safe; uses the pool's threads.
 #pragma once
 
 #include <vector>
@@ -15,12 +15,12 @@ namespace color3d {
 
 class SplatPipeline {
  public:
-  // Passes book their time on `clock` (may be null), which must outlive the pipeline's use; they
+  // Passes record their time on `clock` (may be null), which must outlive the pipeline's use; they
   // leave it in Phase::kOther.
   void set_clock(PhaseClock* clock) { clock_ = clock; }
 
   // Draws `parameters`; `background` has one number per channel. With `depth_channel` a last
-  // channel holds sum(alpha T depth). A Gaussian dropped is as if it were not there.
+  // channel holds sum(alpha T depth). Dropped Gaussians have no effect.
   void Forward(const ParameterBlock& parameters,
                const ColorSpec& color,
                const RasterCamera& camera,

@@ -1,6 +1,6 @@
-// From 3D Gaussians to 2D splats and back (EWA splatting: Zwicker et al. 2001; Kerbl et al. 2023).
-// Internal to the splat module; no Eigen here, because the kernels are compiled once per
-// instruction set. All functions are deterministic whatever the thread count.
+// Projection of 3D Gaussians to 2D splats and its adjoint (EWA splatting: Zwicker et al. 2001;
+// Kerbl et al. 2023). Internal to the splat module; no Eigen here, because the kernels are compiled
+// once per instruction set. All functions are deterministic whatever the thread count.
 #pragma once
 
 #include <cstdint>
@@ -55,12 +55,12 @@ void ProjectSplats(const ParameterBlock& parameters,
                    ThreadPool& pool,
                    SplatBuffer& splats);
 
-// Leaves out Gaussians at random (DropGaussian: Park et al. 2025); those that stay have
-// 1 / (1 - rate) times their opacity, before alpha's cap. Their gradients follow as ever, because
-// ln(opacity) only gains a constant.
+// Drops Gaussians at random (DropGaussian: Park et al. 2025); the others have 1 / (1 - rate) times
+// their opacity, before the cap on alpha. Gradients are unaffected, because ln(opacity) only gains
+// a constant.
 struct SplatDropping {
   double rate = 0.0;  // 0..0.9
-  uint64_t seed = 0;  // chooses which
+  uint64_t seed = 0;  // selects the dropped ones
 };
 void DropSplats(const SplatDropping& dropping, ThreadPool& pool, SplatBuffer& splats);
 
@@ -72,7 +72,7 @@ struct DensifyStatistics {
   void Reset(int64_t gaussians);
 };
 
-// Which parameters' gradients are wanted.
+// The parameters whose gradients are computed.
 enum class GradientScope { kAll, kColorOnly };
 
 // `pair_gradient` holds one gradient row of GradientRowFloats(channels) for each (Gaussian, tile)

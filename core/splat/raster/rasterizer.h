@@ -15,9 +15,8 @@ namespace color3d {
 
 // `color` has splats.channels channels (1..4) and the picture's size; `background` has as many
 // numbers. `transmittance` (1 channel) may be null. `median_depth` (1 channel, may be null) gets
-// the last channel's number of the splat behind which less than half of the light comes through, 0
-// where there is none. `block_masks` gets the 4x4 blocks that each list entry touches, for
-// RasterizeBackward.
+// the last channel's value of the splat at which transmittance falls below one half, 0 without one.
+// `block_masks` gets the 4x4 blocks that each list entry touches, for RasterizeBackward.
 void RasterizeForward(const SplatBuffer& splats,
                       const TileLists& lists,
                       const float* background,

@@ -196,7 +196,7 @@ ReferenceParameters Kept(const ParameterBlock& p,
   return r;
 }
 
-TEST_P(RasterTest, DroppedGaussiansAreAsIfTheyWereNotThere) {
+TEST_P(RasterTest, DroppedGaussiansHaveNoEffect) {
   ThreadPool pool(2);
   const int channels = TestCase(), width = 37, height = 29;
   const RasterCamera camera = TestCamera(width, height);
@@ -304,7 +304,7 @@ INSTANTIATE_TEST_SUITE_P(Channels,
                          RasterTest,
                          testing::Combine(testing::Values(1, 2, 3), EachInstructionSet()));
 
-TEST(RasterizerTest, TileSidesAndThreadCountsDoNotChangeTheResult) {
+TEST(RasterizerTest, IsIndependentOfTilesAndThreads) {
   const RasterCamera camera = TestCamera(131, 77);
   const ParameterBlock p = RandomGaussians(500, 8);
   const ColorSpec color = TestColor(3);
@@ -322,7 +322,7 @@ TEST(RasterizerTest, TileSidesAndThreadCountsDoNotChangeTheResult) {
   EXPECT_EQ(gradients[0].values(), gradients[1].values());
 }
 
-TEST(RasterizerTest, ColorOnlyGradientEqualsTheFullOne) {
+TEST(RasterizerTest, ColorOnlyGradientEqualsFullGradient) {
   ThreadPool pool(2);
   const RasterCamera camera = TestCamera(64, 48);
   const ParameterBlock p = RandomGaussians(60, 9);

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-TEST(RenderViewTest, GivesLabUnitsDepthAndOpacity) {
+TEST(RenderViewTest, ReturnsLabDepthAndOpacity) {
   ThreadPool pool(2);
   GaussianModel m;
   m.channels = 3;
@@ -42,7 +42,7 @@ TEST(RenderViewTest, GivesLabUnitsDepthAndOpacity) {
 }
 
 // Two Gaussians one behind the other; what counts is how much the nearer one hides.
-TEST(RenderViewTest, MedianDepthIsThatOfTheSurfaceThatHidesHalf) {
+TEST(RenderViewTest, MedianDepthIsWhereHalfIsOccluded) {
   ThreadPool pool(1);
   GaussianModel m;
   m.position = {0.0f, 0.0f, 2.0f, 0.0f, 0.0f, 4.0f};

@@ -15,7 +15,7 @@ constexpr int kCount = kBlockCount;
 
 using AdamTest = InstructionSetTest<int>;  // of thread counts
 
-TEST_P(AdamTest, AgreesWithItsFormula) {
+TEST_P(AdamTest, AgreesWithFormula) {
   ThreadPool pool(TestCase());
   ParameterBlock p = RandomBlock(1, 1.0);
   AdamMoments moments{ParameterBlock(kRows, kCount), ParameterBlock(kRows, kCount)};
@@ -42,7 +42,7 @@ TEST_P(AdamTest, AgreesWithItsFormula) {
   }
 }
 
-TEST_P(AdamTest, ReportsWhatIsNotFinite) {
+TEST_P(AdamTest, ReportsNonFiniteValues) {
   ThreadPool pool(TestCase());
   for (const float bad :
        {std::numeric_limits<float>::infinity(), std::numeric_limits<float>::quiet_NaN()}) {

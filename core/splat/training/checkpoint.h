@@ -1,5 +1,5 @@
-// A training's state as bytes: what it is the state of, the values, and a digest over all of it.
-// Internal to the splat module.
+// Serialized training state: fingerprint, values, and a digest over both. Internal to the splat
+// module.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace color3d {
 
 class CheckpointWriter {
  public:
-  // `fingerprint` holds everything that the course of the training depends on (options, scene).
+  // `fingerprint` identifies all inputs that determine the training (options, scene).
   explicit CheckpointWriter(std::string_view fingerprint);
 
   template <class T>
@@ -34,11 +34,11 @@ class CheckpointWriter {
   std::string bytes_;
 };
 
-// Reads back what a CheckpointWriter wrote, in the same order. Never reads beyond the end: ok()
-// turns false instead, and what is read from then on is empty.
+// Reads the output of a CheckpointWriter in the same order. Never reads beyond the end: ok()
+// becomes false, and further values are empty.
 class CheckpointReader {
  public:
-  // Not ok() for damaged bytes, another version of the format and another fingerprint.
+  // Not ok() for damaged bytes, another format version or another fingerprint.
   CheckpointReader(std::string_view bytes, std::string_view fingerprint);
   bool ok() const { return ok_; }
 
@@ -52,8 +52,8 @@ class CheckpointReader {
   std::string_view Text();
   ParameterBlock Block();
   AlignedFloats Vector();
-  // A number of items of `item_bytes` each that follow; 0 and not ok() when they cannot all be
-  // there.
+  // Number of following items of `item_bytes` each; 0 and not ok() if the remaining bytes are
+  // fewer.
   uint64_t Count(size_t item_bytes);
 
  private:

@@ -47,7 +47,7 @@ struct Case {
 
 using LossTest = InstructionSetTest<Case>;
 
-TEST_P(LossTest, AgreesWithFloat64FormulaAndItsFiniteDifferences) {
+TEST_P(LossTest, AgreesWithFloat64AndFiniteDifferences) {
   const Case& c = TestCase();
   ThreadPool pool(2);
   const PlaneBuffer x = RandomPicture(c.width, c.height, c.channels, 1);
@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(
                                      Case{1, 1, 1, {0.8f, 0.2f, 1.0f}, false}),
                      EachInstructionSet()));
 
-TEST(ImageLossTest, EqualPicturesHaveNoLossButTheCharbonnierFloor) {
+TEST(ImageLossTest, EqualPicturesLeaveCharbonnierFloor) {
   ThreadPool pool(1);
   const PlaneBuffer x = RandomPicture(40, 30, 1, 1);
   ImageLoss loss;

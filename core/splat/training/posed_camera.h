@@ -1,4 +1,4 @@
-// The cameras that trainings draw. Internal to the splat module.
+// Cameras of the training views. Internal to the splat module.
 #pragma once
 
 #include <vector>
@@ -9,14 +9,14 @@
 namespace color3d {
 
 struct PosedCamera {
-  int view = 0;  // what sources of pictures are asked for
+  int view = 0;  // the argument for picture sources
   Camera camera;
   Pose cam_from_world;
   double time_s = 0.0;  // of the scene
-  int shot = 0;         // views of one camera have the same
+  int shot = 0;         // equal for views of one camera
 };
 
-// These views of `scene` at the working size of `images`.
+// The given views of `scene` at the working size of `images`.
 std::vector<PosedCamera> PosedCameras(const Scene& scene,
                                       const ViewImages& images,
                                       const std::vector<int>& views);

@@ -1,5 +1,5 @@
-// Keeps the last good training state, and goes back to it with half the learning rate when
-// something is not finite. Internal to the splat module.
+// Keeps the last good training state and restores it with half the learning rate if a value is not
+// finite. Internal to the splat module.
 #pragma once
 
 #include "core/base/error.h"
@@ -12,14 +12,14 @@ namespace color3d {
 template <class State>
 class TrainingGuard {
  public:
-  // `what` is trained, for messages.
+  // `what`: name of the training, for messages.
   TrainingGuard(const char* what, ProgressObserver& progress) : what_(what), progress_(progress) {}
 
   bool IsDue(int64_t iteration) const { return iteration % kInterval == 0; }
   void Keep(const State& state) { good_ = state; }
 
-  // Reports curve point "restored_non_finite": the iteration that training went back to. Throws
-  // Error{kInternal} after kMaxRestores.
+  // Reports curve point "restored_non_finite": the restored iteration. Throws Error{kInternal}
+  // after kMaxRestores.
   void Restore(State& state) {
     const int64_t iteration = state.iteration;
     const int32_t restores = state.restores + 1;

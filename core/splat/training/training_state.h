@@ -1,5 +1,4 @@
-// What every training by Adam has to remember, as a value and in checkpoints. Internal to the splat
-// module.
+// Common state of trainings by Adam, as a value and in checkpoints. Internal to the splat module.
 #pragma once
 
 #include <cstdint>
@@ -12,7 +11,7 @@
 
 namespace color3d {
 
-// The training views in random order without replacement, shuffled anew when all had their turn.
+// The training views in random order without replacement, reshuffled after each pass.
 struct ViewOrder {
   std::vector<int32_t> views;
   int64_t next = 0;  // position in `views`
@@ -33,7 +32,7 @@ struct TrainingState {
 };
 
 void WriteState(const TrainingState& state, CheckpointWriter& writer);
-// What could not be read leaves reader.ok() false.
+// Sets reader.ok() to false on a failure.
 void ReadState(CheckpointReader& reader, TrainingState& state);
 
 }  // namespace color3d

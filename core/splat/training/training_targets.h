@@ -1,6 +1,6 @@
-// Pictures to train on, in the kernels' form, kept in memory within a budget: first come first
-// kept, which is as good as any other choice where the order of asking is random; those of other
-// levels than the one that is asked for make room. Internal to the splat module. Not thread-safe.
+// Training pictures in the kernels' form, cached within a byte budget. The first ones are kept,
+// which is as good as any other policy for a random order of access; pictures of other levels are
+// evicted first. Internal to the splat module. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@
 
 namespace color3d {
 
-// A picture of the size of the view's camera; null: none.
+// Returns a picture of the size of the view's camera, or null.
 using PictureSource = std::function<std::shared_ptr<const Image>(int view)>;
 
 // Planes with value = (sample + offset) * scale.
@@ -27,8 +27,8 @@ int SizeAtLevel(int size_px, int level);
 class TrainingTargets {
  public:
   using Reduce = std::function<Image(const Image& image, int width, int height)>;
-  // `source` gives `channels` channels, must outlive this object, and is multiplied by `scale`.
-  // `reduce` makes a picture smaller; Resize when it is empty.
+  // `source` returns `channels` channels, must outlive this object, and is multiplied by `scale`.
+  // `reduce` shrinks a picture; empty: Resize.
   TrainingTargets(const PictureSource& source,
                   int channels,
                   float scale,
@@ -40,8 +40,8 @@ class TrainingTargets {
         budget_bytes_(budget_bytes),
         reduce_(std::move(reduce)) {}
 
-  // Picture of a view at a level; null when the source has none. Throws Error{kInvalidArgument}
-  // when the picture does not have the camera's size.
+  // Returns the picture of a view at a level, or null if the source has none. Throws
+  // Error{kInvalidArgument} if the picture's size differs from the camera's.
   std::shared_ptr<const PlaneBuffer> Get(const PosedCamera& view, int level);
   int64_t kept_bytes() const { return kept_bytes_; }  // at most the budget
 

@@ -26,7 +26,7 @@ class TrainingTargetsTest : public testing::Test {
   };
 };
 
-TEST_F(TrainingTargetsTest, KeepsWhatFitsAndReadsTheRestAgain) {
+TEST_F(TrainingTargetsTest, CachesWithinBudgetAndRereadsOthers) {
   TrainingTargets targets(source_, 1, 0.5f, 10 * kPlaneBytes);
   for (int round = 0; round < 3; ++round) {
     for (int view = 0; view < 40; ++view) {
@@ -38,7 +38,7 @@ TEST_F(TrainingTargetsTest, KeepsWhatFitsAndReadsTheRestAgain) {
   EXPECT_EQ(asked_, 40 + 30 + 30);
 }
 
-TEST_F(TrainingTargetsTest, AnotherLevelMakesRoom) {
+TEST_F(TrainingTargetsTest, EvictsPicturesOfOtherLevels) {
   TrainingTargets targets(source_, 1, 1.0f, 10 * kPlaneBytes);
   for (int view = 0; view < 40; ++view) targets.Get(View(view), 1);
   EXPECT_EQ(targets.kept_bytes(), 10 * kPlaneBytes);

@@ -61,7 +61,7 @@ std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
 std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
                                     const FilmOptions& options,
                                     StageContext& context) {
-  const FrameNumbers numbers = PlacesOfFrames(files);
+  const FrameNumbers numbers = FramePositions(files);
   if (!numbers.note.empty()) context.progress().OnWarning(numbers.note);
   std::vector<double> times;
   for (const int64_t place : numbers.places) {

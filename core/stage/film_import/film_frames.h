@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/base/image.h"
-#include "core/scene/camera.h"
+#include "core/scene/scene.h"
 #include "core/stage/film_import/import_film.h"
 
 namespace color3d {

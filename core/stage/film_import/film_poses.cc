@@ -82,10 +82,10 @@ Scene ReliefScene(const Scene& film, const std::vector<int>& shot, const MovingR
     const double foot = FootRow(DecodeImage(ReadFile(file), file));
     if (foot >= 0.0) feet.push_back(foot);
   }
-  scene.relief = ReliefBehind(std::move(feet));
+  scene.relief = FitRelief(std::move(feet));
   const int last = static_cast<int>(scene.views.size()) - 1;
   const Camera& camera = scene.views[0].camera;
-  for (const Eigen::Vector3d& position : PointsOn(*scene.relief, camera, kPoints)) {
+  for (const Eigen::Vector3d& position : ReliefPoints(*scene.relief, camera, kPoints)) {
     scene.points.push_back({position, -1.0, {0, last}});
   }
   return scene;

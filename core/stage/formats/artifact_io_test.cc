@@ -43,16 +43,17 @@ TEST_F(StageTest, FilmFindingsRoundTrip) {
   EXPECT_EQ(back.film->motion_energy, 0.125);
 }
 
-TEST_F(StageTest, DynamicSceneWithoutGeometryIsAFilm) {
+TEST_F(StageTest, DynamicSceneWithoutGeometryIsColoredAsFilm) {
   Scene scene = RampScene(scratch_.path(), 32, 24);
-  EXPECT_FALSE(IsColoredAsFilm(MakeContext(), scene)) << "photos of a place";
+  EXPECT_TRUE(ColoredAs(MakeContext(), scene).is_reconstructed) << "photos of a place";
   for (View& view : scene.views) view.moment = Moment{0.1, 0};
   ASSERT_TRUE(scene.capture().is_dynamic);
-  EXPECT_TRUE(IsColoredAsFilm(MakeContext(), scene));
+  EXPECT_FALSE(ColoredAs(MakeContext(), scene).is_reconstructed);
   AddInput(artifact::kGeometry, "");
-  EXPECT_FALSE(IsColoredAsFilm(MakeContext(), scene));
+  EXPECT_TRUE(ColoredAs(MakeContext(), scene).is_reconstructed);
   for (View& view : scene.views) view.cam_from_world = Pose();
-  EXPECT_TRUE(IsColoredAsFilm(MakeContext(), scene)) << "without poses there is no geometry";
+  EXPECT_FALSE(ColoredAs(MakeContext(), scene).is_reconstructed)
+      << "without poses there is no geometry";
 }
 
 TEST(ViewArtifact, DropsTheExtensionAndFindsCollisions) {

@@ -255,7 +255,7 @@ TEST_F(MovieTest, ErrorsNameTheProblem) {
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 0}), HasSubstr("frames"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 18'001}), HasSubstr("18000"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames = 1'001, .pictures = true}),
-              HasSubstr("at most 1000"));
+              HasSubstr("the limit is 1000"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .frames_per_second = NAN}),
               HasSubstr("frames_per_second"));
   EXPECT_THAT(Complaint({.path = Path::kOrbit, .video = false}), HasSubstr("nothing"));

@@ -6,13 +6,13 @@
 namespace color3d {
 
 struct AugmentationOptions {
-  bool files = false;  // the user's own, below augment/ of the scene's folder
-  int samples = 8;     // 0..64, besides the user's own files; 8: the paper's 4 + 1 + 3
+  bool files = false;  // use files below augment/ of the scene's folder
+  int samples = 8;     // pictures besides files, 0..64; 8: the paper's 4 + 1 + 3
   bool outpaint = true;
   bool animate = true;
   bool novel_views = true;
-  std::string backend;    // a generator by name; empty: the embedded surrogates
-  int max_side_px = 400;  // of the pictures, 64..4096
+  std::string backend;    // name of a generator; empty: embedded surrogates
+  int max_side_px = 400;  // longer side of the pictures, 64..4096
   void Validate() const;
   bool operator==(const AugmentationOptions&) const = default;
 };

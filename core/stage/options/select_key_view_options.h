@@ -10,8 +10,8 @@ namespace color3d {
 struct SelectKeyViewOptions {
   KeyViewOptions selection;
   std::string view;      // for KeyViewStrategy::kManual: name or unique file stem
-  std::string encoder;   // weights by name in StageContext::Model; empty: the embedded encoder
-  std::string features;  // CLIP weights by name; empty: the encoder's features
+  std::string encoder;   // name of weights in StageContext::Model; empty: embedded encoder
+  std::string features;  // name of CLIP weights; empty: features of the encoder
 };
 
 }  // namespace color3d

@@ -17,14 +17,14 @@ namespace {
 
 constexpr char kFolder[] = "augment/";
 constexpr size_t kMaxFiles = 64;
-constexpr int kReadSidePx = 4096;  // colorizers are trained at a fraction of it
+constexpr int kReadSidePx = 4096;  // several times the training size
 constexpr int64_t kMaxAnswerPixels = 16'000'000;
 
 GeneratedPicture PictureOf(const Image& lab) {
   return {lab, Image(lab.width, lab.height, 1, 1.0f)};
 }
 
-// Lab of a picture; checks that it is coloured and large enough.
+// Returns a picture in Lab. Checks that it is coloured and large enough.
 Image CheckedLab(const Image& srgb, int max_side_px, const std::string& what) {
   if (std::min(srgb.width, srgb.height) < kMinGeneratedSidePx) {
     throw InvalidArgument("{} is {} px; width and height must be at least {} px",
@@ -32,7 +32,8 @@ Image CheckedLab(const Image& srgb, int max_side_px, const std::string& what) {
                           SizeText(srgb),
                           kMinGeneratedSidePx);
   }
-  if (srgb.channels != 3) throw InvalidArgument("{} is grey, without any colour to learn", what);
+  if (srgb.channels != 3)
+    throw InvalidArgument("{} is grey; the colorizer learns only from colour", what);
   Image lab = LabFromSrgb(FitWithin(srgb, max_side_px));
   ExpectColor(lab, what.c_str());
   return lab;
@@ -66,8 +67,7 @@ std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageCon
           "{} is no picture ({}); remove it from {}", file, ReadableImageFormats(), kFolder);
     }
     if (pictures.size() >= kMaxFiles) {
-      throw InvalidArgument(
-          "{} holds more than {} pictures; keep the best ones", kFolder, kMaxFiles);
+      throw InvalidArgument("{} has more than {} pictures; keep the best ones", kFolder, kMaxFiles);
     }
     try {
       const Image lab = CheckedLab(

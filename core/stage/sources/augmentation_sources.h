@@ -1,5 +1,5 @@
-// Training pictures from the user's files and from a generator among the user's model servers. For
-// the stage generate_augmentations, which makes all others itself.
+// Training pictures from files of the user and from generators on model servers, for the stage
+// generate_augmentations.
 #pragma once
 
 #include <string>
@@ -14,23 +14,23 @@ namespace color3d {
 // "outpaint", "animate", "novel_view": as in stage.proto and backend.proto.
 const char* AugmentationKindName(AugmentationKind kind);
 
-// "outpaint-1" for the first (index 0) of its kind: names an artifact.
+// Name of an artifact, "outpaint-1" for the first (index 0) of its kind.
 std::string AugmentationName(const std::string& kind, size_t index);
 
 struct Augmentation {
-  std::string name;    // of the artifact, without folder and ending
+  std::string name;    // name of the artifact, without folder and extension
   std::string kind;    // AugmentationKindName, or "file"
-  std::string source;  // "embedded", "backend NAME", or the file's name
+  std::string source;  // "embedded", "backend NAME", or the name of the file
   GeneratedPicture picture;
 };
 
 // Reads the coloured photos below augment/ of the scene's folder, sorted by name, and reduces them
 // to `max_side_px`. Throws Error{kInvalidArgument} naming a file that is no picture, has no colour
-// or is too small, and when there are too many.
+// or is too small, and if there are too many.
 std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageContext& context);
 
 // Requests `count` pictures of one kind, made from `key_srgb` (3 channels, 0..1), from the
-// generator `backend`, which must claim the kind. Throws what RemoteColorizer throws, and
+// generator `backend`, which must support the kind. Throws the errors of RemoteColorizer, and
 // Error{kFailedPrecondition} for answers that are no coloured pictures.
 std::vector<Augmentation> AugmentationsFromBackend(const std::string& backend,
                                                    RemoteColorizer& remote,

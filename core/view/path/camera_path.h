@@ -1,4 +1,4 @@
-// Where the camera of a movie stands, frame by frame (EXPORT.md "Movies"). Pure functions.
+// Camera of a movie, frame by frame (EXPORT.md "Movies"). Pure functions.
 #pragma once
 
 #include <array>
@@ -11,24 +11,24 @@ namespace color3d {
 struct PathCamera {
   Camera camera;
   Pose cam_from_world;
-  double time_s = 0.0;  // of the scene; says nothing where nothing moves
+  double time_s = 0.0;  // time in the scene; no effect in static scenes
 };
 
-// The camera with another picture: scaled to cover width x height px, with its middle in the
-// middle. Nothing comes into sight that was not there; what sticks out is cut off.
+// The camera with another picture size: scaled to cover width x height px, centred. Shows nothing
+// outside the original picture; excess is cropped.
 Camera CoverPicture(const Camera& camera, int width, int height);
 
-// A smooth way through cameras: Catmull-Rom curves through their centres, directions and focal
-// lengths, at an even speed.
+// A smooth path through cameras at constant speed: Catmull-Rom curves through their centres,
+// directions and focal lengths.
 class SmoothPath {
  public:
-  // At least one camera, all of one picture size, on finite poses. `unit`: the distance that is
-  // worth as much of the way as a turn by one radian, e.g. to what the cameras look at; > 0.
+  // Requires at least one camera; all have one picture size and finite poses. `unit`: the distance
+  // that weighs as much as a rotation by one radian, e.g. the distance to the focus; > 0.
   SmoothPath(const std::vector<PathCamera>& knots, double unit);
 
-  // After this share of the way, 0..1 (clamped).
+  // The camera after this share of the path, 0..1 (clamped).
   PathCamera At(double share) const;
-  // When it passes the camera `i`: At(KnotAt(i)) is that camera.
+  // The share at which the path passes camera `i`: At(KnotAt(i)) is that camera.
   double KnotAt(size_t i) const { return way_.at(i * kSteps) / length_; }
 
  private:
@@ -40,23 +40,23 @@ class SmoothPath {
 
   int width_ = 0, height_ = 0;
   std::vector<Numbers> knots_;  // one more before and after
-  std::vector<double> gaps_;    // from each to the next, as the curve counts
-  std::vector<double> way_;     // made after each of kSteps between neighbours
+  std::vector<double> gaps_;    // from each to the next, in curve parameters
+  std::vector<double> way_;     // length of the path after each of kSteps between neighbours
   double length_ = 1.0;
 };
 
-// Shares of the way for `frames` frames, 0..1. Forth: from 0 to 1 at an even speed that begins and
-// ends gently. `bounce`: there and back, so that the last frame is followed by the first. `closed`:
-// the way comes back to its beginning by itself.
+// Shares of the path for `frames` frames, 0..1. Default: once from 0 to 1 with a gentle start and
+// end. `bounce`: back and forth, so that the first frame follows the last. `closed`: the path
+// returns to its beginning by itself.
 std::vector<double> FrameShares(int frames, bool bounce, bool closed);
 
-// Frames on the turn around the key view (turn.h) with its focal length, upright.
+// Frames of the turn around the key view (turn.h) with its focal length, upright.
 std::vector<PathCamera> TurnFrames(const Scene& scene,
                                    int key_view,
                                    const Eigen::Vector3d& focus,
                                    const std::vector<double>& shares);
 
-// As people order names with numbers: "p2" before "p10".
+// Natural order of names: "p2" before "p10".
 std::vector<int> ViewsInOrder(const Scene& scene);
 
 }  // namespace color3d

@@ -34,7 +34,7 @@ std::vector<PathCamera> Bow(int count) {
   return cameras;
 }
 
-TEST(SmoothPathTest, PassesThroughEveryCameraExactly) {
+TEST(SmoothPathTest, PassesThroughEveryCamera) {
   const std::vector<PathCamera> cameras = Bow(9);
   const SmoothPath path(cameras, 3.0);
   EXPECT_EQ(path.KnotAt(0), 0.0);
@@ -49,7 +49,7 @@ TEST(SmoothPathTest, PassesThroughEveryCameraExactly) {
   }
 }
 
-TEST(SmoothPathTest, MovesEvenlyWithoutJumpsAndUpStaysUp) {
+TEST(SmoothPathTest, MovesEvenlyAndStaysUpright) {
   const std::vector<PathCamera> cameras = Bow(9);
   const SmoothPath path(cameras, 3.0);
   constexpr int kSteps = 400;
@@ -70,7 +70,7 @@ TEST(SmoothPathTest, MovesEvenlyWithoutJumpsAndUpStaysUp) {
   EXPECT_LT(most_turn, 0.02);
 }
 
-TEST(SmoothPathTest, OneCameraStandsStillAndEqualOnesDoNoHarm) {
+TEST(SmoothPathTest, AcceptsOneCameraAndEqualCameras) {
   const std::vector<PathCamera> bow = Bow(3);
   const SmoothPath still({bow[0]}, 1.0);
   for (const double share : {0.0, 0.3, 1.0, 7.0, -1.0}) {
@@ -89,7 +89,7 @@ TEST(SmoothPathTest, OneCameraStandsStillAndEqualOnesDoNoHarm) {
   EXPECT_THROW(SmoothPath(bow, std::nan("")), Error);
 }
 
-TEST(FrameSharesTest, ForthThereAndBackAndAround) {
+TEST(FrameSharesTest, SupportsOnceBackAndForthAndLoop) {
   const std::vector<double> forth = FrameShares(101, false, false);
   EXPECT_EQ(forth.front(), 0.0);
   EXPECT_EQ(forth.back(), 1.0);
@@ -105,7 +105,7 @@ TEST(FrameSharesTest, ForthThereAndBackAndAround) {
   EXPECT_EQ(FrameShares(1, false, false), std::vector<double>{0.0});
 }
 
-TEST(CoverPictureTest, SeesNothingThatTheOtherDidNot) {
+TEST(CoverPictureTest, AddsNothingUnseenByOriginal) {
   const Camera camera{600, 400, 500.0, 510.0, 310.0, 190.0};
   for (const auto& [width, height] : {std::pair{300, 200}, {100, 300}, {302, 100}, {64, 64}}) {
     const Camera covered = CoverPicture(camera, width, height);
@@ -124,7 +124,7 @@ TEST(CoverPictureTest, SeesNothingThatTheOtherDidNot) {
   }
 }
 
-TEST(ViewsInOrderTest, NumbersCountAsNumbers) {
+TEST(ViewsInOrderTest, SortsNumbersByValue) {
   Scene scene;
   for (const char* name : {"p1.png", "p10.png", "p2.png", "p02.png", "a9.png", "a.png"}) {
     scene.views.push_back({.name = name});

@@ -1,6 +1,6 @@
-// A way around what the key view shows, without a beginning or an end: a full circle where photos
-// stand all around, else a sway that stays among them; as high and as far away as the photos that
-// are near. The page and movies take the same. Pure functions.
+// A closed camera path around the focus of the key view: a full circle if photos surround it, else
+// a sway among them, at the height and distance of the nearby photos. The page and movies use the
+// same path. Pure functions.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,10 +12,10 @@
 namespace color3d {
 
 struct Turn {
-  // A camera as seen from the origin of the page's world (stand.h), radians.
+  // A camera seen from the origin of the page's world (stand.h), in radians.
   struct Place {
     double angle = 0.0;         // around the y axis
-    double height = 0.0;        // above the level
+    double height = 0.0;        // elevation
     double log_distance = 0.0;  // page's units
   };
   Place start;  // the key view's camera
@@ -26,11 +26,11 @@ struct Turn {
   std::vector<Place> photos;  // all of them
 };
 
-// `stand`: of the key view (StandOf).
+// `stand`: that of the key view (StandOf).
 Turn TurnOf(const Scene& scene, int key_view, const Stand& stand);
 
-// Where the camera is after this share of the turn, in the page's units; the share wraps, and 0 is
-// the key view. It looks at the origin.
+// The camera after this share of the turn, in the page's units. The share wraps; 0 is the key view.
+// The camera looks at the origin.
 Eigen::Vector3d TurnPosition(const Turn& turn, double share);
 
 }  // namespace color3d

@@ -40,7 +40,7 @@ Scene SceneOf(const std::vector<double>& degrees) {
 
 Turn TurnOf(const Scene& scene, int key) { return TurnOf(scene, key, StandOf(scene, key, kFocus)); }
 
-TEST(TurnTest, PhotosAllAroundGiveACircleAndOthersASwayAmongThem) {
+TEST(TurnTest, SurroundingPhotosGiveCircleOthersSway) {
   std::vector<double> ring;
   for (int i = 0; i < 8; ++i) ring.push_back(45.0 * i);
   EXPECT_TRUE(TurnOf(SceneOf(ring), 3).around);
@@ -60,7 +60,7 @@ TEST(TurnTest, PhotosAllAroundGiveACircleAndOthersASwayAmongThem) {
   EXPECT_NEAR(TurnOf(SceneOf({0}), 0).reach, 0.1, 1e-9);
 }
 
-TEST(TurnTest, TheWayBeginsAtTheKeyViewAndStaysAmongThePhotos) {
+TEST(TurnTest, PathBeginsAtKeyViewAndStaysNearPhotos) {
   const std::vector<double> arc = {-75, -50, -25, 0};
   for (int key = 0; key < 4; ++key) {
     const Scene scene = SceneOf(arc);
@@ -83,7 +83,7 @@ TEST(TurnTest, TheWayBeginsAtTheKeyViewAndStaysAmongThePhotos) {
   }
 }
 
-TEST(TurnTest, TheWayRisesAndFallsWithThePhotosButNotToThoseOfAnotherHeight) {
+TEST(TurnTest, PathFollowsHeightOfNearbyPhotos) {
   Scene scene;
   for (int i = 0; i < 24; ++i) {
     const double angle = 15.0 * i;
@@ -99,7 +99,7 @@ TEST(TurnTest, TheWayRisesAndFallsWithThePhotosButNotToThoseOfAnotherHeight) {
   EXPECT_NEAR(height(TurnPosition(turn, 0.5)), std::atan2(0.5, 4.0), 0.06);
 }
 
-TEST(TurnFramesTest, TheLoopClosesUpStaysUpAndTheFocusStaysInTheMiddle) {
+TEST(TurnFramesTest, LoopClosesUprightAndCentered) {
   std::vector<double> ring;
   for (int i = 0; i < 12; ++i) ring.push_back(30.0 * i);
   for (const std::vector<double>& angles : {ring, {-30.0, -10.0, 0.0, 25.0}}) {
@@ -135,7 +135,7 @@ TEST(TurnFramesTest, TheLoopClosesUpStaysUpAndTheFocusStaysInTheMiddle) {
   }
 }
 
-TEST(TurnFramesTest, AKeyViewFromStraightAboveHasAnUpToo) {
+TEST(TurnFramesTest, OverheadKeyViewHasUpVector) {
   Scene scene;
   for (int i = 0; i < 3; ++i) {
     View view;

@@ -4,9 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cctype>
 #include <future>
+#include <set>
+#include <string>
 #include <thread>
 
+#include "core/catalogue/captures.h"
 #include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
@@ -367,6 +371,22 @@ TEST_F(SceneValidationTest, AcceptsOneSplatWithoutPhotos) {
   ASSERT_TRUE(
       Commit({{"a.png", TinyPng()}, {"b.png", TinyPng()}, {"points.ply", "ply"}}, &scene).ok());
   EXPECT_EQ(scene.layout(), v1::Scene::LAYOUT_PHOTOS);
+}
+
+TEST(SceneLayoutTest, EveryApiValueHasRowOfSameName) {
+  std::set<CaptureLayout> in_api;
+  const auto* layouts = v1::Scene::Layout_descriptor();
+  for (int i = 0; i < layouts->value_count(); ++i) {
+    const auto layout = static_cast<CaptureLayout>(layouts->value(i)->number());
+    in_api.insert(layout);
+    if (layout == CaptureLayout::kUnknown) continue;
+    std::string name = InfoOf(layout).name;
+    for (char& c : name) c = static_cast<char>(std::toupper(c));
+    EXPECT_EQ(layouts->value(i)->name(), "LAYOUT_" + name);
+  }
+  for (const CaptureLayoutInfo& info : CaptureLayouts()) {
+    EXPECT_EQ(in_api.contains(info.layout), info.layout != CaptureLayout::kPosedFilms) << info.name;
+  }
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ std::vector<ChoicePoint> TwoScenes() {
           PointOf("fox", "crop", "128", 60, 5.5)};
 }
 
-TEST(ChoiceResults, SurviveBeingKilledInTheMiddleOfALine) {
+TEST(ChoiceResults, IgnoreTruncatedLine) {
   const ScratchFolder folder;
   const auto file = folder.path() / "choices.jsonl";
   EXPECT_TRUE(ReadChoicePoints(file).empty());
@@ -46,7 +46,7 @@ TEST(ChoiceResults, SurviveBeingKilledInTheMiddleOfALine) {
   EXPECT_TRUE(points[1].SameWork(PointOf("fern", "crop", "128", 20, 0.0)));
 }
 
-TEST(ChoiceTables, ShowEachChoiceBesideTheDefault) {
+TEST(ChoiceTables, CompareEachChoiceWithDefault) {
   const std::string tables = ChoiceTables(TwoScenes());
   EXPECT_THAT(tables, HasSubstr("### default\n"));
   EXPECT_THAT(tables, HasSubstr("|  | 20 | 2.0 | 4.00 | 6.00 | 5.00 | 2.00 | 3.00 | 2.50 |\n"));
@@ -57,7 +57,7 @@ TEST(ChoiceTables, ShowEachChoiceBesideTheDefault) {
   EXPECT_THAT(tables, Not(HasSubstr("384"))) << "one of the scenes is missing";
 }
 
-TEST(ChoicePlots, AreMeansOverScenes) {
+TEST(ChoicePlots, ShowMeansOverScenes) {
   const auto plots = ChoicePlots(TwoScenes(), /*delivered=*/true);
   ASSERT_EQ(plots.size(), 2u);
   EXPECT_EQ(plots[0].title, kDefaultChoice);

@@ -25,7 +25,7 @@ TEST(ColorBinsTest, CountsShares) {
   EXPECT_DOUBLE_EQ(bins[1].share, 0.25);
 }
 
-TEST(ColorBinsTest, RareBinsAreLeftOutAndSharesSumToOne) {
+TEST(ColorBinsTest, OmitsRareBinsAndSharesSumToOne) {
   ColorHistogram histogram;
   for (int i = 0; i < 99; ++i) histogram.Add(Uniform(0.0f, 0.0f));
   histogram.Add(Uniform(60.0f, 0.0f));
@@ -34,7 +34,7 @@ TEST(ColorBinsTest, RareBinsAreLeftOutAndSharesSumToOne) {
   EXPECT_DOUBLE_EQ(bins[0].share, 1.0);
 }
 
-TEST(ColorBinsTest, ColorsBeyondTheGridCountAtItsBorder) {
+TEST(ColorBinsTest, CountsOuterColorsAtTheBorder) {
   ColorHistogram histogram;
   histogram.Add(Uniform(1e6f, -1e6f));
   const auto bins = histogram.Bins(0.0);
@@ -42,7 +42,7 @@ TEST(ColorBinsTest, ColorsBeyondTheGridCountAtItsBorder) {
   EXPECT_EQ(bins[0].center_ab, (std::array<float, 2>{120.0f, -120.0f}));
 }
 
-TEST(ColorBinsTest, RebalancingLiftsRareBinsAndKeepsTheMean) {
+TEST(ColorBinsTest, RebalancingLiftsRareBinsAndKeepsMean) {
   const std::vector<ColorHistogram::Bin> bins{{{0, 0}, 0.9}, {{60, 0}, 0.1}};
   const std::vector<float> weights = RebalancingWeights(bins, 0.0, 1.0);
   EXPECT_NEAR(weights[1] / weights[0], 9.0, 1e-5);
@@ -52,7 +52,7 @@ TEST(ColorBinsTest, RebalancingLiftsRareBinsAndKeepsTheMean) {
   EXPECT_FLOAT_EQ(none[1], 1.0f);
 }
 
-TEST(ColorBinsTest, TakesOnlyAb) {
+TEST(ColorBinsTest, RefusesOtherChannelCounts) {
   ColorHistogram histogram;
   EXPECT_THROW(histogram.Add(Image(4, 4, 3)), Error);
 }

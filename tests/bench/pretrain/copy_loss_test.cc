@@ -35,7 +35,7 @@ torch::Tensor SamePlaces() {
   return torch::stack({at.repeat({cells}), at.unsqueeze(1).expand({cells, cells}).flatten()}, 1);
 }
 
-TEST(CopyLossTest, TheSpaceIsThatOfMatching) {
+TEST(CopyLossTest, UsesSpaceOfMatching) {
   torch::manual_seed(1);
   const torch::Tensor mix = torch::randn({24, 24});
   const torch::Tensor cells = torch::mm(torch::randn({300, 24}), mix);
@@ -48,7 +48,7 @@ TEST(CopyLossTest, TheSpaceIsThatOfMatching) {
       SquaredDistances(ours, ours), SquaredDistances(used, used), /*rtol=*/1e-3, /*atol=*/1e-3));
 }
 
-TEST(CopyLossTest, OfFewerSamplesThanChannelsToo) {
+TEST(CopyLossTest, AcceptsFewerSamplesThanChannels) {
   torch::manual_seed(2);
   const torch::Tensor samples = torch::randn({12, 40});
   const torch::Tensor white = WhitenBlock(samples, samples, 8, 2.0);
@@ -57,7 +57,7 @@ TEST(CopyLossTest, OfFewerSamplesThanChannelsToo) {
   EXPECT_LT((white.square().mean(0) - 2.0 / 8).abs().max().item<float>(), 0.02f);
 }
 
-TEST(CopyLossTest, TheSameViewCopiesItselfAndAnotherDoesNot) {
+TEST(CopyLossTest, SameViewHasLowerLossThanAnother) {
   torch::manual_seed(3);
   const CopyView view = RandomView();
   CopyView other = RandomView();
@@ -75,7 +75,7 @@ TEST(CopyLossTest, TheSameViewCopiesItselfAndAnotherDoesNot) {
   EXPECT_LT(same.contrast.item<double>(), 0.5 * wrong.contrast.item<double>());
 }
 
-TEST(CopyLossTest, WithoutKnownPlacesThereIsNoContrast) {
+TEST(CopyLossTest, HasNoContrastWithoutMatches) {
   torch::manual_seed(4);
   const CopyView view = RandomView();
   Random random(1);
@@ -89,7 +89,7 @@ TEST(CopyLossTest, WithoutKnownPlacesThereIsNoContrast) {
   EXPECT_EQ(losses.contrast.item<double>(), 0.0);
 }
 
-TEST(CopyLossTest, DescendingMakesTapsThatCopyRightColors) {
+TEST(CopyLossTest, DescentImprovesCopiedColors) {
   torch::manual_seed(5);
   CopyView first = RandomView(), second = RandomView();
   for (CopyView* view : {&first, &second}) {

@@ -40,7 +40,7 @@ class PhotoSetTest : public testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(PhotoSetTest, MatchesOfAPairShowTheSame) {
+TEST_F(PhotoSetTest, MatchesOfPairShowSamePlace) {
   Write("photo.png", Ramps(200, 150, 0.2f));
   const PhotoSet photos({{folder_, 1.0}});
   Random random(4);
@@ -73,7 +73,7 @@ TEST_F(PhotoSetTest, MatchesOfAPairShowTheSame) {
   EXPECT_LT(mirrored, 10);  // the world is not: one of seven
 }
 
-TEST_F(PhotoSetTest, AClipIsOneOfManyPhotosAndItsFramesArePaired) {
+TEST_F(PhotoSetTest, PairsFramesOfClips) {
   for (int i = 0; i < 3; ++i) {
     Write("clips/one/" + std::to_string(i) + ".png", Ramps(60, 60, 0.3f * static_cast<float>(i)));
   }
@@ -99,7 +99,7 @@ TEST_F(PhotoSetTest, AClipIsOneOfManyPhotosAndItsFramesArePaired) {
   EXPECT_LT(unknown, 70);
 }
 
-TEST_F(PhotoSetTest, CropsStayInsideAndAreTrueColor) {
+TEST_F(PhotoSetTest, CropsStayInsideAndKeepColor) {
   Write("photo.png", Ramps(90, 50, 0.2f));
   const PhotoSet photos({{folder_, 1.0}});
   Random random(5);
@@ -115,13 +115,13 @@ TEST_F(PhotoSetTest, CropsStayInsideAndAreTrueColor) {
   }
 }
 
-TEST_F(PhotoSetTest, RefusesAFolderWithoutColor) {
+TEST_F(PhotoSetTest, RejectsFolderWithoutColor) {
   Write("gray.png", Image(32, 32, 3, 0.4f));
   EXPECT_THROW(PhotoSet({{folder_, 1.0}}), Error);
   EXPECT_THROW(PhotoSet({}, {{folder_, 1.0}}), Error);
 }
 
-TEST(CropWindowTest, TurnedWindowsStayInsideThePhoto) {
+TEST(CropWindowTest, RotatedWindowsStayInsidePhoto) {
   const BytePhoto photo{40, 90, {}};
   Random random(6);
   for (int i = 0; i < 200; ++i) {

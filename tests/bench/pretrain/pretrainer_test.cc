@@ -50,7 +50,7 @@ void ExpectEqual(const WeightMap& expected, const WeightMap& actual) {
     ASSERT_EQ(array.values, actual.at(name).values) << name;
 }
 
-TEST_F(PretrainerTest, AResumedRunEndsAsAnUninterruptedOne) {
+TEST_F(PretrainerTest, ResumesWithSameResult) {
   const PhotoSet photos({{folder_, 1.0}});
   for (double copy_weight : {0.0, 1.0}) {
     options_.copy_weight = options_.contrast_weight = copy_weight;
@@ -71,7 +71,7 @@ TEST_F(PretrainerTest, AResumedRunEndsAsAnUninterruptedOne) {
   }
 }
 
-TEST_F(PretrainerTest, GoesOnFromWeights) {
+TEST_F(PretrainerTest, StartsFromWeights) {
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   trainer.Step();
@@ -88,7 +88,7 @@ TEST_F(PretrainerTest, GoesOnFromWeights) {
             other.AveragedWeights().at("encoder.norm1.bias").values);
 }
 
-TEST_F(PretrainerTest, NamesWhatWeightsToStartFromLack) {
+TEST_F(PretrainerTest, NamesMissingStartWeights) {
   const PhotoSet photos({{folder_, 1.0}});
   const WeightMap good = Pretrainer(options_, photos, std::nullopt).AveragedWeights();
   const auto expect_refused = [&](const WeightMap& weights, const std::string& name) {
@@ -111,7 +111,7 @@ TEST_F(PretrainerTest, NamesWhatWeightsToStartFromLack) {
   expect_refused(weights, "encoder.norm1.weight");
 }
 
-TEST_F(PretrainerTest, TheScheduleMayGoByTime) {
+TEST_F(PretrainerTest, FollowsScheduleByTime) {
   const PhotoSet photos({{folder_, 1.0}});
   const auto change = [&](double progress) {
     Pretrainer trainer(options_, photos, std::nullopt);
@@ -126,7 +126,7 @@ TEST_F(PretrainerTest, TheScheduleMayGoByTime) {
   EXPECT_LT(change(1.0), 0.05 * change(0.0));
 }
 
-TEST_F(PretrainerTest, WhatItWritesIsAnAutomaticColorizer) {
+TEST_F(PretrainerTest, WritesAutomaticColorizer) {
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   trainer.Step();
@@ -137,7 +137,7 @@ TEST_F(PretrainerTest, WhatItWritesIsAnAutomaticColorizer) {
   for (float v : color.ab.data) ASSERT_TRUE(std::isfinite(v));
 }
 
-TEST_F(PretrainerTest, RefusesADamagedCheckpoint) {
+TEST_F(PretrainerTest, RejectsDamagedCheckpoint) {
   const PhotoSet photos({{folder_, 1.0}});
   Pretrainer trainer(options_, photos, std::nullopt);
   std::string checkpoint = trainer.Checkpoint("{}");

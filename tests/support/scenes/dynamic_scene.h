@@ -18,7 +18,7 @@ namespace color3d {
 
 struct DynamicSceneOptions {
   DynamicCase which = DynamicCase::kSliding;
-  // 1..8, on an arc. A single one that does not move makes a film (Scene::IsFilm).
+  // 1..8, on an arc. A single static one makes a film (CaptureKind::kFilm).
   int cameras = 6;
   // 1..1000 time steps of 1/8 s; 0: 1 for kOneStep, which takes no other, 8 for kStill, else 12.
   int times = 0;

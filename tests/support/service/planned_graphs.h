@@ -28,6 +28,15 @@ inline v1::JobSpec SceneSpec() {
   return spec;
 }
 
+inline JobRecord Done(const std::string& kind) {
+  JobRecord job;
+  job.name = "jobs/" + kind;
+  job.kind = kind;
+  job.scene = "scenes/test";
+  job.state = JobState::kSucceeded;
+  return job;
+}
+
 inline int IndexOf(const NewGraph& graph, const std::string& kind) {
   for (size_t i = 0; i < graph.jobs.size(); ++i) {
     if (graph.jobs[i].kind == kind) return static_cast<int>(i);

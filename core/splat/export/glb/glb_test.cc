@@ -39,7 +39,7 @@ TEST(GlbTest, ReadsBackExactly) {
   }
 }
 
-TEST(GlbTest, RefusesNoneAndWhatIsNotFinite) {
+TEST(GlbTest, RejectsEmptyAndNonFiniteModels) {
   EXPECT_THROW(EncodeGlb(Gaussians(0, 0)), Error);
   ViewerGaussians g = Gaussians(3, 1);
   g.log_scale[4] = std::numeric_limits<float>::infinity();

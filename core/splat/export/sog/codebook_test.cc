@@ -17,7 +17,7 @@ std::vector<float> Normal(size_t count, uint64_t seed) {
   return values;
 }
 
-TEST(CodebookTest, FewValuesAreKeptAndManyAreNear) {
+TEST(CodebookTest, KeepsFewValuesAndApproximatesMany) {
   const Codebook few({3.0f, -1.0f, 3.0f, 0.5f});
   for (const float v : {3.0f, -1.0f, 0.5f}) EXPECT_EQ(few.levels()[few.Nearest(v)], v);
   EXPECT_EQ(Codebook({}).levels()[7], 0.0f);
@@ -37,7 +37,7 @@ TEST(CodebookTest, FewValuesAreKeptAndManyAreNear) {
   EXPECT_LT(squares / values.size(), 1.15 * std::sqrt(3.0) * M_PI / 2.0 / 65536.0);
 }
 
-TEST(PaletteTest, FindsSeparateRowsAndDoesNotDependOnThreads) {
+TEST(PaletteTest, FindsClustersForAnyThreadCount) {
   constexpr int kWidth = 5;
   const std::vector<float> centers = Normal(40 * kWidth, 2);
   std::vector<float> rows;
@@ -59,7 +59,7 @@ TEST(PaletteTest, FindsSeparateRowsAndDoesNotDependOnThreads) {
   }
 }
 
-TEST(PaletteTest, MoreRowsAreNearerAndTinyInputsWork) {
+TEST(PaletteTest, ErrorFallsWithPaletteSize) {
   ThreadPool pool(2);
   const std::vector<float> rows = Normal(4000 * 4, 3);
   double last = 1e30;

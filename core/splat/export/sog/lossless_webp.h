@@ -1,4 +1,4 @@
-// Pictures of bytes that mean something else than colour, kept bit for bit. A pure function.
+// Lossless WebP of byte data that is not colour. A pure function.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ struct RgbaTexture {
   std::vector<uint8_t> rgba;
 };
 
-// Bit for bit, also where alpha is 0. Throws Error{kInvalidArgument} for more than 16383 pixels a
-// side.
+// Bit-exact, including pixels of alpha 0. Throws Error{kInvalidArgument} for more than 16383 pixels
+// a side.
 std::string EncodeLosslessWebp(const RgbaTexture& texture);
 
 }  // namespace color3d

@@ -25,7 +25,7 @@ ViewerGaussians Gaussians(size_t count, int degree) {
   return ForViewers(model, FitRgbHarmonics(model, pool), kFrame, pool);
 }
 
-TEST(SogTest, ReadsBackWithinWhatTheFormatKeeps) {
+TEST(SogTest, RoundTripsWithinFormatPrecision) {
   ThreadPool pool(2);
   for (const int degree : {0, 1, 2, 3}) {
     const ViewerGaussians g = Gaussians(600, degree);
@@ -63,7 +63,7 @@ TEST(SogTest, ReadsBackWithinWhatTheFormatKeeps) {
   }
 }
 
-TEST(SogTest, RendersAsThePly) {
+TEST(SogTest, RendersLikePly) {
   ThreadPool pool(2);
   GaussianModel model = RandomModel({3000, 3, 2, 0, /*chroma_size=*/0.03});
   for (size_t i = 0; i < model.size(); ++i) {
@@ -88,7 +88,7 @@ TEST(SogTest, WritesSameBytesForAnyThreadCount) {
   EXPECT_EQ(EncodeSog(g, two), EncodeSog(g, one));
 }
 
-TEST(SogTest, NoneAndOneGaussianAreFilesToo) {
+TEST(SogTest, EncodesEmptyModelAndOneGaussian) {
   ThreadPool pool(2);
   EXPECT_EQ(ReadSog(EncodeSog(Gaussians(0, 2), pool)).size(), 0u);
   const ViewerGaussians one = Gaussians(1, 3);
@@ -102,7 +102,7 @@ TEST(SogTest, NoneAndOneGaussianAreFilesToo) {
   for (size_t k = 0; k < one.sh.size(); ++k) EXPECT_NEAR(file.sh[k], one.sh[k], 1e-5) << k;
 }
 
-TEST(SogTest, RefusesWhatIsNotFinite) {
+TEST(SogTest, RejectsNonFiniteValues) {
   ThreadPool pool(1);
   ViewerGaussians g = Gaussians(4, 1);
   g.position[7] = std::numeric_limits<float>::infinity();
@@ -117,7 +117,7 @@ TEST(SogTest, RefusesWhatIsNotFinite) {
   EXPECT_THROW(EncodeSog(g, pool), Error);
 }
 
-TEST(SogTest, ZipKeepsItsFiles) {
+TEST(SogTest, ZipRoundTrips) {
   const auto files = ReadStoredZip(StoredZip({{"a", "one"}, {"folder/b", std::string(300, '\0')}}));
   ASSERT_EQ(files.size(), 2u);
   EXPECT_EQ(files.at("a"), "one");

@@ -1,4 +1,4 @@
-// A zip archive whose files are stored, not compressed. Pure functions.
+// Zip archives of uncompressed files. Pure functions.
 #pragma once
 
 #include <string>
@@ -11,8 +11,8 @@ struct ZipEntry {
   std::string bytes;
 };
 
-// The same bytes for the same entries: all dates are 1 January 1980. Throws
-// Error{kInvalidArgument} where a file or the archive would reach 4 GB.
+// The same bytes for the same entries: all dates are 1 January 1980. Throws Error{kInvalidArgument}
+// if a file or the archive would reach 4 GB.
 std::string StoredZip(const std::vector<ZipEntry>& entries);
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
-// One attribute of the Gaussians of a .splat4d over its frames: which of them stay as they are, and
-// the steps of those that do not. Internal to the export.
+// Quantization of one attribute of a .splat4d over its frames: constant Gaussians and the steps of
+// the others. Internal to the export.
 #pragma once
 
 #include <cstddef>
@@ -8,33 +8,33 @@
 
 namespace color3d {
 
-// How an attribute is quantised: nothing is off by more than `bound`.
+// Quantization steps with errors of at most `bound`.
 struct Quantizer {
   int channels = 1;
   double bound = 0.0;
-  double step = 1.0;       // of what changes
-  double base_step = 1.0;  // of what does not, and of how things begin
+  double step = 1.0;       // of changing values
+  double base_step = 1.0;  // of constant values and of first values
 };
 
-// First every frame is shown to Observe, then Close, then every frame to Hold.
+// Call order: Observe every frame, Close, then Hold every frame.
 class HeldTrack {
  public:
   HeldTrack(const Quantizer& quantizer, size_t count);
 
-  // `values`: channels a Gaussian. What is not `seen` may be anywhere.
+  // `values`: channels per Gaussian. Values that are not `seen` are ignored.
   void Observe(const std::vector<float>& values, const std::vector<char>& seen);
   void Close();
 
   bool IsStill(size_t i) const { return still_[i] != 0; }
-  // In steps of base_step: where a Gaussian stays, else where it is first seen.
+  // The constant value of a Gaussian, or its first visible one, in steps of base_step.
   int32_t Base(size_t i, int channel) const { return base_[i * quantizer_.channels + channel]; }
 
-  // What was seen of it; 0 where nothing was.
+  // A visible value; 0 if it is never visible.
   float Low(size_t i, int channel) const { return low_[i * quantizer_.channels + channel]; }
   float High(size_t i, int channel) const { return high_[i * quantizer_.channels + channel]; }
 
-  // A Gaussian keeps its steps until they are off by more than the bound, so that what trembles
-  // below that costs nothing.
+  // Repeats the steps of a Gaussian until their error exceeds the bound, so that jitter below it
+  // takes no space.
   void Hold(const std::vector<float>& values, const std::vector<char>& seen);
   int32_t Held(size_t i, int channel) const { return held_[i * quantizer_.channels + channel]; }
   const Quantizer& quantizer() const { return quantizer_; }

@@ -1,5 +1,5 @@
-// What moves in a model, in a file's frame and as bytes say it, one moment after another. Internal
-// to the export. Not thread-safe.
+// The moving Gaussians of a model at successive times, in the file's frame and quantized to bytes.
+// Internal to the export. Not thread-safe.
 #pragma once
 
 #include <vector>
@@ -15,14 +15,15 @@ class MoverFrames {
   // `pool` must outlive the object.
   MoverFrames(const GaussianModel& model, const ExportFrame& frame, ThreadPool& pool);
 
-  // A time of the scene, seconds. Throws Error{kInvalidArgument} for values that are not finite.
+  // Moves to a time of the scene in seconds. Throws Error{kInvalidArgument} for values that are not
+  // finite.
   void GoTo(double time_s);
 
   std::vector<float> position;  // 3
-  std::vector<float> rotation;  // 4: -128..127, of the sign that is nearer to the moment before
+  std::vector<float> rotation;  // 4: -128..127, of the sign closer to the previous time
   std::vector<float> opacity;   // 1: 0..255
   std::vector<char> seen;       // opacity > 0
-  std::vector<char> always;     // as many ones
+  std::vector<char> always;     // all ones
 
  private:
   void AddRotation(const float* unit, const float* before);

@@ -63,7 +63,7 @@ class Splat4dTest : public testing::Test {
   ExportFrame frame_{2.0, {1.0, -2.0, 3.0}};
 };
 
-TEST_F(Splat4dTest, EveryFrameReadsBackWithinItsBounds) {
+TEST_F(Splat4dTest, RoundTripsWithinErrorBounds) {
   const GaussianModel model = MovingModel();
   const int frames = 67;  // three groups, of which the last is short
   const Splat4dFile file = ReadSplat4d(Encode(model, frames));
@@ -104,7 +104,7 @@ TEST_F(Splat4dTest, EveryFrameReadsBackWithinItsBounds) {
   }
 }
 
-TEST_F(Splat4dTest, WhatStandsStillCostsNothingPerFrame) {
+TEST_F(Splat4dTest, StaticGaussiansAreStoredOnce) {
   GaussianModel model = MovingModel();
   for (auto* part : {&model.motion.velocity, &model.motion.acceleration, &model.motion.spin}) {
     std::fill(part->begin(), part->end(), 0.0f);
@@ -115,7 +115,7 @@ TEST_F(Splat4dTest, WhatStandsStillCostsNothingPerFrame) {
   EXPECT_LT(many.size(), few.size() + 100);
 }
 
-TEST_F(Splat4dTest, WhatNoFrameShowsIsLeftOut) {
+TEST_F(Splat4dTest, OmitsGaussiansInvisibleInAllFrames) {
   GaussianModel model = MovingModel();
   model.opacity_logit[0] = -20.0f;           // stands still
   model.opacity_logit[kCount - 1] = -20.0f;  // moves
@@ -125,7 +125,7 @@ TEST_F(Splat4dTest, WhatNoFrameShowsIsLeftOut) {
   EXPECT_THROW(Encode(model, 5), Error);
 }
 
-TEST_F(Splat4dTest, OneFrameAndAModelWithoutMotionAreFiles) {
+TEST_F(Splat4dTest, EncodesOneFrameAndStaticModel) {
   EXPECT_EQ(ReadSplat4d(Encode(MovingModel(), 1)).frames.size(), 1u);
   const GaussianModel still = RandomModel({kCount, 3, 1, 0, /*chroma_size=*/0.03});
   const Splat4dFile file = ReadSplat4d(Encode(still, 3));
@@ -133,7 +133,7 @@ TEST_F(Splat4dTest, OneFrameAndAModelWithoutMotionAreFiles) {
   EXPECT_EQ(file.frames.size(), 3u);
 }
 
-TEST_F(Splat4dTest, RefusesWhatItCannotSay) {
+TEST_F(Splat4dTest, RejectsUnsupportedModels) {
   GaussianModel model = MovingModel();
   EXPECT_THROW(Encode(model, 0), Error);
   EXPECT_THROW(Encode(model, kMaxSplat4dFrames + 1), Error);

@@ -1,4 +1,4 @@
-// The streams of symbols that a .splat4d is made of. Pure functions. Internal to the export.
+// Symbol streams of a .splat4d. Pure functions. Internal to the export.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace color3d {
 
-// Attributes as the format numbers them.
+// Attribute numbers of the format.
 enum Attribute { kPosition, kRotation, kColor, kOpacity, kScale, kAttributes };
 enum StreamKind { kKey, kDelta, kStatic };
 
@@ -21,12 +21,13 @@ struct PackedStream {
   std::string head, payload;
 };
 
-// 0, -1, 1, -2, ... as 0, 1, 2, 3, ...: small numbers of either sign have small symbols.
+// Zigzag coding: 0, -1, 1, -2, ... become 0, 1, 2, 3, ..., so that small numbers have small
+// symbols.
 inline uint32_t ZigZag(int32_t value) {
   return (static_cast<uint32_t>(value) << 1u) ^ static_cast<uint32_t>(value >> 31);
 }
 
-// Throws Error{kResourceExhausted} where memory is short.
+// Throws Error{kResourceExhausted} if memory is short.
 PackedStream Pack(const Stream& stream);
 
 }  // namespace color3d

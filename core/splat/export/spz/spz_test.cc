@@ -20,7 +20,7 @@ ViewerGaussians Gaussians(size_t count, int degree) {
   return ForViewers(model, FitRgbHarmonics(model, pool), ExportFrame(), pool);
 }
 
-TEST(SpzTest, BothVersionsReadBackWithinWhatTheFormatKeeps) {
+TEST(SpzTest, BothVersionsRoundTripWithinPrecision) {
   ThreadPool pool(2);
   for (const SpzVersion version : {SpzVersion::k2, SpzVersion::k4}) {
     for (const int degree : {0, 1, 2, 3}) {
@@ -54,7 +54,7 @@ TEST(SpzTest, BothVersionsReadBackWithinWhatTheFormatKeeps) {
   }
 }
 
-TEST(SpzTest, FarScenesHaveFewerBitsBehindThePoint) {
+TEST(SpzTest, DistantScenesUseFewerFractionalBits) {
   ThreadPool pool(1);
   ViewerGaussians g = Gaussians(10, 0);
   for (float& x : g.position) x *= 1e5f;
@@ -65,7 +65,7 @@ TEST(SpzTest, FarScenesHaveFewerBitsBehindThePoint) {
   }
 }
 
-TEST(SpzTest, RefusesWhatTheFormatCannotSay) {
+TEST(SpzTest, RejectsUnsupportedModels) {
   ThreadPool pool(1);
   const auto refusal = [&](const ViewerGaussians& g) -> std::string {
     try {

@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# Compiles sources that a unity build joins, each on its own, without code (-fsyntax-only): a missing
+# include fails.
+#   tests/check_includes.sh BUILD_DIR        those that the last 5 commits or you have changed
+#   tests/check_includes.sh BUILD_DIR all    all of them (LibTorch's headers are read anew for each)
+# BUILD_DIR is configured, and the protos are built.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+build=${1:?usage: tests/check_includes.sh BUILD_DIR [all]}
+
+joined=$(find "$build" -path '*/Unity/*.cxx' -exec sed -nE "s|^#include \"$PWD/([^\"]+)\".*|\1|p" {} + | sort -u)
+if [ "${2:-}" != all ]; then
+  since=$(git rev-parse -q --verify HEAD~5 || git rev-list --max-parents=0 HEAD | tail -n 1)
+  # A changed header is seen through the source of its name, which includes it.
+  changed=$({ git diff --name-only "$since"; git ls-files --others --exclude-standard; } | sed 's/\.h$/.cc/' | sort -u)
+  joined=$(comm -12 <(echo "$joined") <(echo "$changed"))
+fi
+if [ -z "$joined" ]; then
+  echo "check_includes: no source of a unity build has changed"
+  exit 0
+fi
+# All sources get the include paths and macros of all targets.
+flags=$(grep -oE ' -(isystem |I|D)[^ "]+' "$build/compile_commands.json" | sort -u | tr '\n' ' ')
+# shellcheck disable=SC2086 # the flags are words
+if ! xargs -P "$(nproc)" -I{} g++ -std=c++20 -I. $flags -x c++ -fsyntax-only -w {} <<<"$joined"; then
+  echo "check_includes: include what each source named above uses" >&2
+  exit 1
+fi
+echo "check_includes: ok, $(wc -l <<<"$joined") sources"
