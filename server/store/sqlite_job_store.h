@@ -201,10 +201,10 @@ class SqliteJobStore : public JobStore {
   void StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsage& usage);
   // Steady time since the last call of this name; 0 at the first one after a start of the machine.
   int64_t ElapsedSinceLast(SqliteDatabase& db, const char* name);
-  // Of the digests that `select` gives, the project lets those go that nothing of it names.
-  void LetGo(SqliteDatabase& db,
-             const std::string& project,
-             const std::vector<std::string>& sha256);
+  // The project gives up those of these blobs that none of its jobs and scenes names.
+  void ReleaseHoldings(SqliteDatabase& db,
+                       const std::string& project,
+                       const std::vector<std::string>& sha256);
   int64_t Now() const { return clocks_.wall(); }
   int64_t SteadyNow() const { return clocks_.steady(); }
 

@@ -86,7 +86,7 @@ class Attempt {
   void HandleError(const JobError& found);
   JobError OutOfMemory(const std::exception& e) const;
   // Writes the end of an attempt that was told to stop; false when there was no such order.
-  void Conclude(WorkerStore& store, StopReason reason, const JobError& error);
+  void ReportEnd(WorkerStore& store, StopReason reason, const JobError& error);
   [[noreturn]] void GiveUp(StopReason reason);
   void LogEnd(const char* how);
 
@@ -350,7 +350,8 @@ void Attempt::HandleError(const JobError& found) {
   fs::remove_all(scratch_, ignored);
   for (int tries_left = 2;; --tries_left) {
     try {
-      return Conclude(context_.store, lost ? StopReason::kLeaseLost : keeper_.stop_reason(), error);
+      return ReportEnd(
+          context_.store, lost ? StopReason::kLeaseLost : keeper_.stop_reason(), error);
     } catch (const Error& e) {
       if (tries_left > 0 && e.code() != ErrorCode::kAborted) {
         std::this_thread::sleep_for(context_.timing.report_pause);
@@ -362,7 +363,7 @@ void Attempt::HandleError(const JobError& found) {
   }
 }
 
-void Attempt::Conclude(WorkerStore& store, StopReason reason, const JobError& error) {
+void Attempt::ReportEnd(WorkerStore& store, StopReason reason, const JobError& error) {
   const JobUsage usage = keeper_.Usage();
   switch (reason) {
     case StopReason::kLeaseLost:
@@ -394,7 +395,7 @@ void Attempt::Conclude(WorkerStore& store, StopReason reason, const JobError& er
 // the thread that hangs cannot be ended alone.
 void Attempt::GiveUp(StopReason reason) {
   try {
-    Conclude(context_.heartbeat_store, reason, {});
+    ReportEnd(context_.heartbeat_store, reason, {});
   } catch (const Error& e) {
     spdlog::error("{} cannot report its end: {}", tag_, e.what());
   }

@@ -192,7 +192,7 @@ TEST_F(WorkerLoopTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
   EXPECT_EQ(succeeded, 2);
 }
 
-TEST_F(WorkerLoopTest, ArtifactsOfAdditionalKeyViewsLieInNumberedFolders) {
+TEST_F(WorkerLoopTest, AdditionalKeyViewsHaveNumberedFolders) {
   runner_.wanted = 1;
   NewGraph graph;
   graph.scene = "scenes/test";
