@@ -80,7 +80,7 @@ class Maintenance {
   Maintenance& operator=(const Maintenance&) = delete;
 
  private:
-  // Does the chore, waits as long as it says, and so on until the end.
+  // Does the chore and waits for the returned time, until the destructor.
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
@@ -88,7 +88,7 @@ class Maintenance {
   void GiveBackSpace();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void ExpireJobs();
-  // What could not be read is added to `unreadable`.
+  // Adds the paths that could not be read to `unreadable`.
   void SweepScratch(std::vector<std::string>* unreadable);
   void SweepJobLogs(std::vector<std::string>* unreadable);
   void Scrub(const std::vector<StoredBlob>& blobs, std::vector<std::string>* unreadable);
@@ -109,7 +109,7 @@ class Maintenance {
   std::thread reaper_, sweeper_;
 };
 
-// Leases of worker processes that are gone (the whole machine or the server was killed) end now.
+// Ends the leases of worker processes that no longer exist (the machine or the server was killed).
 void ExpireDeadWorkers(ChoreStore& store);
 
 }  // namespace color3d

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-// How soon a waiting scene notices that it was cancelled.
+// Interval at which a waiting scene checks for cancellation.
 constexpr auto kCancelPoll = std::chrono::milliseconds(50);
 
 // A session fills two: one trains while the other prepares the next sample.
@@ -53,8 +53,8 @@ SceneBatch::Membership::Membership(SceneBatch& batch, const std::string& project
   const MutexLock lock(batch_.mutex_);
   Member member;
   member.project = project;
-  // Newcomers start level with whoever has computed least, so that they neither catch up on the
-  // time before they came nor wait longer than the others.
+  // New members start at the least time of the others, so that they neither make up for the time
+  // before they joined nor wait longer than the others.
   bool first = true;
   for (const Member& other : batch_.members_) {
     if (other.project != project) continue;

@@ -23,14 +23,14 @@ namespace color3d {
 
 class SceneBatch {
  public:
-  // `slots`: how many scenes compute at once; 0: as many as the machine has cores.
+  // `slots`: maximum number of scenes that compute at once; 0: number of cores.
   explicit SceneBatch(int slots = 0);
 
   int slots() const { return slots_; }
-  // Scenes that are in the batch now.
+  // Number of scenes in the batch now.
   int size() const;
 
-  // The encoder of this name: the one that is in memory, or what `load` gives.
+  // The encoder of this name: the one in memory, else the result of `load`.
   std::shared_ptr<const Encoder> SharedEncoder(
       const std::string& name, const std::function<std::shared_ptr<const Encoder>()>& load);
 
@@ -65,7 +65,7 @@ class SceneBatch {
     ~Turn();
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
-    // Slots that this turn may fill: more than one only when nobody waits for them.
+    // Slots that this turn may fill: more than one only if no other member waits.
     int slots() const { return slots_; }
 
    private:

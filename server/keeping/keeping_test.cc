@@ -105,7 +105,7 @@ TEST_F(KeepingTest, BackupLeavesOutAndListsDamagedBlobs) {
   EXPECT_EQ(ResultIn(fresh_, later), "later");
 }
 
-// Somebody declared a scene and never sent its photos: nothing is lost.
+// The photos of a declared scene were never sent: nothing is lost.
 TEST_F(KeepingTest, AbandonedUploadsAreNoFault) {
   SceneRecord abandoned;
   abandoned.name = "scenes/abandoned";

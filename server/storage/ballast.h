@@ -1,5 +1,5 @@
-// A file that takes some of the disk, so that it can be given up: on a full disk even a deletion
-// needs a few MiB, for the job store's log. Thread-safe.
+// A file that reserves disk space to be freed later: on a full disk even a deletion needs a few
+// MiB, for the log of the job store. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,14 +13,14 @@ namespace color3d {
 
 class Ballast {
  public:
-  // `bytes`: how long it is once it is made. One that an earlier server left is taken over.
+  // `bytes`: length of the file. A file that an earlier server left is used.
   Ballast(std::filesystem::path file, int64_t bytes);
 
   int64_t bytes() const { return bytes_; }
   bool IsThere() const;
-  // Makes it, whole or not at all; whether it is there now.
+  // Makes the whole file or none; returns true if it exists now.
   bool Make();
-  // Gives it up; whether that has freed anything.
+  // Deletes the file; returns true if that freed space.
   bool Release();
 
  private:
@@ -32,8 +32,8 @@ class Ballast {
 // How long the ballast of a folder's disk is: 16 MiB, and at most a twentieth of the disk.
 int64_t BallastBytes(const std::filesystem::path& folder);
 
-// Does what frees space. Where the disk is too full for that it is done again once `make_room`,
-// which may be empty, has given something up.
+// Calls `body`, which frees space. If the disk is too full for that, calls it again after
+// `make_room` (may be empty) has freed some.
 template <typename Body>
 auto WithRoomMade(const std::function<bool()>& make_room, const Body& body) {
   try {

@@ -28,7 +28,7 @@ struct UploadStore::Writer::Session {
 
 namespace {
 
-// Of one owner: each is a file, be it small.
+// Maximum number of unfinished uploads of an owner: each is a file.
 constexpr size_t kMaxUnfinished = 1'000;
 
 void CheckName(const UploadName& name, int64_t max_blob_bytes) {
@@ -48,7 +48,7 @@ void CheckName(const UploadName& name, int64_t max_blob_bytes) {
   }
 }
 
-// Of a file as PartPath names it.
+// Owner of a file named by PartPath.
 std::string OwnerOf(const std::string& part) {
   const std::string before = part.substr(0, part.find('.'));
   const size_t at = before.find('@');

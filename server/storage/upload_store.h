@@ -60,8 +60,8 @@ class UploadStore {
     int64_t size_ = 0;
     SpaceReservation space_;  // for what is still to come
   };
-  // May refuse an upload, by throwing, that would bring what its owner's unfinished uploads take to
-  // so many bytes. Decides for one upload at a time.
+  // Throws to refuse an upload after which the unfinished uploads of its owner would take
+  // `owner_bytes`. Called for one upload at a time.
   using Admission = std::function<void(int64_t owner_bytes)>;
   // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). An owner may have
   // 1,000 unfinished uploads (kResourceExhausted, QUOTA_EXCEEDED). A blob that is there need not be
@@ -73,8 +73,8 @@ class UploadStore {
     int uploads = 0;
     std::vector<std::string> unreadable;  // as WalkFolder
   };
-  // Removes uploads that nobody writes and that have not grown for `age`, at this call and at the
-  // last one.
+  // Removes uploads that are not being written and that have not grown for `age`, at this call and
+  // at the last one.
   Reaped ReapOlderThan(std::chrono::seconds age);
 
  private:

@@ -1,4 +1,4 @@
-// What projects see of each other, and what they may have.
+// Isolation and quotas of projects.
 #include "server/store/project_store.h"
 
 #include <gtest/gtest.h>

@@ -17,7 +17,7 @@ struct StoreOptions {
   int max_attempts = 3;
   // First delay before a failed or lost attempt is tried again; doubles with each attempt.
   int64_t retry_backoff_ms = 2'000;
-  // Of this program. A worker of another version than the server's is given no job.
+  // The version of this program. A worker of another version than the server's is given no job.
   std::string program_version;
   // Leases of another start of the machine have ended when a server opens the store.
   std::string boot_id = BootId();
@@ -157,7 +157,8 @@ class SqliteJobStore : public JobStore {
   std::optional<std::string> CheckRequest(SqliteDatabase& db, const RequestKey& request);
   void RecordRequest(SqliteDatabase& db, const RequestKey& request, const std::string& resource);
 
-  // Of the next events after this revision, deletes those of finished jobs from before this time.
+  // Deletes those of the next events after this revision that are of finished jobs and from before
+  // this time.
   // How far it came; nothing: they are all younger.
   std::optional<int64_t> CompactEvents(int64_t after, int64_t before_ms);
 

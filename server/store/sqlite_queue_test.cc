@@ -1,4 +1,4 @@
-// What keeps jobs waiting, what lets them share work, and how old ones go.
+// Queue of the job store: holds, equal work, deletion of old jobs.
 #include <gtest/gtest.h>
 
 #include "tests/support/service/job_store_fixture.h"

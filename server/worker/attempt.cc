@@ -31,7 +31,7 @@ void LinkOrCopy(const fs::path& blob, const fs::path& target) {
   fs::copy_file(blob, target);
 }
 
-// Of a model's file and all that is read beside it.
+// Identity of a model's file and of all files that are read beside it.
 std::string IdentityOf(const fs::path& model) {
   std::string identity;
   for (const fs::path& part : FilesOfModel(model)) {
@@ -79,7 +79,7 @@ class Attempt {
   void NoteModels(const std::vector<std::string>& names);
   void RequireModelsUnchanged() const;
   bool ServeFromCache();
-  // Whether the job was put back because another that runs does the same.
+  // Returns true if the job was put back because a running job does equal work.
   bool JoinEqual();
   void Compute();
   void Publish(const StageOutput& output);
@@ -196,7 +196,7 @@ void Attempt::Prepare() {
   const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
   if (part.bytes.empty()) return;
-  // Whether somebody else has done the same is nothing that a project may learn.
+  // Keyed by project: a project must not learn of equal work of others.
   std::string material =
       context_.code_version + '\n' + job_.project + '\n' + Sha256Hex(manifest) + '\n';
   for (const auto& [name, artifact] : input_artifacts_) {

@@ -182,7 +182,7 @@ class CoreStageRunner : public StageRunner {
   }
 
  private:
-  // Of all personalize jobs of this process, made when the first one needs it.
+  // The batch of all personalize jobs of this process; made by the first one.
   SceneBatch* Batch(int threads) {
     const MutexLock lock(mutex_);
     if (!batch_) batch_ = std::make_unique<SceneBatch>(threads);

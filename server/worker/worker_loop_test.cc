@@ -1,5 +1,5 @@
-// The worker loop with scripted stages, in this process: which jobs run together, and that one's
-// end is not the others'.
+// The worker loop with scripted stages, in this process: jobs that run together, and their separate
+// ends.
 #include "server/worker/worker_loop.h"
 
 #include <gtest/gtest.h>
