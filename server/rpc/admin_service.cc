@@ -48,12 +48,12 @@ void CollectNow(const RpcParts& parts,
   }
   std::vector<FileDigest> gone;
   if (request.dry_run()) {
-    for (const StoredBlob& blob : DueBlobsSoFar(parts.store, blobs, std::chrono::seconds(grace))) {
+    for (const StoredBlob& blob : DueBlobsSoFar(parts.chores, blobs, std::chrono::seconds(grace))) {
       gone.push_back(blob.digest);
     }
   } else {
-    const auto due = DueBlobs(parts.store, blobs, std::chrono::seconds(grace));
-    gone = RemoveDue(parts.store, parts.blobs, due, stop);
+    const auto due = DueBlobs(parts.chores, blobs, std::chrono::seconds(grace));
+    gone = RemoveDue(parts.chores, parts.blobs, due, stop);
   }
   response->set_blobs(static_cast<int>(gone.size()));
   int64_t bytes = 0;

@@ -45,7 +45,7 @@ struct RpcServer::Services {
 };
 
 RpcServer::RpcServer(const RpcServerOptions& options,
-                     ClientStore& store,
+                     JobStore& store,
                      BlobStore& blobs,
                      UploadStore& uploads,
                      const Clock& clock) {
@@ -67,6 +67,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   memory_ = std::make_unique<CallMemory>(options.limits.call_memory_bytes);
   access_ = std::make_unique<Access>(options.tokens, options.certificates);
   parts_.reset(new RpcParts{store,
+                            store,
                             blobs,
                             uploads,
                             *quick_,

@@ -12,6 +12,7 @@
 #include "server/rpc/calls/rpc_parts.h"
 #include "server/rpc/jobs/watch_hub.h"
 #include "server/rpc/live/colorize_hub.h"
+#include "server/store/job_store.h"
 
 namespace grpc {
 class Server;
@@ -52,7 +53,7 @@ class RpcServer {
   // Starts to serve. Throws Error{kFailedPrecondition} with the remedy if the address is in use or
   // does not belong to this machine. The stores must outlive the server.
   RpcServer(const RpcServerOptions& options,
-            ClientStore& store,
+            JobStore& store,
             BlobStore& blobs,
             UploadStore& uploads,
             const Clock& clock);

@@ -82,7 +82,7 @@ TEST_F(ScriptTest, NamesUnusableOutput) {
   expect("  return torch.cat([x, x], 1).int()\n", "type int");
   expect("  return torch.cat([x, x], 1) * float('nan')\n", "nan");
   expect("  return torch.cat([x, x], 1) * 100.0\n", "6000");
-  expect("  return torch.cat([x, x, x], 1)\n", "the value 60,");
+  expect("  return torch.cat([x, x, x], 1)\n", "the value 60;");
   expect("  return 3\n", "returned a Int");
   expect("  assert x.size(0) > 1, 'no colours today'\n  return x\n", "no colours today");
   expect("  return torch.cat([x, torch.ones(1)], 1)\n", "failed");

@@ -25,6 +25,7 @@
 #include "server/rpc/calls/stream_limit.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/upload_store.h"
+#include "server/store/chore_store.h"
 #include "server/store/client_store.h"
 #include "server/store/project_store.h"
 #include "server/store/user_models.h"
@@ -78,6 +79,7 @@ struct StreamLimits {
 
 struct RpcParts {
   ClientStore& store;  // of all projects; clients see theirs through Call::store
+  ChoreStore& chores;
   BlobStore& blobs;
   UploadStore& uploads;
   Executor& quick;   // reads of the job store and of cached files, e.g. GetJob

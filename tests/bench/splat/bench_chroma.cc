@@ -14,6 +14,7 @@
 #include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/metrics/quality.h"
+#include "core/scene/import/import.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/splat/geometry/geometry_trainer.h"
 #include "core/splat/raster/render.h"

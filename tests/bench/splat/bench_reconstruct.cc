@@ -12,6 +12,7 @@
 #include "core/image/codec.h"
 #include "core/metrics/quality.h"
 #include "core/report/curves.h"
+#include "core/scene/import/import.h"
 #include "core/scene/masks/still_regions.h"
 #include "core/simd/instruction_set.h"
 #include "core/splat/geometry/geometry_trainer.h"
