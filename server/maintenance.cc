@@ -77,24 +77,27 @@ Maintenance::Maintenance(JobStore& store,
 
 Maintenance::~Maintenance() {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   reaper_.join();
   sweeper_.join();
 }
 
 bool Maintenance::IsStopping() {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return stopping_;
 }
 
 void Maintenance::Repeat(const std::function<std::chrono::milliseconds()>& chore) {
   while (true) {
     const std::chrono::milliseconds pause = chore();
-    std::unique_lock lock(mutex_);
-    if (wake_.wait_for(lock, pause, [this] { return stopping_; })) return;
+    const MutexLock lock(mutex_);
+    const auto end = std::chrono::steady_clock::now() + pause;
+    while (!stopping_ && wake_.WaitUntil(mutex_, end)) {
+    }
+    if (stopping_) return;
   }
 }
 

@@ -4,13 +4,12 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "server/storage/ballast.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
@@ -81,7 +80,7 @@ class Maintenance {
   Maintenance& operator=(const Maintenance&) = delete;
 
  private:
-  // Does the chore, waits as long as it says, and so on until the end.
+  // Does the chore and waits for the returned time, until the destructor.
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
@@ -89,7 +88,7 @@ class Maintenance {
   void GiveBackSpace();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void ExpireJobs();
-  // What could not be read is added to `unreadable`.
+  // Adds the paths that could not be read to `unreadable`.
   void SweepScratch(std::vector<std::string>* unreadable);
   void SweepJobLogs(std::vector<std::string>* unreadable);
   void Scrub(const std::vector<StoredBlob>& blobs, std::vector<std::string>* unreadable);
@@ -104,13 +103,13 @@ class Maintenance {
   Scrubber scrubber_;
   std::chrono::steady_clock::time_point next_scrub_{};
   ChoreCounts counts_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
+  Mutex mutex_;
+  CondVar wake_;
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
   std::thread reaper_, sweeper_;
 };
 
-// Leases of worker processes that are gone (the whole machine or the server was killed) end now.
+// Ends the leases of worker processes that no longer exist (the machine or the server was killed).
 void ExpireDeadWorkers(ChoreStore& store);
 
 }  // namespace color3d

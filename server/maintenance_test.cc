@@ -45,7 +45,7 @@ class MaintenanceTest : public JobStoreTest {
   UploadStore uploads_{paths_.Uploads(), blobs_, 1000};
 };
 
-TEST_F(MaintenanceTest, WhatNothingNamesGoesAfterItsTimeByTheSteadyClock) {
+TEST_F(MaintenanceTest, RemovesUnreferencedBlobsByTheSteadyClock) {
   const FileDigest orphan = blobs_.PutBytes("orphan");
   const FileDigest named = blobs_.PutBytes("resultsingle");
   CreateSingle();
@@ -75,7 +75,7 @@ class BlobsOfABusyDisk : public FileBlobStore {
   mutable std::atomic<int> sweeps{0};
 };
 
-TEST_F(MaintenanceTest, ASweepThatFailedIsTriedAgainSoonAndOneThatDidNotIsNot) {
+TEST_F(MaintenanceTest, RetriesFailedSweepsSoon) {
   BlobsOfABusyDisk blobs(paths_.Blobs());
   MaintenanceTiming timing = Quick();
   timing.sweep = std::chrono::hours(1);
@@ -87,7 +87,7 @@ TEST_F(MaintenanceTest, ASweepThatFailedIsTriedAgainSoonAndOneThatDidNotIsNot) {
   EXPECT_EQ(chores.counts().sweeps_failed, 1);
 }
 
-TEST_F(MaintenanceTest, WhoeverOnlyLooksNotesNothing) {
+TEST_F(MaintenanceTest, DryRunNotesNothing) {
   blobs_.PutBytes("orphan");
   const auto never = [] { return false; };
   const auto due = [&](auto look) {
@@ -105,7 +105,7 @@ TEST_F(MaintenanceTest, WhoeverOnlyLooksNotesNothing) {
   EXPECT_EQ(RemoveDue(*store_, blobs_, due(DueBlobs), never).size(), 1u);
 }
 
-TEST_F(MaintenanceTest, WhatIsTouchedBeginsItsTimeAnew) {
+TEST_F(MaintenanceTest, TouchRestartsTheAge) {
   const FileDigest orphan = blobs_.PutBytes("orphan");
   for (int day = 0; day < 5; ++day) {
     RunForAWhile();
@@ -114,7 +114,7 @@ TEST_F(MaintenanceTest, WhatIsTouchedBeginsItsTimeAnew) {
   }
 }
 
-TEST_F(MaintenanceTest, AMachineThatStartsAnewAddsNoTime) {
+TEST_F(MaintenanceTest, RebootAddsNoAge) {
   const FileDigest orphan = blobs_.PutBytes("orphan");
   RunForAWhile();
   store_.reset();
@@ -154,7 +154,7 @@ TEST_F(MaintenanceTest, OldJobsGoWithTheirScenesAndLogs) {
   RunUntil([&] { return fs::is_empty(paths_.JobLogs()); }, timing);
 }
 
-TEST_F(MaintenanceTest, ScenesThatAreNeverCommittedGoByThemselves) {
+TEST_F(MaintenanceTest, DeletesUncommittedScenes) {
   SceneRecord scene;
   scene.name = "scenes/abandoned";
   store_->CreateScene(scene, {}, {});
@@ -170,7 +170,7 @@ TEST_F(MaintenanceTest, ScenesThatAreNeverCommittedGoByThemselves) {
 
 class UnreadableMaintenanceTest : private testing::Unprivileged, public MaintenanceTest {};
 
-TEST_F(UnreadableMaintenanceTest, AFolderThatCannotBeReadStopsNoSweepSilently) {
+TEST_F(UnreadableMaintenanceTest, ReportsUnreadableFolders) {
   const FileDigest hidden = blobs_.PutBytes("hidden"), orphan = blobs_.PutBytes("orphan");
   const fs::path folder = blobs_.Fetch(hidden.sha256).parent_path().parent_path();
   ASSERT_NE(folder, blobs_.Fetch(orphan.sha256).parent_path().parent_path());
@@ -266,7 +266,7 @@ TEST_F(MaintenanceTest, AServerOnAFullDiskLivesAndStarts) {
 }
 
 // A sweep that hangs keeps no lost job from going on.
-TEST_F(MaintenanceTest, LeasesAreLookedAfterWhateverTheSweepDoes) {
+TEST_F(MaintenanceTest, ReapsLeasesDuringASweep) {
   class HangingBlobs : public FileBlobStore {
    public:
     using FileBlobStore::FileBlobStore;

@@ -15,8 +15,8 @@ struct ServeOptions {
   bool insecure_any_address = false;
   // PEM files; a certificate and its key: TLS. A client CA: clients must show a certificate, too.
   std::filesystem::path tls_certificate, tls_key, tls_client_ca;
-  std::filesystem::path tokens;  // empty: nobody is asked for one
-  // What the certificates of tls_client_ca may; empty: it needs tokens.
+  std::filesystem::path tokens;  // empty: no call needs one
+  // File with the roles of the certificates of tls_client_ca; empty: tokens are needed.
   std::filesystem::path certificate_roles;
   int max_connections = 4096;
   std::filesystem::path data_folder;
@@ -25,16 +25,16 @@ struct ServeOptions {
   // Passed on to the workers. `serve` sets the folder, threads, memory and grace of each itself.
   WorkerSettings worker;
   int threads = 0;  // of each worker; 0: the machine's, shared among the workers
-  // Of the inference worker; 0: the machine's.
+  // Threads of the inference worker; 0: the machine's.
   int live_threads = 0;
-  // Of each worker, MiB; 0: three quarters of the machine's, shared among the workers, and half of
-  // the machine's for the inference worker.
+  // Memory of each worker, MiB; 0: three quarters of the machine's, shared among the workers, and
+  // half of the machine's for the inference worker.
   int64_t worker_memory_mib = 0;
   double drain_seconds = 20.0;
   int64_t low_space_mib =
       512;  // free; below it no job is begun; 0: jobs are begun until it is full
   int max_unfinished_jobs = 2'000;
-  // Of each project; 0: no limit of its own.
+  // Limits of each project; 0: none of its own.
   int project_jobs = 0, project_streams = 0;
   double project_gib = 0.0;
   int project_scenes = 10'000;
@@ -52,8 +52,8 @@ struct ServeOptions {
   int64_t worker_backoff_ms = 10'000;
 };
 
-// Returns after a drain. Throws Error for what the user can mend (exit status 2), and
-// Error{kUnavailable} when it ended because nobody was answered any more (exit status 1).
+// Returns after a drain. Throws Error for faults that the user can mend (exit status 2), and
+// Error{kUnavailable} if the server no longer answered calls (exit status 1).
 void Serve(const ServeOptions& options);
 
 }  // namespace color3d

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-// How soon a waiting scene notices that it was cancelled.
+// Interval at which a waiting scene checks for cancellation.
 constexpr auto kCancelPoll = std::chrono::milliseconds(50);
 
 // A session fills two: one trains while the other prepares the next sample.
@@ -23,13 +23,13 @@ int CoresIfZero(int slots) {
 SceneBatch::SceneBatch(int slots) : slots_(CoresIfZero(slots)), free_slots_(slots_) {}
 
 int SceneBatch::size() const {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return static_cast<int>(members_.size());
 }
 
 std::shared_ptr<const Encoder> SceneBatch::SharedEncoder(
     const std::string& name, const std::function<std::shared_ptr<const Encoder>()>& load) {
-  std::lock_guard lock(encoder_mutex_);
+  const MutexLock lock(encoder_mutex_);
   std::shared_ptr<const Encoder> encoder = encoders_[name].lock();
   if (!encoder) {
     encoder = load();
@@ -40,7 +40,7 @@ std::shared_ptr<const Encoder> SceneBatch::SharedEncoder(
 
 const SceneBatch::Member* SceneBatch::Next() const {
   const Member* next = nullptr;
-  const auto key = [this](const Member& member) {
+  const auto key = [this](const Member& member) COLOR3D_REQUIRES(mutex_) {
     return std::make_tuple(project_seconds_.at(member.project), member.seconds);
   };
   for (const Member& member : members_) {
@@ -50,11 +50,11 @@ const SceneBatch::Member* SceneBatch::Next() const {
 }
 
 SceneBatch::Membership::Membership(SceneBatch& batch, const std::string& project) : batch_(batch) {
-  std::lock_guard lock(batch_.mutex_);
+  const MutexLock lock(batch_.mutex_);
   Member member;
   member.project = project;
-  // Newcomers start level with whoever has computed least, so that they neither catch up on the
-  // time before they came nor wait longer than the others.
+  // New members start at the least time of the others, so that they neither make up for the time
+  // before they joined nor wait longer than the others.
   bool first = true;
   for (const Member& other : batch_.members_) {
     if (other.project != project) continue;
@@ -73,34 +73,34 @@ SceneBatch::Membership::Membership(SceneBatch& batch, const std::string& project
 }
 
 SceneBatch::Membership::~Membership() {
-  std::lock_guard lock(batch_.mutex_);
+  const MutexLock lock(batch_.mutex_);
   const std::string project = member_->project;
   batch_.members_.erase(member_);
   const bool last = std::none_of(batch_.members_.begin(),
                                  batch_.members_.end(),
                                  [&](const Member& member) { return member.project == project; });
   if (last) batch_.project_seconds_.erase(project);
-  batch_.changed_.notify_all();
+  batch_.changed_.NotifyAll();
 }
 
 SceneBatch::Turn::Turn(Membership& membership, const CancellationToken& cancel)
     : membership_(membership) {
   SceneBatch& batch = membership.batch_;
-  std::unique_lock lock(batch.mutex_);
+  const MutexLock lock(batch.mutex_);
   Member& member = *membership.member_;
   member.waiting = true;
   while (batch.free_slots_ == 0 || batch.Next() != &member) {
     if (cancel.IsCancelled()) {
       member.waiting = false;
-      batch.changed_.notify_all();
+      batch.changed_.NotifyAll();
       cancel.ThrowIfCancelled();
     }
-    batch.changed_.wait_for(lock, kCancelPoll);
+    batch.changed_.WaitFor(batch.mutex_, kCancelPoll);
   }
   member.waiting = false;
   slots_ = batch.Next() == nullptr ? std::min(batch.free_slots_, kMaxSlotsOfTurn) : 1;
   batch.free_slots_ -= slots_;
-  batch.changed_.notify_all();
+  batch.changed_.NotifyAll();
   start_ = std::chrono::steady_clock::now();
 }
 
@@ -108,11 +108,11 @@ SceneBatch::Turn::~Turn() {
   SceneBatch& batch = membership_.batch_;
   const double seconds =
       slots_ * std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  std::lock_guard lock(batch.mutex_);
+  const MutexLock lock(batch.mutex_);
   batch.free_slots_ += slots_;
   membership_.member_->seconds += seconds;
   batch.project_seconds_[membership_.member_->project] += seconds;
-  batch.changed_.notify_all();
+  batch.changed_.NotifyAll();
 }
 
 }  // namespace color3d

@@ -9,29 +9,28 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
 #include <list>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "core/base/cancellation.h"
+#include "core/base/mutex.h"
 #include "core/encoder/encoder.h"
 
 namespace color3d {
 
 class SceneBatch {
  public:
-  // `slots`: how many scenes compute at once; 0: as many as the machine has cores.
+  // `slots`: maximum number of scenes that compute at once; 0: number of cores.
   explicit SceneBatch(int slots = 0);
 
   int slots() const { return slots_; }
-  // Scenes that are in the batch now.
+  // Number of scenes in the batch now.
   int size() const;
 
-  // The encoder of this name: the one that is in memory, or what `load` gives.
+  // The encoder of this name: the one in memory, else the result of `load`.
   std::shared_ptr<const Encoder> SharedEncoder(
       const std::string& name, const std::function<std::shared_ptr<const Encoder>()>& load);
 
@@ -66,7 +65,7 @@ class SceneBatch {
     ~Turn();
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
-    // Slots that this turn may fill: more than one only when nobody waits for them.
+    // Slots that this turn may fill: more than one only if no other member waits.
     int slots() const { return slots_; }
 
    private:
@@ -76,17 +75,18 @@ class SceneBatch {
   };
 
  private:
-  // Whose turn it is; null when nobody waits. With the mutex held.
-  const Member* Next() const;
+  // The member whose turn is next, or null if none waits.
+  const Member* Next() const COLOR3D_REQUIRES(mutex_);
 
   const int slots_;
-  mutable std::mutex mutex_;
-  std::condition_variable changed_;
-  int free_slots_;
-  std::list<Member> members_;
-  std::map<std::string, double> project_seconds_;  // of projects with members
-  std::mutex encoder_mutex_;
-  std::map<std::string, std::weak_ptr<const Encoder>> encoders_;
+  mutable Mutex mutex_;
+  CondVar changed_;
+  int free_slots_ COLOR3D_GUARDED_BY(mutex_);
+  std::list<Member> members_ COLOR3D_GUARDED_BY(mutex_);
+  std::map<std::string, double> project_seconds_
+      COLOR3D_GUARDED_BY(mutex_);  // of projects with members
+  Mutex encoder_mutex_;
+  std::map<std::string, std::weak_ptr<const Encoder>> encoders_ COLOR3D_GUARDED_BY(encoder_mutex_);
 };
 
 }  // namespace color3d

@@ -63,7 +63,7 @@ class ChaosClockTest : public ::testing::Test {
     }
   }
 
-  // Of an upload of which half is there.
+  // An upload of which half is there.
   static std::string BeginUpload(TestClient& client, const std::string& content) {
     const v1::Digest digest = testing::DigestOf(content);
     google::bytestream::WriteRequest request;

@@ -45,7 +45,7 @@ class Submitter {
   std::vector<std::string> names_;
 };
 
-// What was wrong, a line each.
+// Failures, one a line.
 std::vector<std::string> Endure(ChaosService& service, const Budget& budget) {
   Random random(ChaosSeed());
   const auto begun = std::chrono::steady_clock::now();

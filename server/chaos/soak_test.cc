@@ -30,7 +30,7 @@ constexpr double kAllowanceMib = 4.0, kFirstAllowanceMib = 24.0;
 constexpr size_t kKeptJobs = 200;  // older ones are deleted
 constexpr size_t kUploadBytes = 20'000;
 
-// What many clients do, each on a thread of its own, until the end.
+// Clients, each on a thread of its own, until the end of the test.
 class Busy {
  public:
   Busy(ServerProcess& server, const std::string& scene) : server_(server), scene_(scene) {
@@ -42,7 +42,7 @@ class Busy {
     Repeat(50, [this](TestClient& client, Random& random) { GiveUp(client, random); });
     Repeat(500, [this](TestClient& client, Random&) { ColorPicture(client); });
   }
-  // What went wrong.
+  // Failures.
   std::vector<std::string> End() {
     is_over_ = true;
     for (std::thread& thread : threads_) thread.join();

@@ -1,4 +1,4 @@
-// Whether a data folder is what it should be.
+// Checks and repairs a data folder.
 #pragma once
 
 #include <cstdint>

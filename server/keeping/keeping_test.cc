@@ -67,7 +67,7 @@ class KeepingTest : public ::testing::Test {
   std::string job_;
 };
 
-TEST_F(KeepingTest, WhatWasBackedUpIsServedAgain) {
+TEST_F(KeepingTest, RestoredBackupIsServed) {
   const CopiedBlobs first = BackUp(paths_.root, backup_);  // the store is open: a server may run
   EXPECT_EQ(first.copied, 2) << "what nothing names stays behind";
   EXPECT_EQ(first.bytes, 5 + 6);
@@ -88,7 +88,7 @@ TEST_F(KeepingTest, WhatWasBackedUpIsServedAgain) {
   }
 }
 
-TEST_F(KeepingTest, WhatIsDamagedIsLeftOutAndListed) {
+TEST_F(KeepingTest, BackupLeavesOutAndListsDamagedBlobs) {
   const std::vector<std::string> photo = {photo_.sha256};
   const fs::path other = scratch_.path() / "other";
   BackUp(paths_.root, backup_);
@@ -105,8 +105,8 @@ TEST_F(KeepingTest, WhatIsDamagedIsLeftOutAndListed) {
   EXPECT_EQ(ResultIn(fresh_, later), "later");
 }
 
-// Somebody declared a scene and never sent its photos: nothing is lost.
-TEST_F(KeepingTest, UploadsThatWereAbandonedAreNoFault) {
+// The photos of a declared scene were never sent: nothing is lost.
+TEST_F(KeepingTest, AbandonedUploadsAreNoFault) {
   SceneRecord abandoned;
   abandoned.name = "scenes/abandoned";
   abandoned.files = {{"a.jpg", photo_}, {"b.jpg", {Sha256Hex("never sent"), 10}}};
@@ -124,7 +124,7 @@ TEST_F(KeepingTest, UploadsThatWereAbandonedAreNoFault) {
       << "a committed scene names it, too";
 }
 
-TEST_F(KeepingTest, ASecondBackupBelievesNothingThatItHasNotRead) {
+TEST_F(KeepingTest, SecondBackupReadsEarlierBlobsAgain) {
   BackUp(paths_.root, backup_);
   const fs::path copy = FileBlobStore(DataPaths(backup_).Blobs()).Fetch(photo_.sha256);
   fs::permissions(copy, fs::perms::owner_all);
@@ -147,7 +147,7 @@ TEST_F(KeepingTest, ASecondBackupBelievesNothingThatItHasNotRead) {
 
 class UnreadableKeepingTest : private testing::Unprivileged, public KeepingTest {};
 
-TEST_F(UnreadableKeepingTest, WhatCannotBeReadIsNeitherMissingNorPassedOver) {
+TEST_F(UnreadableKeepingTest, UnreadableFilesAreReported) {
   const fs::path folder = blobs_.Fetch(photo_.sha256).parent_path();
   fs::permissions(folder, fs::perms::none);
   const CopiedBlobs copied = BackUp(paths_.root, backup_);
@@ -174,7 +174,7 @@ TEST_F(UnreadableKeepingTest, WhatCannotBeReadIsNeitherMissingNorPassedOver) {
 }
 
 // A worker replaces its checkpoint while the backup runs.
-TEST_F(KeepingTest, ACheckpointThatIsGoneIsBegunAnew) {
+TEST_F(KeepingTest, JobWithoutItsCheckpointStartsOver) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs.resize(1);
@@ -189,7 +189,7 @@ TEST_F(KeepingTest, ACheckpointThatIsGoneIsBegunAnew) {
   EXPECT_TRUE(Check(fresh_).IsGood());
 }
 
-TEST_F(KeepingTest, ABackupGoesNowhereElse) {
+TEST_F(KeepingTest, RefusesUnsuitableBackupFolders) {
   EXPECT_EQ(ReasonThrown([&] { BackUp(scratch_.path() / "none", backup_); }),
             "FAILED_PRECONDITION");
   const fs::path photos = scratch_.path() / "photos";
@@ -200,7 +200,7 @@ TEST_F(KeepingTest, ABackupGoesNowhereElse) {
             "FAILED_PRECONDITION");
 }
 
-TEST_F(KeepingTest, FsckFindsWhatIsWrongAndRepairs) {
+TEST_F(KeepingTest, FsckFindsAndRepairsFaults) {
   store_.reset();
   FsckResult result = Check(paths_.root);
   EXPECT_TRUE(result.IsGood());

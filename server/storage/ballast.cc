@@ -14,14 +14,14 @@ namespace fs = std::filesystem;
 Ballast::Ballast(fs::path file, int64_t bytes) : file_(std::move(file)), bytes_(bytes) {}
 
 bool Ballast::IsThere() const {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::error_code error;
   return static_cast<int64_t>(fs::file_size(file_, error)) >= bytes_ && !error;
 }
 
 bool Ballast::Make() {
   if (bytes_ <= 0 || IsThere()) return bytes_ > 0;
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const int fd = ::open(file_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
   if (fd < 0) return false;
   const bool made = ::posix_fallocate(fd, 0, bytes_) == 0;
@@ -31,7 +31,7 @@ bool Ballast::Make() {
 }
 
 bool Ballast::Release() {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (::unlink(file_.c_str()) != 0) return false;
   spdlog::warn(
       "the disk is full: the {} MiB of {} are given up, so that jobs and scenes can be "

@@ -1,39 +1,39 @@
-// A file that takes some of the disk, so that it can be given up: on a full disk even a deletion
-// needs a few MiB, for the job store's log. Thread-safe.
+// A file that reserves disk space to be freed later: on a full disk even a deletion needs a few
+// MiB, for the log of the job store. Thread-safe.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <mutex>
 
 #include "core/base/error.h"
+#include "core/base/mutex.h"
 
 namespace color3d {
 
 class Ballast {
  public:
-  // `bytes`: how long it is once it is made. One that an earlier server left is taken over.
+  // `bytes`: length of the file. A file that an earlier server left is used.
   Ballast(std::filesystem::path file, int64_t bytes);
 
   int64_t bytes() const { return bytes_; }
   bool IsThere() const;
-  // Makes it, whole or not at all; whether it is there now.
+  // Makes the whole file or none; returns true if it exists now.
   bool Make();
-  // Gives it up; whether that has freed anything.
+  // Deletes the file; returns true if that freed space.
   bool Release();
 
  private:
   const std::filesystem::path file_;
   const int64_t bytes_;
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_;  // one call at a time
 };
 
 // How long the ballast of a folder's disk is: 16 MiB, and at most a twentieth of the disk.
 int64_t BallastBytes(const std::filesystem::path& folder);
 
-// Does what frees space. Where the disk is too full for that it is done again once `make_room`,
-// which may be empty, has given something up.
+// Calls `body`, which frees space. If the disk is too full for that, calls it again after
+// `make_room` (may be empty) has freed some.
 template <typename Body>
 auto WithRoomMade(const std::function<bool()>& make_room, const Body& body) {
   try {

@@ -22,7 +22,7 @@ TEST_F(StorageTest, BallastTakesSpaceUntilItIsGivenUp) {
   EXPECT_FALSE(ballast.IsThere());
 }
 
-TEST_F(StorageTest, WhatFreesSpaceIsDoneAgainOnceThereIsRoom) {
+TEST_F(StorageTest, RetriesDeletionOnceThereIsRoom) {
   int tries = 0, rooms = 0;
   const auto full_at_first = [&] {
     if (++tries == 1) throw ServiceError(ErrorReason::kStorageFull, "full");

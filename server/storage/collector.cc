@@ -46,7 +46,7 @@ std::vector<StoredBlob> DueBlobsSoFar(ChoreStore& store,
   return StillUnnamed(Unnamed(store, blobs), store.AgedCandidates(grace.count()));
 }
 
-// Whoever puts or looks for a blob touches it, before he names it.
+// Every caller that stores or looks for a blob touches it before it names it.
 std::vector<FileDigest> RemoveDue(ChoreStore& store,
                                   BlobStore& blobs,
                                   const std::vector<StoredBlob>& due,

@@ -1,4 +1,4 @@
-// What nothing names any more: found in two phases, with their state in the store, and removed.
+// Unreferenced blobs: found in two phases, whose state is in the store, and removed.
 #pragma once
 
 #include <chrono>

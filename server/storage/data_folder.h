@@ -15,7 +15,7 @@ struct DataPaths {
   // May be deleted at any time.
   std::filesystem::path Cache() const { return root / "cache"; }
   std::filesystem::path Logs() const { return root / "logs"; }
-  // Of single jobs, "<job id>.log".
+  // Logs of single jobs, "<job id>.log".
   std::filesystem::path JobLogs() const { return Logs() / "jobs"; }
   // Private sockets between the server and its workers.
   std::filesystem::path Sockets() const { return root / "sockets"; }

@@ -35,7 +35,7 @@ class FileBlobStore : public BlobStore {
 
  private:
   int64_t UnpromisedBytes() const;  // below 0 where more is promised than there is
-  // Whether the blob is there and good. Counts it where it is damaged.
+  // Returns true if the blob exists and is undamaged. Counts damaged ones.
   bool IsThere(const FileDigest& digest);
   [[noreturn]] void ThrowFull(int64_t bytes, int64_t free) const;
   std::filesystem::path PathOf(const std::string& sha256) const;

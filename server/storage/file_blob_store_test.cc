@@ -42,7 +42,7 @@ TEST_F(FileBlobStoreTest, FilesAreMovedIn) {
   EXPECT_FALSE(fs::exists(file)) << "a duplicate is dropped";
 }
 
-TEST_F(FileBlobStoreTest, OnlyWhatNobodyTouchedSinceIsRemoved) {
+TEST_F(FileBlobStoreTest, RemovesUntouchedBlobsOnly) {
   const auto stored = [&] {
     std::map<std::string, StoredBlob> all;
     blobs_.ForEach([&](const StoredBlob& blob) {
@@ -66,7 +66,7 @@ TEST_F(FileBlobStoreTest, OnlyWhatNobodyTouchedSinceIsRemoved) {
   EXPECT_EQ(stored().size(), 2u);
 }
 
-TEST_F(FileBlobStoreTest, SomebodyWhoHoldsTheStoreKeepsTheSweepWaitingForNothing) {
+TEST_F(FileBlobStoreTest, SweepDoesNotWaitForABusyStore) {
   const FileDigest digest = blobs_.PutBytes("idle");
   std::optional<StoredBlob> blob;
   blobs_.ForEach([&](const StoredBlob& found) {
@@ -82,7 +82,7 @@ TEST_F(FileBlobStoreTest, SomebodyWhoHoldsTheStoreKeepsTheSweepWaitingForNothing
   EXPECT_FALSE(blobs_.Touch(digest));
 }
 
-TEST_F(FileBlobStoreTest, LeftOversOfACrashGo) {
+TEST_F(FileBlobStoreTest, RemovesLeftoversOfACrash) {
   const fs::path folder = scratch_.path() / "blobs" / "ab";
   fs::create_directories(folder);
   for (const char* name : {".x.1.0.part", "y.damaged", "new.part"}) {
@@ -122,7 +122,7 @@ TEST_F(FileBlobStoreTest, GoodBytesTakeThePlaceOfDamagedOnes) {
 }
 
 // Good bytes have come since somebody read damaged ones.
-TEST_F(FileBlobStoreTest, WhatIsWholeIsNotSetAside) {
+TEST_F(FileBlobStoreTest, WholeBlobsAreNotSetAside) {
   const FileDigest digest = blobs_.PutBytes("some bytes");
   Damage(blobs_.Fetch(digest.sha256));
   blobs_.PutBytes("some bytes");
@@ -151,7 +151,7 @@ TEST_F(FileBlobStoreTest, EachTouchIsAnother) {
 
 class UnreadableBlobsTest : private testing::Unprivileged, public StorageTest {};
 
-TEST_F(UnreadableBlobsTest, WhatCannotBeLookedAtIsNotCalledMissing) {
+TEST_F(UnreadableBlobsTest, UnreadableBlobsAreNotMissing) {
   const FileDigest lost = blobs_.PutBytes("lost"), other = blobs_.PutBytes("other");
   const fs::path folder = blobs_.Fetch(lost.sha256).parent_path();
   fs::permissions(folder, fs::perms::none);

@@ -15,13 +15,20 @@ namespace color3d {
 namespace fs = std::filesystem;
 
 struct UploadStore::Writer::Session {
-  std::mutex mutex;
-  uint64_t generation = 0;
+  Mutex mutex;
+  uint64_t generation COLOR3D_GUARDED_BY(mutex) = 0;
+
+  // Throws UPLOAD_TAKEN_OVER unless the writer of this generation is the newest.
+  void RequireOwner(uint64_t writer) const COLOR3D_REQUIRES(mutex) {
+    if (writer == generation) return;
+    throw ServiceError(ErrorReason::kUploadTakenOver,
+                       "another connection goes on with this upload; ask QueryWriteStatus");
+  }
 };
 
 namespace {
 
-// Of one owner: each is a file, be it small.
+// Maximum number of unfinished uploads of an owner: each is a file.
 constexpr size_t kMaxUnfinished = 1'000;
 
 void CheckName(const UploadName& name, int64_t max_blob_bytes) {
@@ -41,7 +48,7 @@ void CheckName(const UploadName& name, int64_t max_blob_bytes) {
   }
 }
 
-// Of a file as PartPath names it.
+// Owner of a file named by PartPath.
 std::string OwnerOf(const std::string& part) {
   const std::string before = part.substr(0, part.find('.'));
   const size_t at = before.find('@');
@@ -66,6 +73,7 @@ UploadStore::UploadStore(const fs::path& folder, BlobStore& blobs, int64_t max_b
   fs::create_directories(folder_, error);
   const auto unreadable =
       WalkFolder(folder_, WalkDepth::kFolder, [&](const fs::directory_entry& entry) {
+        const MutexLock lock(mutex_);
         CountOnDisk(entry.path().filename().string());
         return true;
       });
@@ -110,7 +118,7 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name,
   std::unique_ptr<Writer> writer;
   {
     const std::string part = path.filename().string();
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     std::map<std::string, int64_t>& owned = bytes_[name.owner];
     int64_t others = 0;
     for (const auto& [other, bytes] : owned) others += other == part ? 0 : bytes;
@@ -135,7 +143,7 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name,
       entry = writer->session_;
     }
   }
-  std::lock_guard lock(writer->session_->mutex);
+  const MutexLock lock(writer->session_->mutex);
   writer->fd_ = ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
   struct stat status {};
   if (writer->fd_ < 0 || ::fstat(writer->fd_, &status) != 0)
@@ -159,7 +167,7 @@ UploadStore::Writer::~Writer() {
     ::close(fd_);
   }
   const std::string key = store_->PartPath(name_).filename().string();
-  std::lock_guard lock(store_->mutex_);
+  const MutexLock lock(store_->mutex_);
   session_.reset();
   const auto entry = store_->sessions_.find(key);
   if (entry == store_->sessions_.end() || !entry->second.expired()) return;
@@ -172,16 +180,9 @@ UploadStore::Writer::~Writer() {
   store_->CountOnDisk(key);
 }
 
-void UploadStore::Writer::RequireOwner() const {
-  if (generation_ != session_->generation) {
-    throw ServiceError(ErrorReason::kUploadTakenOver,
-                       "another connection goes on with this upload; ask QueryWriteStatus");
-  }
-}
-
 void UploadStore::Writer::Append(int64_t offset, std::string_view data) {
-  std::lock_guard lock(session_->mutex);
-  RequireOwner();
+  const MutexLock lock(session_->mutex);
+  session_->RequireOwner(generation_);
   if (offset != size_) {
     throw ServiceError(ErrorReason::kOffsetMismatch,
                        "a write at offset {} follows one that ended at {}",
@@ -203,15 +204,15 @@ void UploadStore::Writer::Append(int64_t offset, std::string_view data) {
 }
 
 int64_t UploadStore::Writer::Sync() {
-  std::lock_guard lock(session_->mutex);
-  RequireOwner();
+  const MutexLock lock(session_->mutex);
+  session_->RequireOwner(generation_);
   if (::fsync(fd_) != 0) ThrowWriteError("cannot sync an upload");
   return size_;
 }
 
 void UploadStore::Writer::Finish() {
-  std::lock_guard lock(session_->mutex);
-  RequireOwner();
+  const MutexLock lock(session_->mutex);
+  session_->RequireOwner(generation_);
   if (size_ != name_.digest.size_bytes) {
     throw ServiceError(ErrorReason::kSizeMismatch,
                        "the upload ends after {} of the announced {} bytes",
@@ -237,7 +238,7 @@ UploadStore::Reaped UploadStore::ReapOlderThan(std::chrono::seconds age) {
       WalkFolder(folder_, WalkDepth::kFolder, [&](const fs::directory_entry& entry) {
         if (!stale_.IsStale(entry.path())) return true;
         const std::string part = entry.path().filename().string();
-        std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         if (sessions_.contains(part)) return true;
         if (::unlink(entry.path().c_str()) == 0) ++reaped.uploads;
         CountOnDisk(part);

@@ -8,12 +8,12 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/base/digest.h"
+#include "core/base/mutex.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/stale_files.h"
 
@@ -52,7 +52,6 @@ class UploadStore {
     friend class UploadStore;
     struct Session;
     Writer() = default;
-    void RequireOwner() const;
     UploadStore* store_ = nullptr;
     UploadName name_;
     std::shared_ptr<Session> session_;
@@ -61,8 +60,8 @@ class UploadStore {
     int64_t size_ = 0;
     SpaceReservation space_;  // for what is still to come
   };
-  // May refuse an upload, by throwing, that would bring what its owner's unfinished uploads take to
-  // so many bytes. Decides for one upload at a time.
+  // Throws to refuse an upload after which the unfinished uploads of its owner would take
+  // `owner_bytes`. Called for one upload at a time.
   using Admission = std::function<void(int64_t owner_bytes)>;
   // `offset` must be the committed size (kInvalidArgument, OFFSET_MISMATCH). An owner may have
   // 1,000 unfinished uploads (kResourceExhausted, QUOTA_EXCEEDED). A blob that is there need not be
@@ -74,23 +73,23 @@ class UploadStore {
     int uploads = 0;
     std::vector<std::string> unreadable;  // as WalkFolder
   };
-  // Removes uploads that nobody writes and that have not grown for `age`, at this call and at the
-  // last one.
+  // Removes uploads that are not being written and that have not grown for `age`, at this call and
+  // at the last one.
   Reaped ReapOlderThan(std::chrono::seconds age);
 
  private:
   std::filesystem::path PartPath(const UploadName& name) const;
-  // With the mutex held: what is on the disk of an upload that nobody writes.
-  void CountOnDisk(const std::string& part);
+  // Counts the bytes on disk of an upload that is not being written.
+  void CountOnDisk(const std::string& part) COLOR3D_REQUIRES(mutex_);
 
   std::filesystem::path folder_;
   BlobStore& blobs_;
   int64_t max_blob_bytes_;
   StaleFiles stale_;
-  std::mutex mutex_;
-  std::map<std::string, std::weak_ptr<Writer::Session>> sessions_;
+  Mutex mutex_;
+  std::map<std::string, std::weak_ptr<Writer::Session>> sessions_ COLOR3D_GUARDED_BY(mutex_);
   // By owner and file: what is announced of uploads that are being written, else what is there.
-  std::map<std::string, std::map<std::string, int64_t>> bytes_;
+  std::map<std::string, std::map<std::string, int64_t>> bytes_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

@@ -74,7 +74,7 @@ TEST_F(UploadStoreTest, DeadUploadsAreReaped) {
 }
 
 // What is announced counts while it comes, what is left of it afterwards, also over a restart.
-TEST_F(UploadStoreTest, WhatAnOwnerHasUnderWayIsCounted) {
+TEST_F(UploadStoreTest, CountsBytesOfUnfinishedUploads) {
   const UploadName abc{"u1", DigestOf("abc"), "attic"}, de{"u2", DigestOf("de"), "attic"};
   int64_t seen = -1;
   const auto look = [&](UploadStore& uploads, const std::string& owner = "attic") {
@@ -109,7 +109,7 @@ TEST_F(UploadStoreTest, EmptyBlobs) {
   EXPECT_TRUE(blobs_.Touch(name.digest));
 }
 
-TEST_F(UploadStoreTest, AnUploadOfWhichNothingCameLeavesNothing) {
+TEST_F(UploadStoreTest, EmptyUploadLeavesNoFile) {
   uploads_.Open({"u", DigestOf("abc")}, 0).reset();
   EXPECT_EQ(ReasonThrown([&] { uploads_.Open({"v", DigestOf("abc")}, 2); }), "OFFSET_MISMATCH");
   EXPECT_TRUE(ListFiles(scratch_.path() / "uploads").empty());

@@ -56,7 +56,7 @@ struct ProgressRecord {
   double eta_seconds = -1.0;  // < 0: unknown
 };
 
-// What a job has taken, over all its attempts, and what it warned of.
+// Time and memory of a job over all its attempts, and its warnings.
 struct JobUsage {
   double seconds = 0.0;  // of computing
   int64_t peak_memory_bytes = 0;
@@ -108,7 +108,7 @@ struct JobRecord {
 // About what the record takes in memory.
 int64_t MemoryBytes(const JobRecord& job);
 
-// What the owner of a running job shows to prove that it still is: every write of a worker names
+// Proof that a worker still owns a running job: every write of a worker names
 // the epoch of its claim, and is refused once another claim has raised it.
 struct Lease {
   int64_t job_id = 0;

@@ -1,4 +1,4 @@
-// What projects see of each other, and what they may have.
+// Isolation and quotas of projects.
 #include "server/store/project_store.h"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ class ProjectStoreTest : public JobStoreTest {
   ProjectStore a_{*store_, "a"}, b_{*store_, "b"}, none_{*store_, ""};
 };
 
-TEST_F(ProjectStoreTest, EachHasItsOwn) {
+TEST_F(ProjectStoreTest, ProjectsSeeOnlyTheirOwn) {
   const JobRecord job = Create(a_);
   EXPECT_EQ(job.scene, "scenes/house");
   EXPECT_EQ(a_.GetJob(job.name).scene, "scenes/house");
@@ -89,7 +89,7 @@ TEST_F(ProjectStoreTest, RequestIdsAreTheirOwn) {
   EXPECT_EQ(ReasonThrown([&] { a_.Delete(of_a.name, {}); }), "JOB_NOT_FOUND");
 }
 
-TEST_F(ProjectStoreTest, ABlobIsForThoseWhoBroughtOrMadeIt) {
+TEST_F(ProjectStoreTest, BlobsAreReadableByTheirHolders) {
   const FileDigest photo{Sha256Hex("photo"), 5};
   EXPECT_FALSE(a_.HoldsBlob(photo)) << "to know its digest is not to have it";
   a_.HoldBlob(photo);
@@ -116,7 +116,7 @@ TEST_F(ProjectStoreTest, ABlobIsForThoseWhoBroughtOrMadeIt) {
   EXPECT_EQ(b_.Usage().stored_bytes, 0);
 }
 
-TEST_F(ProjectStoreTest, RowsCountInWhatAProjectHas) {
+TEST_F(ProjectStoreTest, RowsCountForTheQuota) {
   const int64_t before = a_.Usage().row_bytes;
   SceneRecord scene;
   scene.name = "scenes/long";
@@ -149,7 +149,7 @@ TEST_F(ProjectStoreTest, RowsCountInWhatAProjectHas) {
   EXPECT_GT(a_.Usage().row_bytes, before + 2048 + 300 - 1) << "request ids have rows, too";
 }
 
-TEST_F(ProjectStoreTest, ScenesHaveALimitAndThoseThatAreNeverCommittedASmallerOne) {
+TEST_F(ProjectStoreTest, LimitsScenesAndUncommittedScenes) {
   const SceneLimits limits{4, 2};
   const auto create = [&](const ProjectStore& project, const std::string& name) {
     SceneRecord scene;
@@ -168,7 +168,7 @@ TEST_F(ProjectStoreTest, ScenesHaveALimitAndThoseThatAreNeverCommittedASmallerOn
   EXPECT_EQ(create(a_, "four"), "nothing");
 }
 
-TEST_F(ProjectStoreTest, OneDoesNotFillTheQueueOfAll) {
+TEST_F(ProjectStoreTest, OneProjectCannotFillTheQueue) {
   const QueueLimits limits(5, 2);
   Create(a_, limits);
   Create(a_, limits);
@@ -180,7 +180,7 @@ TEST_F(ProjectStoreTest, OneDoesNotFillTheQueueOfAll) {
   EXPECT_EQ(ReasonThrown([&] { Create(b_, QueueLimits(5, 9)); }), "QUEUE_FULL");
 }
 
-TEST_F(ProjectStoreTest, TheyTakeTurns) {
+TEST_F(ProjectStoreTest, ProjectsTakeTurns) {
   for (int i = 0; i < 4; ++i) Create(a_);
   for (int i = 0; i < 2; ++i) Create(b_);
   std::string order;

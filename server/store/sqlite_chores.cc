@@ -1,4 +1,4 @@
-// What the server's chores ask of the store: whether it takes writes, what is old, what is named.
+// Chores of the server: probes for writing, age limits, referenced blobs.
 #include <fmt/core.h>
 
 #include <algorithm>

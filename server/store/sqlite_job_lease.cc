@@ -1,4 +1,4 @@
-// What workers and the reaper call. Every write of a worker is fenced by its lease epoch.
+// Calls of workers and of the reaper. Every write of a worker is fenced by its lease epoch.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-// Of a worker's progress: what it says may come from a user's file.
+// Maximum length of a progress message: it may quote a user's file.
 constexpr size_t kMaxMessageBytes = 1000;
 
 ServiceError LeaseLost(const Lease& lease) {

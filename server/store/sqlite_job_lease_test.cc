@@ -13,7 +13,7 @@ namespace color3d {
 namespace {
 using SqliteJobLeaseTest = JobStoreTest;
 
-TEST_F(SqliteJobLeaseTest, ZombieCanPublishNothing) {
+TEST_F(SqliteJobLeaseTest, RefusesWritesWithAnOldEpoch) {
   const JobRecord job = CreateSingle();
   const JobRecord zombie = ClaimOne("first");
   now_ += kLease + 1;
@@ -66,7 +66,7 @@ TEST_F(SqliteJobLeaseTest, PoisonJobStopsAfterItsAttempts) {
   EXPECT_FALSE(store_->Claim("w", kLease));
 }
 
-TEST_F(SqliteJobLeaseTest, OnlyPassingFaultsAreTriedAgain) {
+TEST_F(SqliteJobLeaseTest, RetriesTransientErrorsOnly) {
   const JobRecord job = CreateSingle();
   FailWith(ClaimOne(), ErrorCode::kUnavailable);
   EXPECT_EQ(StateOf(job.name), JobState::kQueued);
@@ -164,7 +164,7 @@ TEST_F(SqliteJobLeaseTest, JobsOfABatchDoNotOvertakeOtherKinds) {
   EXPECT_TRUE(store_->ClaimForBatch("w", kLease, "personalize", kAnyJob));
 }
 
-TEST_F(SqliteJobLeaseTest, AJobThatAWorkerWasLostWithIsNotBatched) {
+TEST_F(SqliteJobLeaseTest, JobsThatLostAWorkerAreNotBatched) {
   store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
   ClaimOne();
   now_ += kLease + 1;
@@ -228,7 +228,7 @@ class NoFurtherFiles {
 };
 
 // A worker that is locked in may not write where SQLite would put them.
-TEST_F(SqliteJobLeaseTest, TheResultsOfLongFilmsNeedNoFileBesideTheStore) {
+TEST_F(SqliteJobLeaseTest, PublishesManyArtifactsWithoutTemporaryFiles) {
   for (const char* film : {"first", "second"}) {
     CreateSingle();
     const JobRecord job = ClaimOne();

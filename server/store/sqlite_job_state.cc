@@ -413,7 +413,7 @@ void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) 
     while (named.Step()) blobs.push_back(named.Text(0));
   }
   db.Run("delete from job where job_id in (" + list + ")");
-  LetGo(db, root.project, blobs);
+  ReleaseHoldings(db, root.project, blobs);
   RecordRequest(db, request, name);
   transaction.Commit();
 }

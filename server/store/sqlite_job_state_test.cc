@@ -95,7 +95,7 @@ TEST_F(SqliteJobStateTest, CancellingAChildEndsItsGraph) {
   EXPECT_EQ(Child(root, "import").state, JobState::kQueued);
 }
 
-TEST_F(SqliteJobStateTest, RetryBringsBackWhatFailedAndKeepsPlannedSkips) {
+TEST_F(SqliteJobStateTest, RetryRequeuesFailedJobsAndKeepsPlannedSkips) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("import"),
@@ -170,7 +170,7 @@ TEST_F(SqliteJobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
   EXPECT_EQ(children[1].scene, "scenes/other");
 }
 
-TEST_F(SqliteJobStateTest, AReaderIsNotRetriedWithoutWhatItRead) {
+TEST_F(SqliteJobStateTest, RetryNeedsTheInputsOfTheJob) {
   const JobRecord input = CreateSingle();
   Succeed(ClaimOne());
   NewGraph graph;
@@ -185,7 +185,7 @@ TEST_F(SqliteJobStateTest, AReaderIsNotRetriedWithoutWhatItRead) {
   EXPECT_EQ(StateOf(reader.name), JobState::kFailed);
 }
 
-TEST_F(SqliteJobStateTest, ARetryKeepsToTheQueuesLimit) {
+TEST_F(SqliteJobStateTest, RetryObeysTheQueueLimit) {
   const JobRecord root = CreateDiamond();
   FailWith(ClaimOne(), ErrorCode::kInternal);
   EXPECT_EQ(ReasonThrown([&] { store_->Retry(root.name, false, {}, 3); }), "QUEUE_FULL");

@@ -17,7 +17,7 @@ struct StoreOptions {
   int max_attempts = 3;
   // First delay before a failed or lost attempt is tried again; doubles with each attempt.
   int64_t retry_backoff_ms = 2'000;
-  // Of this program. A worker of another version than the server's is given no job.
+  // The version of this program. A worker of another version than the server's is given no job.
   std::string program_version;
   // Leases of another start of the machine have ended when a server opens the store.
   std::string boot_id = BootId();
@@ -157,7 +157,8 @@ class SqliteJobStore : public JobStore {
   std::optional<std::string> CheckRequest(SqliteDatabase& db, const RequestKey& request);
   void RecordRequest(SqliteDatabase& db, const RequestKey& request, const std::string& resource);
 
-  // Of the next events after this revision, deletes those of finished jobs from before this time.
+  // Deletes those of the next events after this revision that are of finished jobs and from before
+  // this time.
   // How far it came; nothing: they are all younger.
   std::optional<int64_t> CompactEvents(int64_t after, int64_t before_ms);
 
@@ -201,10 +202,10 @@ class SqliteJobStore : public JobStore {
   void StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsage& usage);
   // Steady time since the last call of this name; 0 at the first one after a start of the machine.
   int64_t ElapsedSinceLast(SqliteDatabase& db, const char* name);
-  // Of the digests that `select` gives, the project lets those go that nothing of it names.
-  void LetGo(SqliteDatabase& db,
-             const std::string& project,
-             const std::vector<std::string>& sha256);
+  // The project gives up those of these blobs that none of its jobs and scenes names.
+  void ReleaseHoldings(SqliteDatabase& db,
+                       const std::string& project,
+                       const std::vector<std::string>& sha256);
   int64_t Now() const { return clocks_.wall(); }
   int64_t SteadyNow() const { return clocks_.steady(); }
 

@@ -68,9 +68,9 @@ void SqliteJobStore::ForgetBlob(const std::string& sha256) {
   transaction.Commit();
 }
 
-void SqliteJobStore::LetGo(SqliteDatabase& db,
-                           const std::string& project,
-                           const std::vector<std::string>& sha256) {
+void SqliteJobStore::ReleaseHoldings(SqliteDatabase& db,
+                                     const std::string& project,
+                                     const std::vector<std::string>& sha256) {
   for (const std::string& digest : sha256) {
     db.Run(
         "delete from blob_holding where project=?1 and sha256=?2 and not exists("

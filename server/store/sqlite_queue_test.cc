@@ -1,4 +1,4 @@
-// What keeps jobs waiting, what lets them share work, and how old ones go.
+// Queue of the job store: holds, equal work, deletion of old jobs.
 #include <gtest/gtest.h>
 
 #include "tests/support/service/job_store_fixture.h"
@@ -7,7 +7,7 @@ namespace color3d {
 namespace {
 using QueueTest = JobStoreTest;
 
-TEST_F(QueueTest, AHeldQueueGivesNothingAndSaysWhy) {
+TEST_F(QueueTest, HeldQueueGivesNoJobAndTellsTheReason) {
   const JobRecord job = CreateSingle();
   store_->UpdateWorker({"w", 1, "", 0, 0});
   for (const Hold hold : {Hold::kPaused, Hold::kStorage}) {
@@ -23,7 +23,7 @@ TEST_F(QueueTest, AHeldQueueGivesNothingAndSaysWhy) {
   EXPECT_EQ(ClaimOne().name, job.name);
 }
 
-TEST_F(QueueTest, AWaitingJobKnowsItsPlaceAndItsTime) {
+TEST_F(QueueTest, WaitingJobHasAPlaceAndATime) {
   const JobRecord first = CreateSingle(), second = CreateSingle();
   const JobRecord root = CreateDiamond();
   EXPECT_EQ(store_->PlaceInQueue(first).waits_for, "a worker: none runs");
@@ -63,7 +63,7 @@ TEST_F(QueueTest, EqualWorkIsDoneOnce) {
   EXPECT_FALSE(store_->JoinEqual(LeaseOf(again), "key")) << "nobody else does it now";
 }
 
-TEST_F(QueueTest, WhoeverWaitsForEqualWorkDoesItWhenTheOtherDoesNot) {
+TEST_F(QueueTest, WaitingJobRunsWhenTheEqualJobFails) {
   for (const char* end : {"fails", "is lost", "is cancelled", "is killed"}) {
     SCOPED_TRACE(end);
     const JobRecord first = CreateSingle(), second = CreateSingle();
@@ -87,7 +87,7 @@ TEST_F(QueueTest, WhoeverWaitsForEqualWorkDoesItWhenTheOtherDoesNot) {
   }
 }
 
-TEST_F(QueueTest, WhoeverIsCancelledWaitsForNoEqualWork) {
+TEST_F(QueueTest, CancelledJobDoesNotWaitForEqualWork) {
   CreateSingle();
   const JobRecord root = CreateSingle();
   const JobRecord leader = ClaimOne(), follower = ClaimOne();
@@ -112,7 +112,7 @@ TEST_F(QueueTest, AKilledJobEndsAtOnce) {
   EXPECT_EQ(store_->Retry(root.name, false, {}, kNoLimit).state, JobState::kBlocked);
 }
 
-TEST_F(QueueTest, OldJobsGoInTwoPhases) {
+TEST_F(QueueTest, DeletesOldJobsInTwoPhases) {
   constexpr int64_t kGrace = 1000;
   CreateSingle();
   const JobRecord old = ClaimOne();
@@ -139,7 +139,7 @@ TEST_F(QueueTest, OldJobsGoInTwoPhases) {
             "INVALID_ARGUMENT");
 }
 
-TEST_F(QueueTest, ScenesWithoutJobsGoInTwoPhases) {
+TEST_F(QueueTest, DeletesUnusedScenesInTwoPhases) {
   constexpr int64_t kGrace = 1000;
   SceneRecord abandoned;
   abandoned.name = "scenes/abandoned";  // never committed
@@ -158,7 +158,7 @@ TEST_F(QueueTest, ScenesWithoutJobsGoInTwoPhases) {
   EXPECT_EQ(unused(wall_), std::vector<std::string>{abandoned.name});
 }
 
-TEST_F(QueueTest, ScenesThatAreNeverCommittedGoEarlier) {
+TEST_F(QueueTest, DeletesUncommittedScenesEarlier) {
   constexpr int64_t kGrace = 1000;
   SceneRecord scene;
   for (const char* name : {"scenes/abandoned", "scenes/young"}) {
@@ -175,7 +175,7 @@ TEST_F(QueueTest, ScenesThatAreNeverCommittedGoEarlier) {
   EXPECT_TRUE(unused().empty());
 }
 
-TEST_F(QueueTest, NoReceiverKeepsAnotherOut) {
+TEST_F(QueueTest, NotificationsAreFairBetweenReceivers) {
   const auto end = [&](const std::string& url) {
     NewGraph graph;
     graph.scene = "scenes/test";
@@ -197,7 +197,7 @@ TEST_F(QueueTest, NoReceiverKeepsAnotherOut) {
                                       "https://good.example.org/hook"}));
 }
 
-TEST_F(QueueTest, WordOfAnEndIsOwedUntilItIsDelivered) {
+TEST_F(QueueTest, NotificationStaysDueUntilDelivered) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.notify_url = "https://hooks.example.org";

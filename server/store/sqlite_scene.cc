@@ -182,7 +182,7 @@ void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& requ
     while (select.Step()) files.push_back(select.Text(0));
   }
   db.Run("delete from scene where scene_id=?", scene.id);
-  LetGo(db, scene.project, files);
+  ReleaseHoldings(db, scene.project, files);
   RecordRequest(db, request, name);
   transaction.Commit();
 }

@@ -17,7 +17,7 @@ void CopyStore(const std::filesystem::path& file, const std::filesystem::path& c
 // Jobs of the store, which nobody uses, that would go on from this checkpoint begin anew.
 void DropCheckpoint(const std::filesystem::path& file, const std::string& sha256);
 
-// What is wrong with it in SQLite's words, at most 20 things.
+// Faults of the file in SQLite's words, at most 20.
 std::vector<std::string> StoreProblems(const std::filesystem::path& file);
 
 }  // namespace color3d

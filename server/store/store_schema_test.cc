@@ -75,7 +75,7 @@ class StoreSchemaTest : public JobStoreTest {
   }
 };
 
-TEST_F(StoreSchemaTest, TheServerBringsAnOldStoreUpToDateAndKeepsACopy) {
+TEST_F(StoreSchemaTest, ServerMigratesAnOldStoreAndKeepsACopy) {
   CreateSingle();
   const JobRecord done = ClaimOne();
   Succeed(done);
@@ -109,7 +109,7 @@ int64_t FreePages(const fs::path& file) {
   return free.Step() ? free.Int(0) : -1;
 }
 
-TEST_F(StoreSchemaTest, ADatabaseGivesBackWhatWasDeletedAlsoAnOldOne) {
+TEST_F(StoreSchemaTest, FreePagesReturnToTheFileSystem) {
   for (const bool is_old : {false, true}) {
     SceneRecord scene;
     scene.name = "scenes/large";
@@ -134,14 +134,14 @@ TEST_F(StoreSchemaTest, ADatabaseGivesBackWhatWasDeletedAlsoAnOldOne) {
   }
 }
 
-TEST_F(StoreSchemaTest, AWorkerChangesNothing) {
+TEST_F(StoreSchemaTest, WorkersDoNotMigrate) {
   EXPECT_EQ(ReasonThrown([&] { OpenAsWorker(scratch_.path() / "fresh.db"); }), "STORE_NOT_READY");
   MakeOld();
   EXPECT_EQ(ReasonThrown([&] { OpenAsWorker(File()); }), "STORE_VERSION");
   EXPECT_EQ(VersionOf(File()), 1);
 }
 
-TEST_F(StoreSchemaTest, AWorkerOfAnotherReleaseIsGivenNoJob) {
+TEST_F(StoreSchemaTest, WorkersOfAnotherReleaseGetNoJob) {
   CreateSingle();
   StoreOptions options;
   options.program_version = "0.0.1";
@@ -155,14 +155,14 @@ TEST_F(StoreSchemaTest, AWorkerOfAnotherReleaseIsGivenNoJob) {
   EXPECT_EQ(ClaimOne().attempt, 1) << "nothing was spent";
 }
 
-TEST_F(StoreSchemaTest, AWorkerOfAnotherBuildIsGivenNoJob) {
+TEST_F(StoreSchemaTest, WorkersOfAnotherBuildGetNoJob) {
   CreateSingle();
   SqliteJobStore worker(File(), StoreRole::kWorker, TestClocks());
   SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=version+1");
   EXPECT_EQ(ReasonThrown([&] { worker.Claim("worker-1", kLease); }), "WORKER_VERSION");
 }
 
-TEST_F(StoreSchemaTest, AClockThatIsSetEndsNoLeaseAndStallsNoRetry) {
+TEST_F(StoreSchemaTest, ClockChangesNeitherEndLeasesNorStallRetries) {
   const JobRecord job = (CreateSingle(), ClaimOne());
   for (const int64_t jump : {int64_t{1} << 40, -(int64_t{1} << 40)}) {
     wall_ += jump;
@@ -177,7 +177,7 @@ TEST_F(StoreSchemaTest, AClockThatIsSetEndsNoLeaseAndStallsNoRetry) {
   EXPECT_EQ(ClaimOne().attempt, 2);
 }
 
-TEST_F(StoreSchemaTest, AMachineThatStartedAnewHasNoLeases) {
+TEST_F(StoreSchemaTest, RebootEndsAllLeases) {
   now_ = int64_t{1} << 40;
   const JobRecord running = (CreateSingle(), ClaimOne());
   const JobRecord waiting = (CreateSingle(), ClaimOne());
@@ -193,7 +193,7 @@ TEST_F(StoreSchemaTest, AMachineThatStartedAnewHasNoLeases) {
 }
 
 // As on a full disk: nothing can be written, but whoever reads is served.
-TEST_F(StoreSchemaTest, AServerThatStartsAgainWritesNothing) {
+TEST_F(StoreSchemaTest, RestartWritesNothing) {
   SqliteDatabase other(File(), SqliteAccess::kWrite);
   const SqliteTransaction held(other);
   EXPECT_EQ(ReasonThrown([&] { Open(); }), "nothing");

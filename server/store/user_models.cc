@@ -148,7 +148,7 @@ std::vector<fs::path> FilesOfModel(const fs::path& file) {
 }
 
 FileDigest FileDigests::Of(const fs::path& file) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const std::string identity = FileIdentity(file);
   const auto known = known_.find(file);
   if (known != known_.end() && !identity.empty() && known->second.identity == identity) {

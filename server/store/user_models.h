@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "core/base/digest.h"
+#include "core/base/mutex.h"
 
 namespace color3d {
 
@@ -38,12 +38,12 @@ std::string NamesOf(const std::map<std::string, Value>& entries) {
   return text.empty() ? "none" : text;
 }
 
-// What a weight file looks like, by its first megabytes: "clip", "ddcolor", "convnext",
+// Kind of a weight file, by its first megabytes: "clip", "ddcolor", "convnext",
 // "torchscript" or "unknown". For people who list models: nothing relies on it. Throws
 // Error{kNotFound}.
 std::string LooksLike(const std::filesystem::path& file);
 
-// What tells one state of a file from another without reading it; empty when there is no such file.
+// Distinguishes states of a file without reading it; empty if there is no such file.
 std::string FileIdentity(const std::filesystem::path& file);
 
 // The file itself and what models read beside it when it is there: CLIP's vocabulary and
@@ -62,8 +62,8 @@ class FileDigests {
     std::string identity;
     FileDigest digest;
   };
-  std::mutex mutex_;
-  std::map<std::filesystem::path, Known> known_;
+  Mutex mutex_;
+  std::map<std::filesystem::path, Known> known_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

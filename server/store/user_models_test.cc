@@ -23,7 +23,7 @@ std::string ParseError(const std::vector<std::string>& models,
   return "";
 }
 
-TEST(UserModels, FlagsAreReadAndHandedOn) {
+TEST(UserModels, FlagsAreParsedAndPassedOn) {
   const UserModels models =
       ParseUserModels({"clip=/m/a=b.pt", "ddcolor-1.0=/m/d"}, {"uni=127.0.0.1:7"});
   EXPECT_EQ(models.files.at("clip"), "/m/a=b.pt");
@@ -38,7 +38,7 @@ TEST(UserModels, FlagsAreReadAndHandedOn) {
   EXPECT_TRUE(ParseUserModels({"a=relative"}, {}).files.at("a").is_absolute());
 }
 
-TEST(UserModels, BadNamesAndRepeatedOnesAreRefused) {
+TEST(UserModels, RefusesBadAndRepeatedNames) {
   EXPECT_THAT(ParseError({"clip"}), HasSubstr("is not NAME=FILE"));
   EXPECT_THAT(ParseError({"clip="}), HasSubstr("is not NAME=FILE"));
   EXPECT_THAT(ParseError({"=x"}), HasSubstr("the name ''"));
@@ -49,7 +49,7 @@ TEST(UserModels, BadNamesAndRepeatedOnesAreRefused) {
   EXPECT_THAT(ParseError({}, {"a=x", "a=x"}), HasSubstr("--backend a is given twice"));
 }
 
-TEST(UserModels, AMissingFileIsNamedAtTheStart) {
+TEST(UserModels, NamesAMissingFile) {
   const ScratchFolder folder;
   WriteFileAtomic(folder.path() / "there", "x");
   const std::string there = "a=" + (folder.path() / "there").string();

@@ -31,7 +31,7 @@ void LinkOrCopy(const fs::path& blob, const fs::path& target) {
   fs::copy_file(blob, target);
 }
 
-// Of a model's file and all that is read beside it.
+// Identity of a model's file and of all files that are read beside it.
 std::string IdentityOf(const fs::path& model) {
   std::string identity;
   for (const fs::path& part : FilesOfModel(model)) {
@@ -79,14 +79,14 @@ class Attempt {
   void NoteModels(const std::vector<std::string>& names);
   void RequireModelsUnchanged() const;
   bool ServeFromCache();
-  // Whether the job was put back because another that runs does the same.
+  // Returns true if the job was put back because a running job does equal work.
   bool JoinEqual();
   void Compute();
   void Publish(const StageOutput& output);
   void HandleError(const JobError& found);
   JobError OutOfMemory(const std::exception& e) const;
   // Writes the end of an attempt that was told to stop; false when there was no such order.
-  void Conclude(WorkerStore& store, StopReason reason, const JobError& error);
+  void ReportEnd(WorkerStore& store, StopReason reason, const JobError& error);
   [[noreturn]] void GiveUp(StopReason reason);
   void LogEnd(const char* how);
 
@@ -196,7 +196,7 @@ void Attempt::Prepare() {
   const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
   if (part.bytes.empty()) return;
-  // Whether somebody else has done the same is nothing that a project may learn.
+  // Keyed by project: a project must not learn of equal work of others.
   std::string material =
       context_.code_version + '\n' + job_.project + '\n' + Sha256Hex(manifest) + '\n';
   for (const auto& [name, artifact] : input_artifacts_) {
@@ -350,7 +350,8 @@ void Attempt::HandleError(const JobError& found) {
   fs::remove_all(scratch_, ignored);
   for (int tries_left = 2;; --tries_left) {
     try {
-      return Conclude(context_.store, lost ? StopReason::kLeaseLost : keeper_.stop_reason(), error);
+      return ReportEnd(
+          context_.store, lost ? StopReason::kLeaseLost : keeper_.stop_reason(), error);
     } catch (const Error& e) {
       if (tries_left > 0 && e.code() != ErrorCode::kAborted) {
         std::this_thread::sleep_for(context_.timing.report_pause);
@@ -362,7 +363,7 @@ void Attempt::HandleError(const JobError& found) {
   }
 }
 
-void Attempt::Conclude(WorkerStore& store, StopReason reason, const JobError& error) {
+void Attempt::ReportEnd(WorkerStore& store, StopReason reason, const JobError& error) {
   const JobUsage usage = keeper_.Usage();
   switch (reason) {
     case StopReason::kLeaseLost:
@@ -394,7 +395,7 @@ void Attempt::Conclude(WorkerStore& store, StopReason reason, const JobError& er
 // the thread that hangs cannot be ended alone.
 void Attempt::GiveUp(StopReason reason) {
   try {
-    Conclude(context_.heartbeat_store, reason, {});
+    ReportEnd(context_.heartbeat_store, reason, {});
   } catch (const Error& e) {
     spdlog::error("{} cannot report its end: {}", tag_, e.what());
   }

@@ -16,9 +16,9 @@ void AttemptBatch::Start(const JobRecord& job) {
   try {
     running.thread = std::thread([this, job, shares_process, &running] {
       RunAttempt(context_, job, shares_process);
-      std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       running.ended = true;
-      ended_.notify_all();
+      ended_.NotifyAll();
     });
   } catch (const std::exception& e) {  // no more threads
     spdlog::error("{} cannot be run beside others: {}", AttemptTag(job), e.what());
@@ -31,9 +31,10 @@ int AttemptBatch::Reap(std::chrono::milliseconds timeout) {
   const auto ended = [](const Running& running) { return running.ended; };
   std::list<Running> done;
   {
-    std::unique_lock lock(mutex_);
-    ended_.wait_for(
-        lock, timeout, [&] { return std::any_of(running_.begin(), running_.end(), ended); });
+    const MutexLock lock(mutex_);
+    const auto end = std::chrono::steady_clock::now() + timeout;
+    while (std::none_of(running_.begin(), running_.end(), ended) && ended_.WaitUntil(mutex_, end)) {
+    }
     for (auto it = running_.begin(); it != running_.end();) {
       const auto next = std::next(it);
       if (it->ended) done.splice(done.end(), running_, it);

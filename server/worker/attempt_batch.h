@@ -4,11 +4,10 @@
 // from its checkpoint. Used by the worker's thread.
 #pragma once
 
-#include <condition_variable>
 #include <list>
-#include <mutex>
 #include <thread>
 
+#include "core/base/mutex.h"
 #include "server/worker/attempt.h"
 
 namespace color3d {
@@ -27,12 +26,12 @@ class AttemptBatch {
  private:
   struct Running {
     std::thread thread;
-    bool ended = false;  // under the mutex
+    bool ended = false;  // guarded by mutex_
   };
 
   const AttemptContext& context_;
-  std::mutex mutex_;
-  std::condition_variable ended_;
+  Mutex mutex_;  // guards Running::ended
+  CondVar ended_;
   std::list<Running> running_;
 };
 

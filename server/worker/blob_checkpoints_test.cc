@@ -39,7 +39,7 @@ TEST_F(BlobCheckpointsTest, OnlyTheNewestIsKept) {
 }
 
 // Another worker has stored the same bytes and is about to name them.
-TEST_F(BlobCheckpointsTest, WhatAnotherIsAboutToNameStays) {
+TEST_F(BlobCheckpointsTest, KeepsABlobThatAnotherJobIsAboutToName) {
   auto checkpoints = Of(Running());
   checkpoints.Save("equal");
   const FileDigest other = blobs_.PutBytes("equal");  // found there, and touched
@@ -50,7 +50,7 @@ TEST_F(BlobCheckpointsTest, WhatAnotherIsAboutToNameStays) {
   EXPECT_EQ(Of(store_->GetJob(another.name)).Load(), "equal");
 }
 
-TEST_F(BlobCheckpointsTest, WhatAnotherHadStoredBeforeStays) {
+TEST_F(BlobCheckpointsTest, KeepsABlobThatAnotherJobStoredBefore) {
   blobs_.PutBytes("equal");
   auto checkpoints = Of(Running());
   checkpoints.Save("equal");

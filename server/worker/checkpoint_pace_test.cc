@@ -9,7 +9,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 // A checkpoint is saved whenever it is time; what is saved takes longer and longer.
-TEST(CheckpointPace, SavingTakesATwentiethOfTheTimeHoweverLargeCheckpointsGrow) {
+TEST(CheckpointPace, LargeCheckpointsTakeATwentiethOfTheTime) {
   const CheckpointPace::Time begin{};
   CheckpointPace::Time now = begin;
   CheckpointPace pace(seconds(20), now);

@@ -29,7 +29,7 @@ TEST(ColorizerCacheTest, LoadsOnceAndForgetsTheLeastRecentlyUsed) {
   EXPECT_EQ(cache.size(), 2u);
 }
 
-TEST(ColorizerCacheTest, WhatIsInUseStaysBeyondTheBound) {
+TEST(ColorizerCacheTest, KeepsColorizersInUseBeyondTheBound) {
   ColorizerCache cache(100);
   const auto used = cache.Get("used", [] { return Sized(90); });
   const auto also = cache.Get("also", [] { return Sized(90); });

@@ -112,7 +112,7 @@ TEST_F(CoreLiveEngineTest, MixedExamplesDoNotMixAndLuminanceIsKept) {
   }
 }
 
-TEST_F(CoreLiveEngineTest, ColorPicturesAndSixteenBitsAreTakenAndSizesObeyed) {
+TEST_F(CoreLiveEngineTest, AcceptsColorAnd16BitPicturesAndSizes) {
   const std::string red = Example(40, 15);
   std::vector<Request> requests = {
       ByExample(red, EncodePng8(SrgbFromLab(TintedLab(-20, 20)))),
@@ -127,7 +127,7 @@ TEST_F(CoreLiveEngineTest, ColorPicturesAndSixteenBitsAreTakenAndSizesObeyed) {
   EXPECT_EQ(LabOf(2).height, 40);
 }
 
-TEST_F(CoreLiveEngineTest, OnePicturesFaultIsItsOwn) {
+TEST_F(CoreLiveEngineTest, BadPictureFailsAlone) {
   const std::string red = Example(40, 15), grey = Put(GrayPng());
   const std::string huge = EncodePng8(Image(6000, 4300, 1));
   Request unknown_model = ByExample(red, GrayPng());
@@ -185,7 +185,7 @@ TEST_F(CoreLiveEngineTest, AColorizerOfAnotherEncoderIsRefusedByDigest) {
 }
 
 // A PNG of noise does not compress.
-TEST_F(CoreLiveEngineTest, AnAnswerTooLargeForAMessageIsABlob) {
+TEST_F(CoreLiveEngineTest, AnswersLargeResultsAsBlobs) {
   Image noise(1500, 1200, 1);
   uint32_t state = 1;
   for (float& value : noise.data) {

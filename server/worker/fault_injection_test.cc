@@ -325,7 +325,7 @@ TEST(FaultInjectionTest, EveryCallIsPartOfTheLife) {
                                        "UpdateWorker"}));
 }
 
-TEST(FaultInjectionTest, WhateverFailsOnceInPassingCostsNoJob) {
+TEST(FaultInjectionTest, TransientFailureCostsNoJob) {
   const Life undisturbed = Live(0, false, ErrorCode::kUnavailable);
   for (const JobRecord& job : undisturbed.jobs) {
     EXPECT_EQ(job.state, EndOf(job)) << job.kind;
@@ -345,7 +345,7 @@ TEST(FaultInjectionTest, WhateverFailsOnceInPassingCostsNoJob) {
   }
 }
 
-TEST(FaultInjectionTest, NoResultIsPublishedThatIsGone) {
+TEST(FaultInjectionTest, DoesNotPublishAMissingResult) {
   Faults none(0, false, ErrorCode::kUnavailable);
   World world(none, none);
   world.UploadPhoto();
@@ -358,7 +358,7 @@ TEST(FaultInjectionTest, NoResultIsPublishedThatIsGone) {
   }
 }
 
-TEST(FaultInjectionTest, WhatFailsForGoodEndsTheJobWithItsReason) {
+TEST(FaultInjectionTest, PermanentFailureEndsTheJobWithItsReason) {
   const int calls = Live(0, false, ErrorCode::kInternal).calls;
   for (const bool after : {false, true}) {
     for (int n = 1; n <= calls; ++n) {
@@ -369,7 +369,7 @@ TEST(FaultInjectionTest, WhatFailsForGoodEndsTheJobWithItsReason) {
 }
 
 // Each step lasts for two heartbeats, or looks of the heartbeat's thread.
-TEST(FaultInjectionTest, HeartbeatsThatFailCostNothingAndOneThatFindsTheLeaseLostOneAttempt) {
+TEST(FaultInjectionTest, FailedHeartbeatsCostAtMostOneAttempt) {
   std::set<std::string> failed;
   for (const ErrorCode code :
        {ErrorCode::kUnavailable, ErrorCode::kInternal, ErrorCode::kAborted}) {

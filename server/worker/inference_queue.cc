@@ -43,11 +43,11 @@ InferenceQueue::InferenceQueue(LiveEngine& engine, int max_batch, size_t max_wai
 InferenceQueue::~InferenceQueue() {
   std::deque<Waiting> left;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
     left.swap(waiting_);
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   for (const Waiting& call : left) call.reactor->Finish(EndingStatus());
   thread_.join();
 }
@@ -59,14 +59,14 @@ grpc::ServerUnaryReactor* InferenceQueue::ColorizeImage(
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   bool taken = false;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!stopping_ && waiting_.size() < max_waiting_) {
       waiting_.push_back({context, reactor, {request, response, nullptr}});
       taken = true;
     }
   }
   if (taken) {
-    wake_.notify_all();
+    wake_.NotifyAll();
   } else {
     reactor->Finish(OverloadedStatus());
   }
@@ -74,7 +74,7 @@ grpc::ServerUnaryReactor* InferenceQueue::ColorizeImage(
 }
 
 InferenceQueue::State InferenceQueue::state() const {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto now = SteadyClock::now();
   State state;
   state.idle = !busy_ && waiting_.empty();
@@ -88,10 +88,10 @@ std::vector<InferenceQueue::Waiting> InferenceQueue::Take() {
   std::vector<Waiting> batch;
   std::vector<Waiting> cancelled;
   {
-    std::unique_lock lock(mutex_);
+    const MutexLock lock(mutex_);
     busy_ = false;
     changed_ = SteadyClock::now();
-    wake_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
+    while (!stopping_ && waiting_.empty()) wake_.Wait(mutex_);
     busy_ = true;
     changed_ = batch_start_ = SteadyClock::now();
     while (!waiting_.empty() && batch.size() < max_batch_) {
@@ -130,7 +130,7 @@ void InferenceQueue::Loop() {
       Answer(std::move(batch));
       continue;
     }
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (stopping_) return;
   }
 }

@@ -6,13 +6,12 @@
 #include <grpcpp/support/server_callback.h>
 
 #include <chrono>
-#include <condition_variable>
 #include <deque>
-#include <mutex>
 #include <thread>
 #include <vector>
 
 #include "color3d/internal/v1/inference.grpc.pb.h"
+#include "core/base/mutex.h"
 #include "server/worker/live_engine.h"
 
 namespace color3d {
@@ -50,14 +49,14 @@ class InferenceQueue final : public internal::v1::InferenceService::CallbackServ
   LiveEngine& engine_;
   const size_t max_batch_;
   const size_t max_waiting_;
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::deque<Waiting> waiting_;
-  bool stopping_ = false;
-  bool busy_ = true;  // loading, at first
-  SteadyClock::time_point changed_ = SteadyClock::now();
-  SteadyClock::time_point batch_start_ = SteadyClock::now();
-  int64_t pictures_ = 0;
+  mutable Mutex mutex_;
+  CondVar wake_;
+  std::deque<Waiting> waiting_ COLOR3D_GUARDED_BY(mutex_);
+  bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool busy_ COLOR3D_GUARDED_BY(mutex_) = true;  // loading, at first
+  SteadyClock::time_point changed_ COLOR3D_GUARDED_BY(mutex_) = SteadyClock::now();
+  SteadyClock::time_point batch_start_ COLOR3D_GUARDED_BY(mutex_) = SteadyClock::now();
+  int64_t pictures_ COLOR3D_GUARDED_BY(mutex_) = 0;
   std::thread thread_;
 };
 

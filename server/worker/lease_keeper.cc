@@ -45,10 +45,10 @@ LeaseKeeper::~LeaseKeeper() { Stop(); }
 
 void LeaseKeeper::Stop() {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ending_ = true;
   }
-  wake_.notify_all();
+  wake_.NotifyAll();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -57,12 +57,12 @@ double LeaseKeeper::SecondsSoFar() const {
 }
 
 JobUsage LeaseKeeper::Usage() const {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return {SecondsSoFar(), PeakMemoryBytes(), warnings_};
 }
 
 void LeaseKeeper::OnProgress(int64_t step, int64_t total_steps, const std::string& message) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const bool fresh = total_steps != progress_.total_steps || step < progress_.step;
   progress_.step = step;
   progress_.total_steps = total_steps;
@@ -91,7 +91,7 @@ void LeaseKeeper::UpdateEta() {
 }
 
 void LeaseKeeper::OnError(int64_t, const std::string& error_name, double value) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   progress_.error_name = error_name;
   progress_.error_value = std::isfinite(value) ? value : 0.0;
   last_progress_ = SteadyClock::now();
@@ -100,7 +100,7 @@ void LeaseKeeper::OnError(int64_t, const std::string& error_name, double value) 
 
 void LeaseKeeper::OnWarning(const std::string& message) {
   spdlog::warn("{} {}", tag_, message);
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const bool known = std::find(warnings_.begin(), warnings_.end(), message) != warnings_.end();
   if (!known && warnings_.size() < kMaxWarnings) warnings_.push_back(message);
 }
@@ -118,7 +118,7 @@ void LeaseKeeper::Beat() {
   JobUsage usage;
   bool dirty = false;
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     progress = progress_;
     usage.warnings = warnings_;
     dirty = dirty_;
@@ -153,10 +153,16 @@ void LeaseKeeper::Beat() {
 
 void LeaseKeeper::Loop() {
   const auto tick = std::min(timing_.progress, timing_.heartbeat / 2);
-  std::unique_lock lock(mutex_);
-  while (!wake_.wait_for(lock, tick, [this] { return ending_; })) {
-    const auto last_progress = last_progress_;
-    lock.unlock();
+  while (true) {
+    SteadyClock::time_point last_progress;
+    {
+      MutexLock lock(mutex_);
+      const auto end = SteadyClock::now() + tick;
+      while (!ending_ && wake_.WaitUntil(mutex_, end)) {
+      }
+      if (ending_) return;
+      last_progress = last_progress_;
+    }
     Beat();
     const auto now = SteadyClock::now();
     // A worker that cannot reach the store stops before somebody else may take its job over.
@@ -170,7 +176,6 @@ void LeaseKeeper::Loop() {
       const auto grace = reason == StopReason::kDraining ? timing_.drain_grace : timing_.stop_grace;
       if (SteadyClock::now() - stopped_at_ > grace) give_up_(reason);
     }
-    lock.lock();
   }
 }
 

@@ -4,14 +4,13 @@
 
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "core/base/cancellation.h"
+#include "core/base/mutex.h"
 #include "core/base/progress.h"
 #include "server/store/worker_store.h"
 
@@ -69,7 +68,7 @@ class LeaseKeeper : public ProgressObserver {
   void Beat();
   void StopStage(StopReason reason);
   double SecondsSoFar() const;
-  void UpdateEta();
+  void UpdateEta() COLOR3D_REQUIRES(mutex_);
 
   WorkerStore& store_;
   const Lease lease_;
@@ -84,17 +83,17 @@ class LeaseKeeper : public ProgressObserver {
   std::atomic<StopReason> reason_{StopReason::kNone};
   SteadyClock::time_point stopped_at_;  // heartbeat thread only
 
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  bool ending_ = false;
-  bool dirty_ = false;
-  ProgressRecord progress_;
-  std::vector<std::string> warnings_;
-  SteadyClock::time_point last_progress_ = start_;
-  SteadyClock::time_point last_said_;
+  mutable Mutex mutex_;
+  CondVar wake_;
+  bool ending_ COLOR3D_GUARDED_BY(mutex_) = false;
+  bool dirty_ COLOR3D_GUARDED_BY(mutex_) = false;
+  ProgressRecord progress_ COLOR3D_GUARDED_BY(mutex_);
+  std::vector<std::string> warnings_ COLOR3D_GUARDED_BY(mutex_);
+  SteadyClock::time_point last_progress_ COLOR3D_GUARDED_BY(mutex_) = start_;
+  SteadyClock::time_point last_said_ COLOR3D_GUARDED_BY(mutex_);
   // Where the present run of steps began, for the expected time to its end.
-  int64_t eta_base_step_ = 0;
-  SteadyClock::time_point eta_base_time_ = start_;
+  int64_t eta_base_step_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  SteadyClock::time_point eta_base_time_ COLOR3D_GUARDED_BY(mutex_) = start_;
 
   SteadyClock::time_point last_attempt_ = start_;  // heartbeat thread only
   SteadyClock::time_point last_success_ = start_;

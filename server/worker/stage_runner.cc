@@ -1,7 +1,6 @@
 #include "server/worker/stage_runner.h"
 
-#include <mutex>
-
+#include "core/base/mutex.h"
 #include "core/catalogue/stages.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/report/curves.h"
@@ -183,9 +182,9 @@ class CoreStageRunner : public StageRunner {
   }
 
  private:
-  // Of all personalize jobs of this process, made when the first one needs it.
+  // The batch of all personalize jobs of this process; made by the first one.
   SceneBatch* Batch(int threads) {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!batch_) batch_ = std::make_unique<SceneBatch>(threads);
     return batch_.get();
   }
@@ -244,8 +243,8 @@ class CoreStageRunner : public StageRunner {
     }
   }
 
-  std::mutex mutex_;
-  std::unique_ptr<SceneBatch> batch_;
+  Mutex mutex_;
+  std::unique_ptr<SceneBatch> batch_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace

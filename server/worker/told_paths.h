@@ -1,4 +1,4 @@
-// What users are told of files: their names in a scene or job, never where the server keeps them.
+// Paths in messages to users: names in a scene or job, never the paths of the server.
 // Pure, thread-safe.
 #pragma once
 

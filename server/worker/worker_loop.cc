@@ -69,7 +69,7 @@ class WorkerLoop {
   // Claims and runs one job, or a batch of them; false when there was none.
   bool Turn();
   void RunBatch(const JobRecord& first);
-  // Whether another scene may join `running` ones.
+  // Returns true if another scene may join the `running` ones.
   bool HasRoom(int running) const;
   // The next job of this kind and encoder; none when the queue has none or cannot be read now.
   std::optional<JobRecord> ClaimForBatch(const std::string& kind, const std::string& encoder);

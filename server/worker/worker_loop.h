@@ -42,7 +42,7 @@ void RunWorker(const WorkerOptions& options,
                StageRunner& runner,
                const std::atomic<bool>& draining);
 
-// What a worker program is made of, in each of its two roles.
+// Parts of a worker program, one for each of its two roles.
 struct WorkerProgram {
   std::unique_ptr<StageRunner> (*make_runner)();
   std::unique_ptr<LiveEngine> (*make_engine)(const LiveEngineSetup&);  // --inference

@@ -1,5 +1,5 @@
-// The worker loop with scripted stages, in this process: which jobs run together, and that one's
-// end is not the others'.
+// The worker loop with scripted stages, in this process: jobs that run together, and their separate
+// ends.
 #include "server/worker/worker_loop.h"
 
 #include <gtest/gtest.h>
@@ -192,7 +192,7 @@ TEST_F(WorkerLoopTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
   EXPECT_EQ(succeeded, 2);
 }
 
-TEST_F(WorkerLoopTest, ArtifactsOfAdditionalKeyViewsLieInNumberedFolders) {
+TEST_F(WorkerLoopTest, AdditionalKeyViewsHaveNumberedFolders) {
   runner_.wanted = 1;
   NewGraph graph;
   graph.scene = "scenes/test";

@@ -133,7 +133,7 @@ void HandleStopSignals() {
   IgnoreStraySignals();
 }
 
-// What strangers send may take much memory: better this process fails than the machine.
+// Uploads may take much memory: this process fails before the machine does.
 void LimitMemory(int64_t memory_mib) {
   // With less nothing can be computed.
   constexpr int64_t kLeastBytes = int64_t{256} << 20;
@@ -167,7 +167,7 @@ void LimitMemory(int64_t memory_mib) {
   spdlog::info("may take {} MiB of memory, {} MiB of it are reserved", memory_mib, reserved >> 20);
 }
 
-// What this process decodes is strangers'. Threads that were there before are OpenBLAS's own.
+// This process decodes untrusted files. Threads that were there before are OpenBLAS's own.
 void LockIn(const WorkerArguments& arguments) {
   SetSandboxing(arguments.settings.sandbox);
   if (!arguments.settings.sandbox) return;
