@@ -215,7 +215,7 @@ void Maintenance::ExpireJobs() {
   const auto remove = [&](const auto& body) {
     if (IsStopping()) return;
     try {
-      WithRoomMade(make_room, body);
+      RetryAfterMakingRoom(make_room, body);
     } catch (const Error& e) {
       // Used, retried, read or deleted meanwhile.
       if (e.code() != ErrorCode::kFailedPrecondition && e.code() != ErrorCode::kNotFound) throw;

@@ -147,7 +147,7 @@ std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
   std::map<std::string, v1::Digest> color_of_key;
   for (const BenchmarkView& view : selection.views) {
     const auto original = originals.find(view.image_file);
-    const bool is_key = selection.IsKey(view.name) && !options.color.Given();
+    const bool is_key = selection.IsKey(view.name) && !options.color.HasSource();
     const bool is_bound = options.bound && !view.held_out;
     if (original == originals.end() || !(is_key || is_bound || view.held_out)) continue;
     if (!copies.in_color.contains(view.image_file)) {
@@ -218,7 +218,7 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   v1::JobSpec spec = ColorizeSpec(options, scene.name());
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
   colorize->set_key_view(selection.key_views[0]);
-  if (options.color.Given()) {
+  if (options.color.HasSource()) {
     *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
   }
   AddKeyViews(connection, options, colorize);

@@ -39,7 +39,7 @@ class Colorize {
     if (!options_.scene.empty()) return RunStored();
     folder_ = CollectPhotos(options_.photos, options_.film);
     if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
-    if (options_.film) TakeAsFrames(&folder_);
+    if (options_.film) UsePhotosAsFrames(&folder_);
     if (options_.poses && !options_.film && !folder_.film && folder_.camera_films.empty()) {
       throw InvalidArgument(
           "--poses is for films, and {} is not a film; poses of photos are always found (for "
@@ -91,7 +91,7 @@ class Colorize {
       return Finish(PrepareBenchmark(*connection_, context_, options_, folder_, display_));
     }
     const std::string scene = UploadFolder(*connection_, context_, folder_, display_);
-    return options_.color.Given() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
+    return options_.color.HasSource() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
   }
 
  private:
@@ -120,7 +120,7 @@ class Colorize {
   ExitCode RunStored() {
     Connect();
     const std::string scene = ResourceName(options_.scene, "scenes");
-    return Finish(options_.color.Given() ? ColorSpec(scene) : AcceptedSpec(scene));
+    return Finish(options_.color.HasSource() ? ColorSpec(scene) : AcceptedSpec(scene));
   }
 
   v1::JobSpec AcceptedSpec(const std::string& scene) {
@@ -159,7 +159,7 @@ class Colorize {
   std::string KeyView() const {
     if (!options_.key_view.empty()) return options_.key_view;
     // A file with the name of a photo is that photo, regardless of an earlier selection.
-    const std::string same_stem = PhotoOfSameStem(folder_, options_.color.FileOfView());
+    const std::string same_stem = FindPhotoByStem(folder_, options_.color.PictureOfView());
     if (!same_stem.empty()) return same_stem;
     const std::string view = SelectedView();
     // The selection may be of another scene.

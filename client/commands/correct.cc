@@ -41,7 +41,7 @@ struct CorrectOptions {
   std::optional<double> saturation, tint, warmth;
   std::optional<int> proposals;
 
-  bool Paints() const { return paint.Given() || !at.empty(); }
+  bool Paints() const { return paint.HasSource() || !at.empty(); }
   bool ChangesWhole() const { return saturation || tint || warmth; }
 };
 
@@ -62,7 +62,7 @@ std::string PointHints(const CorrectOptions& options) {
 void Check(const CorrectOptions& options) {
   options.paint.Check();
   if (!options.at.empty()) {
-    if (options.paint.Given()) {
+    if (options.paint.HasSource()) {
       throw InvalidArgument("--at cannot be combined with --hints or --image; give one of them");
     }
     if (options.color.empty()) {

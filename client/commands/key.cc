@@ -185,7 +185,7 @@ std::vector<std::string> Key::SelectionFor(const std::string& scene) {
 
 ExitCode Key::Color() {
   options_.color.Check();
-  if (!options_.color.Given()) {
+  if (!options_.color.HasSource()) {
     throw InvalidArgument(
         "a source of colour is missing: --auto, --image, --hints, --reference, --prompt, "
         "--backend, --script or --edit");

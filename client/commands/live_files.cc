@@ -10,7 +10,7 @@
 #include "client/lib/blob_transfer.h"
 #include "client/lib/names.h"
 #include "client/lib/out_folder.h"
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
 
@@ -24,13 +24,12 @@ void AddFolder(const Context& context, const fs::path& folder, std::vector<LiveP
   std::error_code none;
   const bool nested = fs::is_directory(folder / "images", none);
   const fs::path root = nested ? folder / "images" : folder;
-  PassedOver passed_over;
-  const std::vector<std::string> found =
-      ListPictures(root, /*with_subfolders=*/false, &passed_over);
+  SkippedFiles skipped;
+  const std::vector<std::string> found = ListPictures(root, /*with_subfolders=*/false, &skipped);
   if (found.empty()) {
-    throw InvalidArgument("there are no photos in {}{}", root.string(), passed_over.Clause());
+    throw InvalidArgument("there are no photos in {}{}", root.string(), skipped.Clause());
   }
-  for (const std::string& note : passed_over.Notes()) PrintNote(context, note);
+  for (const std::string& note : skipped.Notes()) PrintNote(context, note);
   for (const std::string& file : found) pictures->push_back({file, root / file, std::nullopt});
 }
 

@@ -33,7 +33,7 @@ ExitCode RunCreate(const Context& context,
   if (film && !masks.empty()) {
     throw InvalidArgument("--masks cannot be combined with --film: frames of a film have no masks");
   }
-  if (film) TakeAsFrames(&folder);
+  if (film) UsePhotosAsFrames(&folder);
   if (!masks.empty()) AddMasks(masks, &folder);
   for (const std::string& note : folder.notes) PrintNote(context, note);
   Connection connection(context.server, *context.interrupt);

@@ -51,7 +51,7 @@ std::string ResolveScene(Connection& connection,
                 text);
   }
   PhotoFolder folder = CollectPhotos(text, film);
-  if (film) TakeAsFrames(&folder);
+  if (film) UsePhotosAsFrames(&folder);
   for (const std::string& note : folder.notes) PrintNote(context, note);
   return UploadFolder(connection, context, folder, display);
 }

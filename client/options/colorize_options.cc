@@ -153,7 +153,7 @@ void ColorizeOptions::Check() const {
         "--keys needs --benchmark, where photos have true colours. To "
         "colour several photos, see `color3d key select --count` and --add-key-view");
   }
-  if (keys > 1 && (!additional_key_views.empty() || color.Given())) {
+  if (keys > 1 && (!additional_key_views.empty() || color.HasSource())) {
     throw InvalidArgument(
         "--keys chooses the key views and takes their true colours; leave out {}",
         additional_key_views.empty() ? "the other source of colour" : "--add-key-view");
@@ -165,7 +165,7 @@ void ColorizeOptions::Check() const {
   }
   for (const std::string& text : additional_key_views) ParseAdditionalKeyView(text);
   // A picture of a certain view cannot be scored against that view.
-  const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
+  const bool for_one_view = !color.PictureOfView().empty() || !color.mask.empty();
   if (benchmark && for_one_view) {
     throw InvalidArgument(
         "--benchmark colours the key view with its own true colours, or by --auto, --prompt, "

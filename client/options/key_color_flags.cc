@@ -158,9 +158,9 @@ v1::KeyColorSource MakeSource(const KeyColorFlags& flags, Uploads* uploads) {
 
 }  // namespace
 
-bool KeyColorFlags::Given() const { return !Sources(*this).empty(); }
+bool KeyColorFlags::HasSource() const { return !Sources(*this).empty(); }
 
-std::string KeyColorFlags::FileOfView() const {
+std::string KeyColorFlags::PictureOfView() const {
   for (const std::string& file : {image, hints, edit}) {
     if (!file.empty()) return file;
   }

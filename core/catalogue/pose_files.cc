@@ -48,7 +48,7 @@ int RankOf(const std::string& folder) {
   return folder.starts_with("sparse") ? 0 : 1;
 }
 
-ColmapPlace PlaceOf(const std::string& folder, const std::set<std::string>& names) {
+ColmapPlace MakeColmapPlace(const std::string& folder, const std::set<std::string>& names) {
   ColmapPlace place;
   place.folder = folder;
   const std::string prefix = folder.empty() ? "" : folder + "/";
@@ -81,7 +81,7 @@ std::vector<ColmapPlace> ColmapPlaces(const std::vector<std::string>& files) {
   std::map<int, std::vector<std::pair<int, ColmapPlace>>> tiers;
   for (const auto& [folder, names] : folders) {
     const int rank = RankOf(folder);
-    ColmapPlace place = PlaceOf(folder, names);
+    ColmapPlace place = MakeColmapPlace(folder, names);
     const bool has_cameras = names.contains("cameras.bin") || names.contains("cameras.txt");
     if (!has_cameras && names.size() < 2) continue;
     const int tier = !place.whole ? 2 : rank == kElsewhere ? 1 : 0;

@@ -139,7 +139,7 @@ void LimitMemory(int64_t memory_mib) {
   constexpr int64_t kLeastBytes = int64_t{256} << 20;
   // Sanitizers reserve terabytes, which the kernel would count.
   constexpr int64_t kMostReserved = int64_t{1} << 40;
-  if (!BeEndedFirstWhenMemoryRunsOut()) {
+  if (!PreferAsOomVictim()) {
     spdlog::warn("the kernel may end the server before this worker when memory runs out");
   }
   if (memory_mib == 0) return;

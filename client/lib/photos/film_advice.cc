@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 #include "core/base/text/lower_case.h"
 #include "core/base/text/name_order.h"
 #include "core/catalogue/scene_files.h"

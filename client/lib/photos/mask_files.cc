@@ -6,7 +6,7 @@
 #include <cctype>
 #include <map>
 
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/text/lower_case.h"

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "client/lib/photos/file_kind.h"
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/text/json_text.h"

@@ -1,4 +1,4 @@
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ const std::string kStub = std::string(
                               24) +
                           std::string(64, '\0');
 
-class PassedOverFilesTest : public ::testing::Test {
+class SkippedFilesTest : public ::testing::Test {
  protected:
   void Write(const std::string& path, const std::string& bytes = "x") {
     fs::create_directories((root() / path).parent_path());
@@ -53,7 +53,7 @@ class PassedOverFilesTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(PassedOverFilesTest, CountsUnsupportedPicturesWithRemedy) {
+TEST_F(SkippedFilesTest, CountsUnsupportedPicturesWithRemedy) {
   for (const char* name : {"a.jpg",
                            "b.jpg",
                            "c.NEF",
@@ -90,7 +90,7 @@ TEST_F(PassedOverFilesTest, CountsUnsupportedPicturesWithRemedy) {
   }
 }
 
-TEST_F(PassedOverFilesTest, ReportsHeicStubsAndKeepsOthers) {
+TEST_F(SkippedFilesTest, ReportsHeicStubsAndKeepsOthers) {
   Write("a.jpg"), Write("b.jpg"), Write("c.HEIC", kStub), Write("d.heic", kStub);
   EXPECT_THAT(Photos(), ElementsAre("a.jpg", "b.jpg"));
   EXPECT_THAT(
@@ -104,7 +104,7 @@ TEST_F(PassedOverFilesTest, ReportsHeicStubsAndKeepsOthers) {
                     HasSubstr("heif-convert")));
 }
 
-TEST_F(PassedOverFilesTest, TakesHeicWebpAndBmpWithoutCopies) {
+TEST_F(SkippedFilesTest, TakesHeicWebpAndBmpWithoutCopies) {
   const std::string heic = HeicFile(Image(64, 64, 3, 0.5f));
   const bool reads_heic = !heic.empty();
   Write("a.jpg"), Write("b.bmp"), Write("c.webp"), Write("e.png");
@@ -122,7 +122,7 @@ TEST_F(PassedOverFilesTest, TakesHeicWebpAndBmpWithoutCopies) {
                                     std::string(reads_heic ? "3" : "2"))));
 }
 
-TEST_F(PassedOverFilesTest, SkipsThumbnailsOfOtherPrograms) {
+TEST_F(SkippedFilesTest, SkipsThumbnailsOfOtherPrograms) {
   for (const char* name : {"images/a.jpg",
                            "images/left/b.jpg",
                            "images/@eaDir/a.jpg/SYNOPHOTO_THUMB_XL.jpg",
@@ -144,7 +144,7 @@ TEST_F(PassedOverFilesTest, SkipsThumbnailsOfOtherPrograms) {
                           HasSubstr("hidden pictures passed over: 1 (._a.jpg)")));
 }
 
-TEST_F(PassedOverFilesTest, FollowsOrReportsLinks) {
+TEST_F(SkippedFilesTest, FollowsOrReportsLinks) {
   Write("images/a.jpg"), Write("images/b.jpg"), Write("elsewhere/c.jpg");
   fs::create_symlink(root() / "elsewhere/c.jpg", root() / "images/c.jpg");
   fs::create_symlink(root() / "gone.jpg", root() / "images/d.jpg");
@@ -157,7 +157,7 @@ TEST_F(PassedOverFilesTest, FollowsOrReportsLinks) {
                           HasSubstr("links to folders passed over: 2 (loop, more)")));
 }
 
-TEST_F(PassedOverFilesTest, SkipsResults) {
+TEST_F(SkippedFilesTest, SkipsResults) {
   for (const char* name : {"a.jpg",
                            "b.jpg",
                            "key_view.png",
@@ -183,7 +183,7 @@ TEST_F(PassedOverFilesTest, SkipsResults) {
   EXPECT_THAT(Photos(), ElementsAre("images/a.jpg", "images/b.jpg", "images/left/frames/c.jpg"));
 }
 
-TEST_F(PassedOverFilesTest, SkipsOwnFilmsAndSplats) {
+TEST_F(SkippedFilesTest, SkipsOwnFilmsAndSplats) {
   for (const char* name : {"walk.mov",
                            "film.mp4",
                            "scene.mp4",
@@ -203,7 +203,7 @@ TEST_F(PassedOverFilesTest, SkipsOwnFilmsAndSplats) {
   EXPECT_EQ(CollectPhotos(root()).camera_films.size(), 3u);
 }
 
-TEST_F(PassedOverFilesTest, ReportsUnusedNeighbors) {
+TEST_F(SkippedFilesTest, ReportsUnusedNeighbors) {
   for (const char* name : {"a.jpg",
                            "b.jpg",
                            "a.mov",
@@ -221,7 +221,7 @@ TEST_F(PassedOverFilesTest, ReportsUnusedNeighbors) {
                           HasSubstr("films passed over: 1 (walk.mp4)")));
 }
 
-TEST_F(PassedOverFilesTest, SkipsThumbnailsOfMasksAndAugmentations) {
+TEST_F(SkippedFilesTest, SkipsThumbnailsOfMasksAndAugmentations) {
   const std::string mask = EncodePng8(Image(4, 4, 1, 1.0f));
   Write("a.png", mask), Write("b.png", mask);
   Write("augment/x.png"), Write("augment/@eaDir/x.png"), Write("augment/Thumbs.db");
@@ -232,7 +232,7 @@ TEST_F(PassedOverFilesTest, SkipsThumbnailsOfMasksAndAugmentations) {
   EXPECT_EQ(folder.mask_files.size(), 1u);
 }
 
-TEST_F(PassedOverFilesTest, SkipsThumbnailsOfFrames) {
+TEST_F(SkippedFilesTest, SkipsThumbnailsOfFrames) {
   for (const char* camera : {"left", "right", "@eaDir", "lost+found"}) {
     for (const char* name : {"1.png", "2.png"}) Write(std::string(camera) + "/" + name);
   }

@@ -12,7 +12,7 @@
 namespace color3d::client {
 
 // Files that were skipped, by kind.
-class PassedOver {
+class SkippedFiles {
  public:
   // `kind`: plural noun; after an optional '|', the remedy.
   void Add(const std::string& kind, const std::string& name, size_t count = 1);
@@ -33,11 +33,11 @@ class PassedOver {
 };
 
 // Returns pictures that may be photos: supported extensions, without the files listed above. Paths
-// are relative to `folder`, with '/' separators, sorted. `passed_over` may be null. Throws
+// are relative to `folder`, with '/' separators, sorted. `skipped` may be null. Throws
 // Error{kFailedPrecondition} if the folder cannot be read.
 std::vector<std::string> ListPictures(const std::filesystem::path& folder,
                                       bool with_subfolders,
-                                      PassedOver* passed_over);
+                                      SkippedFiles* skipped);
 
 // Returns the first subfolder of `root`, by name, with pictures in supported formats; else empty.
 std::string SubfolderWithPictures(const std::filesystem::path& root);
@@ -46,7 +46,7 @@ std::string SubfolderWithPictures(const std::filesystem::path& root);
 // other than `used`.
 void AddUnusedNeighbors(const std::filesystem::path& root,
                         const std::vector<std::string>& used,
-                        PassedOver* passed_over);
+                        SkippedFiles* skipped);
 
 // Returns true for files that this program writes into the folder of -o: key_view.png and the like,
 // and films and splats beside its own records.

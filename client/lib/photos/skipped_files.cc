@@ -1,4 +1,4 @@
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 
 #include <fmt/core.h>
 
@@ -146,8 +146,8 @@ bool HoldsPictures(const fs::path& folder) {
 
 class Lister {
  public:
-  Lister(fs::path root, bool with_subfolders, PassedOver* passed_over)
-      : root_(std::move(root)), with_subfolders_(with_subfolders), passed_over_(passed_over) {}
+  Lister(fs::path root, bool with_subfolders, SkippedFiles* skipped)
+      : root_(std::move(root)), with_subfolders_(with_subfolders), skipped_(skipped) {}
 
   std::vector<std::string> List() {
     ListFolder("");
@@ -157,7 +157,7 @@ class Lister {
 
  private:
   void PassOver(const std::string& kind, const std::string& path) {
-    if (passed_over_ != nullptr) passed_over_->Add(kind, path);
+    if (skipped_ != nullptr) skipped_->Add(kind, path);
   }
 
   // `below`: empty, or the folder's path below the root with a trailing '/'.
@@ -261,13 +261,13 @@ class Lister {
 
   const fs::path root_;
   const bool with_subfolders_;
-  PassedOver* const passed_over_;
+  SkippedFiles* const skipped_;
   std::vector<std::string> found_;
 };
 
 }  // namespace
 
-void PassedOver::Add(const std::string& kind, const std::string& name, size_t count) {
+void SkippedFiles::Add(const std::string& kind, const std::string& name, size_t count) {
   const size_t bar = kind.find('|');
   Files& files = kinds_[kind.substr(0, bar)];
   // If remedies differ by file, gives that of the first one.
@@ -280,7 +280,7 @@ void PassedOver::Add(const std::string& kind, const std::string& name, size_t co
   files.has_more_names = true;
 }
 
-std::vector<std::string> PassedOver::Notes() const {
+std::vector<std::string> SkippedFiles::Notes() const {
   std::vector<std::pair<size_t, std::string>> lines;
   for (const auto& [kind, files] : kinds_) {
     std::string names;
@@ -301,7 +301,7 @@ std::vector<std::string> PassedOver::Notes() const {
   return notes;
 }
 
-std::string PassedOver::Clause() const {
+std::string SkippedFiles::Clause() const {
   constexpr size_t kShownKinds = 3;
   const std::vector<std::string> notes = Notes();
   std::string clause;
@@ -322,7 +322,7 @@ std::string SubfolderWithPictures(const fs::path& root) {
 
 void AddUnusedNeighbors(const fs::path& root,
                         const std::vector<std::string>& used,
-                        PassedOver* passed_over) {
+                        SkippedFiles* skipped) {
   constexpr std::string_view kOurs[] = {"augment", "masks", "sparse"};
   const std::vector<std::string> photos = ListPictures(root, /*with_subfolders=*/false, nullptr);
   std::set<std::string> stems;
@@ -335,23 +335,22 @@ void AddUnusedNeighbors(const fs::path& root,
       if (IsResultFile(entry.path())) continue;
       // A companion file that a phone stores beside the photo of the same name.
       if (stems.contains(LowerCase(fs::path(name).stem().string()))) continue;
-      passed_over->Add("films|give the film itself to colour it", name);
+      skipped->Add("films|give the film itself to colour it", name);
     } else if (entry.is_directory(none) && !IsSystemFolder(name) && !Holds(kOurs, name) &&
                !Holds(used, name) && !HasResultRecord(entry.path())) {
       const size_t count = CountPictures(entry.path());
       if (count == 0) continue;
-      passed_over->Add(
-          "pictures in subfolders|put all photographs into one folder, or below images/",
-          name + "/",
-          count);
+      skipped->Add("pictures in subfolders|put all photographs into one folder, or below images/",
+                   name + "/",
+                   count);
     }
   }
 }
 
 std::vector<std::string> ListPictures(const fs::path& folder,
                                       bool with_subfolders,
-                                      PassedOver* passed_over) {
-  return Lister(folder, with_subfolders, passed_over).List();
+                                      SkippedFiles* skipped) {
+  return Lister(folder, with_subfolders, skipped).List();
 }
 
 bool IsResultFile(const fs::path& file) {
