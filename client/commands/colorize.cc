@@ -62,7 +62,7 @@ class Colorize {
         throw InvalidArgument("--add-key-view {}: this is already the key view", key.view);
       }
     }
-    RequireOutBesidePhotos(out_, folder_);
+    RequireSeparateOutFolder(out_, folder_);
     RequireAugmentFiles(options_, folder_);
     if (!WantsAugmentFiles(options_) && !folder_.augment_files.empty()) {
       folder_.notes.push_back(

@@ -108,7 +108,7 @@ RpcError WithRequestId(const RpcError& error,
 }
 
 // Error of a call without a connection; over TLS, the reason why the certificate is rejected.
-std::string WhyUnreachable(const std::shared_ptr<grpc::Channel>& channel) {
+std::string UnreachableReason(const std::shared_ptr<grpc::Channel>& channel) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(2));
   v1::ServerInfo info;
@@ -173,7 +173,7 @@ Connection::Connection(const ServerTarget& server, const CancellationToken& canc
                 "cannot reach a server at {} over TLS: {}; look at --server, --ca and, where the "
                 "server asks for it, --client-cert",
                 server.address,
-                WhyUnreachable(channel_));
+                UnreachableReason(channel_));
   }
   if (!connected) throw UnreachableError(server.address);
   scenes_ = v1::SceneService::NewStub(channel_);

@@ -28,7 +28,7 @@ bool ParseRange(std::string_view text, AdditionalKeyView* key) {
 
 // Takes the range of time off the end of `value`, where it has one. A file may be called
 // "a@2x.png".
-void TakeRange(std::string* value, AdditionalKeyView* key) {
+void ExtractRange(std::string* value, AdditionalKeyView* key) {
   const size_t at = value->rfind('@');
   if (at == std::string::npos) return;
   const std::string range = value->substr(at + 1);
@@ -64,7 +64,7 @@ AdditionalKeyView ParseAdditionalKeyView(const std::string& text) {
   }
   std::string value = text.substr(equals + 1);
   AdditionalKeyView key{text.substr(0, equals), {}};
-  TakeRange(&value, &key);
+  ExtractRange(&value, &key);
   if (value == "auto") {
     key.color.automatic = true;
   } else if (fs::path(value).extension() == ".json") {

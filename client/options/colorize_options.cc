@@ -360,7 +360,7 @@ v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scen
   return spec;
 }
 
-void RequireOutBesidePhotos(const fs::path& out, const PhotoFolder& folder) {
+void RequireSeparateOutFolder(const fs::path& out, const PhotoFolder& folder) {
   const fs::path folder_out = Canonical(out);
   bool inside = false;
   for (const LocalFile& photo : folder.photos) {

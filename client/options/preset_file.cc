@@ -60,7 +60,7 @@ std::string WithRemedy(const std::string& complaint) {
   return complaint + "; `color3d server presets fast` prints a valid preset";
 }
 
-struct FirstComplaint : public google::protobuf::io::ErrorCollector {
+struct FirstError : public google::protobuf::io::ErrorCollector {
   void AddError(int at, google::protobuf::io::ColumnNumber, const std::string& what) override {
     if (!text.empty()) return;
     line = at;
@@ -99,7 +99,7 @@ void CheckValues(const Message& message,
   }
 }
 
-void RequireNothingOfOneScene(const v1::ColorizeSceneSpec& spec, const std::string& file) {
+void RejectSceneSpecificFields(const v1::ColorizeSceneSpec& spec, const std::string& file) {
   const bool one_scene = !spec.key_view().empty() || spec.has_key_color() ||
                          spec.colorize_key_view().has_source() || !spec.truth().empty() ||
                          !spec.training_truth().empty();
@@ -135,7 +135,7 @@ v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
                 name_or_file,
                 PresetNames());
   }
-  FirstComplaint complaint;
+  FirstError complaint;
   TextFormat::ParseInfoTree lines;
   TextFormat::Parser parser;
   parser.RecordErrorsTo(&complaint);
@@ -145,7 +145,7 @@ v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
     Complain(name_or_file, complaint.line, WithRemedy(complaint.text));
   }
   CheckValues(spec, lines, name_or_file);
-  RequireNothingOfOneScene(spec, name_or_file);
+  RejectSceneSpecificFields(spec, name_or_file);
   return spec;
 }
 

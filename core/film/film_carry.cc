@@ -134,7 +134,7 @@ struct Places {
   Image confidence;
 };
 
-void TakeWhereSurer(const Places& found, Places* followed) {
+void MergeMoreConfident(const Places& found, Places* followed) {
   constexpr float kLeastGain = 0.3f;  // of confidence
   for (size_t i = 0; i < found.confidence.data.size(); ++i) {
     if (found.confidence.data[i] <
@@ -155,13 +155,13 @@ double MeanOf(const Image& image) {
 }
 
 // Takes the tracks that features find, where they are more confident than flow.
-void TakeReappearing(const ReappearingRegions& again,
-                     const Image& frame,
-                     const Image& contrast,
-                     const Image& key_contrast,
-                     const FilmCarryOptions& options,
-                     const CancellationToken& cancel,
-                     FilmTrack* track) {
+void MergeReappearing(const ReappearingRegions& again,
+                      const Image& frame,
+                      const Image& contrast,
+                      const Image& key_contrast,
+                      const FilmCarryOptions& options,
+                      const CancellationToken& cancel,
+                      FilmTrack* track) {
   const auto in_key = [&](const FilmTrack& t) {
     return Places{t.in_key, ConfidenceOf(t.in_key, t.in_frame, contrast, key_contrast, options)};
   };
@@ -173,8 +173,8 @@ void TakeReappearing(const ReappearingRegions& again,
   Places of_key = in_frame(*track);
   for (const FilmTrack& other : again.TracksTo(frame, cancel)) {
     cancel.ThrowIfCancelled();
-    TakeWhereSurer(in_key(other), &of_frame);
-    TakeWhereSurer(in_frame(other), &of_key);
+    MergeMoreConfident(in_key(other), &of_frame);
+    MergeMoreConfident(in_frame(other), &of_key);
   }
   *track = {std::move(of_frame.place), std::move(of_key.place)};
 }
@@ -271,7 +271,7 @@ class Walker {
     return carried;
   }
 
-  FilmWalk Where() const {
+  FilmWalk Progress() const {
     const bool ends = frame_ == walk_.frames.back();
     return {walk_.key->frame, walk_.direction, frame_, moved_, wanted_, ends ? nullptr : track_};
   }
@@ -292,7 +292,7 @@ class Walker {
     cancel_.ThrowIfCancelled();
     Register(*key_, key_contrast_, next, contrast, &track->in_frame);
     cancel_.ThrowIfCancelled();
-    TakeReappearing(*again_, next, contrast, key_contrast_, options_, cancel_, track);
+    MergeReappearing(*again_, next, contrast, key_contrast_, options_, cancel_, track);
   }
 
   const Walk& walk_;
@@ -321,10 +321,10 @@ void DropFinished(const std::vector<FilmWalk>& walks, Walk* walk) {
   }
 }
 
-std::vector<Walk> WalksOf(const FilmFrames& frames,
-                          const std::vector<FilmKey>& keys,
-                          bool with_second,
-                          const std::vector<FilmWalk>& done) {
+std::vector<Walk> PlanWalks(const FilmFrames& frames,
+                            const std::vector<FilmKey>& keys,
+                            bool with_second,
+                            const std::vector<FilmWalk>& done) {
   const int count = static_cast<int>(frames.shot.size());
   std::vector<int> key_frames;
   for (const FilmKey& key : keys) key_frames.push_back(key.frame);
@@ -385,7 +385,7 @@ CarriedColor CarryIntoReappearing(const FilmKey& key,
   const Image contrast = LocalContrast(frame), key_contrast = LocalContrast(again.key());
   const Image nowhere(frame.width, frame.height, 2, kNowhere);
   FilmTrack track{nowhere, nowhere};
-  TakeReappearing(again, frame, contrast, key_contrast, options, cancel, &track);
+  MergeReappearing(again, frame, contrast, key_contrast, options, cancel, &track);
   return ColorOf(key, key_contrast, contrast, track, options);
 }
 
@@ -424,13 +424,13 @@ void CarryAlongFilm(const FilmFrames& frames,
       const int frame = walk->frames[i];
       const CarriedColor color = walker.GoTo(frame);
       const std::lock_guard lock(handing_over);
-      if (resume.on_walk) resume.on_walk(walker.Where());
+      if (resume.on_walk) resume.on_walk(walker.Progress());
       to(frame, color);
     }
-    walk->before = walker.Where();
+    walk->before = walker.Progress();
     walk->Drop(count);
   };
-  std::vector<Walk> walks = WalksOf(frames, keys, on_second != nullptr, resume.walks);
+  std::vector<Walk> walks = PlanWalks(frames, keys, on_second != nullptr, resume.walks);
   const auto count = static_cast<int64_t>(walks.size());
   pool.ForEach(count, [&](int64_t i, int) { go(walks[i].nearest, on_frame, &walks[i]); });
   pool.ForEach(count, [&](int64_t i, int) { go(walks[i].frames.size(), on_second, &walks[i]); });

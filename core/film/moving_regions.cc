@@ -53,7 +53,7 @@ Image Texture(const Image& luminance) {
 }
 
 // Reliable flow of `from`. `there`: from it to the other frame; `back`: from that one.
-Flow SureFlow(const Image& from, const Image& there, const Image& back) {
+Flow ConsistentFlow(const Image& from, const Image& there, const Image& back) {
   Flow flow{there, std::vector<char>(from.PlaneSize(), 0), {}, Texture(from)};
   for (int y = 0; y < from.height; ++y) {
     for (int x = 0; x < from.width; ++x) {
@@ -165,7 +165,7 @@ double MedianTexture(const Flow& flow) {
 PairResidual Compare(const Image& from, const Image& there, const Image& back) {
   PairResidual result;
   result.excess = Image(from.width, from.height, 1, -1.0f);
-  const Flow flow = SureFlow(from, there, back);
+  const Flow flow = ConsistentFlow(from, there, back);
   if (flow.sample.size() < kLeastSamples) return result;
   result.background_px = MedianLength(flow);
   const std::optional<CameraModel> account =
@@ -290,7 +290,7 @@ ShotMotion MotionOfCamera(const ShotFrames& frames,
   pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
     const auto from = frames.luminance(pairs[i].first), to = frames.luminance(pairs[i].second);
-    const Flow flow = SureFlow(*from, DenseFlow(*from, *to), DenseFlow(*to, *from));
+    const Flow flow = ConsistentFlow(*from, DenseFlow(*from, *to), DenseFlow(*to, *from));
     if (flow.sample.size() >= kLeastSamples) shift[i] = MedianLength(flow);
   });
   std::erase_if(shift, [](double px) { return px < 0.0; });

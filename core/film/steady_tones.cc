@@ -178,7 +178,7 @@ ToneCurve CurveOf(const std::vector<std::optional<ToneStep>>& steps, int at) {
   return curve;
 }
 
-float Under(const ToneCurve& curve, double tone) {
+float CurveValue(const ToneCurve& curve, double tone) {
   if (curve.empty()) return static_cast<float>(tone);
   const double place = std::clamp(tone, 0.0, 100.0) / 100.0 * (kTones - 1);
   const int below = std::min(static_cast<int>(place), kTones - 2);
@@ -226,8 +226,8 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
       for (int i = 0; i < kKnots; ++i) {
         const double from = steps[k]->from[i], to = steps[k]->to[i];
         before += std::abs(to - from);
-        after += std::abs(Under(result.curves[frames[k + 1]], to) -
-                          Under(result.curves[frames[k]], from));
+        after += std::abs(CurveValue(result.curves[frames[k + 1]], to) -
+                          CurveValue(result.curves[frames[k]], from));
         ++compared;
       }
     }
@@ -239,9 +239,9 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
   return result;
 }
 
-Image Toned(Image luminance, const ToneCurve& curve) {
+Image ApplyToneCurve(Image luminance, const ToneCurve& curve) {
   if (curve.empty()) return luminance;
-  for (float& v : luminance.data) v = Under(curve, v);
+  for (float& v : luminance.data) v = CurveValue(curve, v);
   return luminance;
 }
 

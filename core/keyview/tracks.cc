@@ -58,8 +58,8 @@ std::vector<double> TrackCoverage(const std::vector<std::vector<int>>& tracks,
   return scores;
 }
 
-std::string WhyTracksAreNoUse(const std::vector<std::vector<int>>& tracks,
-                              const std::vector<bool>& kept) {
+std::string TracksProblem(const std::vector<std::vector<int>>& tracks,
+                          const std::vector<bool>& kept) {
   std::vector<double> points(kept.size(), 0.0);
   for (const auto& track : tracks) {
     CheckTrack(track, kept.size());

@@ -46,10 +46,10 @@ TEST(TrackCoverageTest, PrefersMiddleOfAPath) {
 
 TEST(TrackCoverageTest, ReportsUnusableTracks) {
   const std::vector<bool> kept(4, true);
-  EXPECT_NE(WhyTracksAreNoUse({}, kept), "");
-  EXPECT_EQ(WhyTracksAreNoUse(Tracks(20, {0, 1, 2}), kept), "");
-  EXPECT_NE(WhyTracksAreNoUse(Tracks(19, {0, 1, 2}), kept), "");
-  EXPECT_NE(WhyTracksAreNoUse(Tracks(100, {2}), kept), "");
+  EXPECT_NE(TracksProblem({}, kept), "");
+  EXPECT_EQ(TracksProblem(Tracks(20, {0, 1, 2}), kept), "");
+  EXPECT_NE(TracksProblem(Tracks(19, {0, 1, 2}), kept), "");
+  EXPECT_NE(TracksProblem(Tracks(100, {2}), kept), "");
   EXPECT_THROW(TrackCoverage({{0, 4}}, kept), Error);
   EXPECT_THROW(TrackCoverage({{-1}}, kept), Error);
 }

@@ -69,7 +69,7 @@ std::vector<double> ShiftedTimes(const std::vector<FrameTime>& frames) {
   return times;
 }
 
-bool SomeShareATime(std::vector<double> times) {
+bool HasEqualTimes(std::vector<double> times) {
   std::sort(times.begin(), times.end());
   return std::adjacent_find(times.begin(), times.end()) != times.end();
 }
@@ -173,7 +173,7 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
         fmt::format("all {} frames were taken at one time: the scene is static", frames.size());
     return result;
   }
-  const bool by_folder = !named && SomeShareATime(times);
+  const bool by_folder = !named && HasEqualTimes(times);
   std::map<std::string, int> shots;
   std::vector<std::string> camera(frames.size());
   for (size_t i = 0; i < frames.size(); ++i) {

@@ -91,7 +91,7 @@ std::vector<double> Scene::Times() const {
   return {times.begin(), times.end()};
 }
 
-std::vector<int> Scene::FramesOfShotOf(int view) const {
+std::vector<int> Scene::FramesInShot(int view) const {
   std::vector<int> frames = ViewsInOrderOfTime();
   std::erase_if(frames, [&](int i) { return views[i].moment->shot != views[view].moment->shot; });
   return frames;

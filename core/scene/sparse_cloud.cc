@@ -46,7 +46,7 @@ std::vector<int> AllViewsFacing(const Scene& scene, const Eigen::Vector3d& world
   return views;
 }
 
-bool MostLookAt(const Scene& scene, const Eigen::Vector3d& world) {
+bool IsInFrontOfMostViews(const Scene& scene, const Eigen::Vector3d& world) {
   size_t in_front = 0;
   for (const View& view : scene.views) in_front += view.cam_from_world.Apply(world).z() > 0.0;
   return 2 * in_front > scene.views.size();
@@ -90,11 +90,11 @@ Eigen::Vector3d FocusPoint(const Scene& scene) {
   }
   const Eigen::Vector3d focus = a.ldlt().solve(b);
   // Diverging axes meet behind the cameras; that point is useless.
-  return MostLookAt(scene, focus) ? focus : fallback;
+  return IsInFrontOfMostViews(scene, focus) ? focus : fallback;
 }
 
 std::vector<int> ViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
-  return EvenlyOf(AllViewsFacing(scene, world, near), kMaxListedViews);
+  return PickEvenly(AllViewsFacing(scene, world, near), kMaxListedViews);
 }
 
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed) {
@@ -106,7 +106,8 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
   for (const View& view : scene.views) distance += (view.cam_from_world.Center() - focus).norm();
   distance /= static_cast<double>(scene.views.size());
   // Cameras look outward from one place: the scene is around them.
-  if (!MostLookAt(scene, focus)) distance = std::max(distance, 5.0 * Baseline(scene, mean));
+  if (!IsInFrontOfMostViews(scene, focus))
+    distance = std::max(distance, 5.0 * Baseline(scene, mean));
   const double near = 0.15 * distance;
   const size_t wanted_views = std::max<size_t>(2, (scene.views.size() + 3) / 4);
   // Views without any overlap would never give a point: after enough misses one view is enough.
@@ -125,7 +126,7 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     point.views = AllViewsFacing(scene, point.position, near);
     const bool relaxed = attempt >= patience;
     if (point.views.size() < (relaxed ? 1 : std::min(wanted_views, scene.views.size()))) continue;
-    point.views = EvenlyOf(std::move(point.views), kMaxListedViews);
+    point.views = PickEvenly(std::move(point.views), kMaxListedViews);
     point.reprojection_error_px = -1.0;
     points.push_back(std::move(point));
   }

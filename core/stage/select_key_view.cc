@@ -79,12 +79,12 @@ void ChooseManually(const std::string& name,
 
 // Selects several key views. A view that the user names remains the first. Visibility between views
 // comes from the geometry of an earlier job, if there is one.
-void ChooseTogether(const SelectKeyViewOptions& options,
-                    const Scene& scene,
-                    const std::vector<int>& candidates,
-                    const std::vector<bool>& kept,
-                    StageContext& context,
-                    KeyViewRanking* ranking) {
+void ChooseKeyViewSet(const SelectKeyViewOptions& options,
+                      const Scene& scene,
+                      const std::vector<int>& candidates,
+                      const std::vector<bool>& kept,
+                      StageContext& context,
+                      KeyViewRanking* ranking) {
   int first = -1;
   if (options.selection.strategy == KeyViewStrategy::kManual) {
     ChooseManually(options.view, scene, candidates, ranking);
@@ -153,7 +153,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   if (strategy == KeyViewStrategy::kTracks) {
     const auto tracks = TracksOf(scene, candidates, context);
     const std::string reason = tracks.empty() ? "the scene has no points from structure-from-motion"
-                                              : WhyTracksAreNoUse(tracks, kept);
+                                              : TracksProblem(tracks, kept);
     if (reason.empty()) {
       scores = TrackCoverage(tracks, kept);
     } else {
@@ -170,10 +170,10 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   ranking->strategy = StrategyName(strategy);
   ranking->selection = RankViews(std::move(guarded), scores);
   if (!scene.capture().is_reconstructed &&
-      TakeFromLongestShot(scene, candidates, &ranking->selection)) {
+      PreferLongestShot(scene, candidates, &ranking->selection)) {
     ranking->among = "the film's longest shot";
   }
-  if (options.count > 1) ChooseTogether(stage_options, scene, candidates, kept, context, ranking);
+  if (options.count > 1) ChooseKeyViewSet(stage_options, scene, candidates, kept, context, ranking);
 }
 
 // Names of the views that the guard excluded.

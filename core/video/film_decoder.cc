@@ -23,7 +23,7 @@ constexpr int kResyncPackets = 250;
 
 // In other codecs packets may legitimately produce no picture: a repeat, or a picture that is never
 // shown.
-bool EveryPacketIsAPicture(AVCodecID codec) {
+bool IsIntraOnly(AVCodecID codec) {
   return codec == AV_CODEC_ID_H264 || codec == AV_CODEC_ID_HEVC ||
          codec == AV_CODEC_ID_MPEG2VIDEO || codec == AV_CODEC_ID_MPEG1VIDEO;
 }
@@ -192,8 +192,8 @@ bool FilmDecoder::Feed() {
 }
 
 // Marks frames up to `frame` that were not output as missing.
-void FilmDecoder::PassTo(int frame) {
-  if (EveryPacketIsAPicture(codec_->codec_id)) {
+void FilmDecoder::MarkMissingUpTo(int frame) {
+  if (IsIntraOnly(codec_->codec_id)) {
     for (int missing = passed_ + 1; missing < frame; ++missing) {
       NoteDamage(index_.packet_of_frame[missing]);
     }
@@ -210,7 +210,7 @@ void FilmDecoder::Take(std::unique_ptr<AVFrame, FreeFrame> picture) {
   if (is_flagged) NoteDamage(static_cast<int>(packet));
   const FilmPacket& from = index_.packets[packet];
   if (!from.is_shown || from.frame <= passed_) return;
-  PassTo(from.frame);
+  MarkMissingUpTo(from.frame);
   waiting_.push_back({static_cast<int>(packet), is_flagged, std::move(picture)});
 }
 
@@ -226,7 +226,7 @@ bool FilmDecoder::Receive() {
     if (result != AVERROR_EOF && result != AVERROR(EAGAIN)) NoteDamage(next_ - 1);
     if (result == AVERROR_EOF || !Feed()) {
       has_ended_ = true;
-      PassTo(static_cast<int>(index_.stamps.size()));
+      MarkMissingUpTo(static_cast<int>(index_.stamps.size()));
     }
   }
   return false;

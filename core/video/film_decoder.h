@@ -47,7 +47,7 @@ class FilmDecoder {
   bool Feed();
   bool Receive();
   void Take(std::unique_ptr<AVFrame, FreeFrame> picture);
-  void PassTo(int frame);
+  void MarkMissingUpTo(int frame);
   bool Await();
   bool Find(int frame);
 

@@ -17,7 +17,7 @@ bool IsOn(const v1::ExportSpec& spec, const FieldDescriptor* field) {
                                                             : reflection->GetInt32(spec, field) > 0;
 }
 
-bool IsOnWhenUnset(ExportDefault by_default, const std::set<ExportFormat>& formats) {
+bool IsDefaultOn(ExportDefault by_default, const std::set<ExportFormat>& formats) {
   switch (by_default) {
     case ExportDefault::kOff:
       return false;
@@ -43,7 +43,7 @@ std::set<ExportFormat> AskedFormats(const v1::ExportSpec& spec) {
         throw Error(ErrorCode::kInternal, "ExportSpec has no option '{}'", info.option);
       }
       const bool on =
-          IsSet(spec, field) ? IsOn(spec, field) : IsOnWhenUnset(info.by_default, formats);
+          IsSet(spec, field) ? IsOn(spec, field) : IsDefaultOn(info.by_default, formats);
       if (on) formats.insert(info.format);
     }
   };

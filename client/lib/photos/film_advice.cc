@@ -135,7 +135,7 @@ std::string Remedy(const fs::path& file, Kind kind) {
   return "";
 }
 
-std::string What(const Ending& ending) {
+std::string DescribeEnding(const Ending& ending) {
   switch (ending.kind) {
     case Kind::kAnimation:
       return fmt::format("an animated picture ({})", ending.name);
@@ -184,7 +184,8 @@ std::vector<fs::path> FilesBelow(const fs::path& folder, int depth) {
 std::string FilmAdvice(const fs::path& file) {
   const Ending* ending = EndingOf(file);
   if (ending == nullptr) return "";
-  return fmt::format("{} is {}; {}", file.string(), What(*ending), Remedy(file, ending->kind));
+  return fmt::format(
+      "{} is {}; {}", file.string(), DescribeEnding(*ending), Remedy(file, ending->kind));
 }
 
 std::string FolderAdvice(const fs::path& folder) {
@@ -199,7 +200,7 @@ std::string FolderAdvice(const fs::path& folder) {
     });
     return fmt::format("; {} is {}{}: {}",
                        first->string(),
-                       What(*ending),
+                       DescribeEnding(*ending),
                        count > 1 ? fmt::format(", as {} more are", count - 1) : "",
                        Remedy(*first, ending->kind));
   }

@@ -198,7 +198,7 @@ bool HasPoses(const fs::path& root) {
          !FilesOfColmap(root).empty();
 }
 
-std::string PosesBeside(const fs::path& root) {
+std::string FindSiblingPoses(const fs::path& root) {
   for (const char* folder : {"sparse", "colmap"}) {
     if (IsFolder(root / folder)) return (root / folder).string();
   }
@@ -208,7 +208,7 @@ std::string PosesBeside(const fs::path& root) {
   return IsFile(poses_bounds) ? poses_bounds.string() : "";
 }
 
-std::string OnlyFolderOfPhotos(const fs::path& root) {
+std::string FindSinglePhotoFolder(const fs::path& root) {
   std::string found;
   for (const std::string& folder : FoldersIn(root)) {
     if (IsAugmentFile(folder + "/") || IsMaskFile(folder + "/")) continue;

@@ -125,7 +125,7 @@ void CollectImages(const fs::path& root, PhotoFolder* result, SkippedFiles* skip
     }
   }
   if (!result->photos.empty()) return AddUnusedNeighbors(root, used, skipped);
-  if (HasPoses(root)) AddPhotosAsImages(root, OnlyFolderOfPhotos(root), result, skipped);
+  if (HasPoses(root)) AddPhotosAsImages(root, FindSinglePhotoFolder(root), result, skipped);
 }
 
 // Includes all files, so that one of the wrong kind is refused by name instead of being skipped.
@@ -281,7 +281,7 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   CheckNames(result);
   const fs::path parent = fs::absolute(result.root).parent_path();
   if (result.model_files.empty() && !result.splat && !result.film) {
-    const std::string poses = PosesBeside(parent);
+    const std::string poses = FindSiblingPoses(parent);
     if (!poses.empty()) {
       result.notes.push_back("the poses in " + poses + " are not used; to use them, give " +
                              parent.string());

@@ -30,22 +30,22 @@ bool AllHaveTimes(const Scene& scene) {
 
 }  // namespace
 
-const char* NameOf(HeldOutAs how) {
+const char* NameOf(HoldOutKind how) {
   switch (how) {
-    case HeldOutAs::kCamera:
+    case HoldOutKind::kCamera:
       return "camera";
-    case HeldOutAs::kMoment:
+    case HoldOutKind::kMoment:
       return "moment";
-    case HeldOutAs::kBlock:
+    case HoldOutKind::kBlock:
       return "block";
-    case HeldOutAs::kNot:
+    case HoldOutKind::kNot:
       break;
   }
   return "";
 }
 
-std::vector<HeldOutAs> HeldOutKinds(const Scene& scene) {
-  std::vector<HeldOutAs> how(scene.views.size(), HeldOutAs::kNot);
+std::vector<HoldOutKind> HeldOutKinds(const Scene& scene) {
+  std::vector<HoldOutKind> how(scene.views.size(), HoldOutKind::kNot);
   if (!AllHaveTimes(scene)) return how;
   const std::vector<double> times = scene.Times();
   const std::set<double> learnt_from = TrainingTimes(scene);
@@ -58,11 +58,11 @@ std::vector<HeldOutAs> HeldOutKinds(const Scene& scene) {
     const View& view = scene.views[i];
     if (!view.held_out) continue;
     if (scene.capture().is_reconstructed && !cameras.contains(view.moment->shot)) {
-      how[i] = HeldOutAs::kCamera;
+      how[i] = HoldOutKind::kCamera;
       continue;
     }
     const auto time = std::lower_bound(times.begin(), times.end(), view.time_s()) - times.begin();
-    how[i] = is_open(time - 1) || is_open(time + 1) ? HeldOutAs::kBlock : HeldOutAs::kMoment;
+    how[i] = is_open(time - 1) || is_open(time + 1) ? HoldOutKind::kBlock : HoldOutKind::kMoment;
   }
   return how;
 }

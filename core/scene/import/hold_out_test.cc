@@ -66,28 +66,28 @@ TEST(HeldOutKindsTest, TellsCamerasMomentsAndBlocksApart) {
     view.held_out = t % 8 == 4 || view.moment->shot == 1;
   }
   HoldOutBlock(0.1, &scene);  // 18 to 21, and 20 was held out before
-  const std::vector<HeldOutAs> how = HeldOutKinds(scene);
+  const std::vector<HoldOutKind> how = HeldOutKinds(scene);
   for (size_t i = 0; i < how.size(); ++i) {
     const View& view = scene.views[i];
     const int t = static_cast<int>(2.0 * view.moment->time_s);
-    const HeldOutAs expected = view.moment->shot == 1 ? HeldOutAs::kCamera
-                               : t >= 18 && t < 22    ? HeldOutAs::kBlock
-                               : t % 8 == 4           ? HeldOutAs::kMoment
-                                                      : HeldOutAs::kNot;
+    const HoldOutKind expected = view.moment->shot == 1 ? HoldOutKind::kCamera
+                                 : t >= 18 && t < 22    ? HoldOutKind::kBlock
+                                 : t % 8 == 4           ? HoldOutKind::kMoment
+                                                        : HoldOutKind::kNot;
     EXPECT_EQ(how[i], expected) << view.name;
   }
-  EXPECT_STREQ(NameOf(HeldOutAs::kBlock), "block");
+  EXPECT_STREQ(NameOf(HoldOutKind::kBlock), "block");
 }
 
 TEST(HeldOutKindsTest, ShotsAreBlocksAndPhotosAreNot) {
   Scene film = SceneOf(1, 30, /*film=*/true);
   for (int t = 10; t < 20; ++t) film.views[t].held_out = true;  // a whole shot
   ASSERT_FALSE(film.capture().is_reconstructed);
-  EXPECT_EQ(HeldOutKinds(film)[12], HeldOutAs::kBlock);
+  EXPECT_EQ(HeldOutKinds(film)[12], HoldOutKind::kBlock);
   Scene photos = SceneOf(1, 8);
   for (View& view : photos.views) view.moment.reset();
   photos.views[0].held_out = true;
-  EXPECT_EQ(HeldOutKinds(photos)[0], HeldOutAs::kNot);
+  EXPECT_EQ(HeldOutKinds(photos)[0], HoldOutKind::kNot);
 }
 
 }  // namespace

@@ -116,7 +116,7 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   }
   const SubprocessResult result = running.get();
   if (result.timed_out) ThrowTooSlow();
-  if (result.signal != 0 && LogSays("std::bad_alloc")) {
+  if (result.signal != 0 && LogContains("std::bad_alloc")) {
     throw Error(ErrorCode::kResourceExhausted,
                 "colmap {} ran out of memory at the {} MiB that it may take; use fewer photos or "
                 "fewer features, or {}; log: {}",
@@ -158,7 +158,7 @@ void ColmapProcess::ThrowTooSlow() const {
               timeout_.count());
 }
 
-bool ColmapProcess::LogSays(const std::string& text) const {
+bool ColmapProcess::LogContains(const std::string& text) const {
   std::ifstream in(log_);
   std::string line;
   while (std::getline(in, line)) {

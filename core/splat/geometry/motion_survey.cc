@@ -44,7 +44,7 @@ Image ResidualOf(const SurveyedView& view) {
 void SubtractTemporalMedian(const std::vector<size_t>& frames,
                             ThreadPool& pool,
                             std::vector<Image>& residuals) {
-  const std::vector<size_t> some = EvenlyOf(frames, kMedianFrames);
+  const std::vector<size_t> some = PickEvenly(frames, kMedianFrames);
   const auto pixels = static_cast<int64_t>(residuals[frames.front()].data.size());
   pool.ForRanges(pixels, [&](int64_t begin, int64_t end, int) {
     std::vector<double> values(some.size());

@@ -249,7 +249,7 @@ class ShotColorer {
       open[i] = ShareOpen(carried[i], (*of_anchors)[gap.begin + i]);
     };
     for (size_t i = 0; i < frames.size(); ++i) {
-      carried.push_back(std::move(CarriedInto(frames[i]).confidence));
+      carried.push_back(std::move(PropagatedColor(frames[i]).confidence));
       measure(i);
     }
     for (size_t left = frames.size(); left > 0; --left) {
@@ -264,13 +264,13 @@ class ShotColorer {
                 [&](int frame, const CarriedColor& color) {
                   const auto i = std::find(frames.begin(), frames.end(), frame) - frames.begin();
                   if (open[i] == 0.0) return;
-                  TakeNeighborsColor(color, &(*of_anchors)[gap.begin + i]);
+                  FillFromNeighbor(color, &(*of_anchors)[gap.begin + i]);
                   measure(i);
                 });
     }
   }
 
-  CarriedColor CarriedInto(int frame) const {
+  CarriedColor PropagatedColor(int frame) const {
     const int view = view_of_frame_[frame];
     const Camera camera = images_.WorkingCamera(view);
     return ReadCarried(context_, scene_.views[view], camera.width, camera.height);
@@ -281,7 +281,7 @@ class ShotColorer {
     context_.cancel().ThrowIfCancelled();
     const int view = view_of_frame_[frame];
     const auto luminance = frames_.luminance(frame);
-    const CarriedColor carried = CarriedInto(frame);
+    const CarriedColor carried = PropagatedColor(frame);
     ColorSources sources = coloring_.sources(view);
     if (of_anchors != nullptr) {
       if (!guessed_.contains(shot_.AnchorUpTo(frame)) &&

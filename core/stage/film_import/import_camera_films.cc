@@ -64,7 +64,7 @@ class CameraFilmsImport {
       result.layout = CaptureLayout::kFilms;
     }
     result.photos_found = count_;
-    TellMoments(&result);
+    ReportTimes(&result);
     FinishPosedScene(options, &result);
     KeepFrames(result.scene);
     return result;
@@ -144,7 +144,7 @@ class CameraFilmsImport {
     return std::move(placed.result);
   }
 
-  void TellMoments(ImportResult* result) {
+  void ReportTimes(ImportResult* result) {
     std::vector<FrameTime> times;
     std::map<std::string, size_t> frames;
     for (const View& view : result->scene.views) {

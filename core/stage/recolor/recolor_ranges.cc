@@ -197,7 +197,7 @@ class RangeColorer {
                    keep,
                    {},
                    [&](int frame, const CarriedColor& second) {
-                     CarriedColor color = CarriedInto(frame);
+                     CarriedColor color = PropagatedColor(frame);
                      if (FillOpen(second, &color) > 0) keep(frame, color);
                    });
   }
@@ -206,7 +206,7 @@ class RangeColorer {
     return folder_ / fmt::format("{}_{}.png", what, frame);
   }
 
-  CarriedColor CarriedInto(int frame) const {
+  CarriedColor PropagatedColor(int frame) const {
     const AbMap map = DecodeAbPng(ReadFile(FileOf(frame, "colors")), "colors");
     const Image painted = DecodeImage(ReadFile(FileOf(frame, "painted")), "painted");
     CarriedColor color{Image(map.ab.width, map.ab.height, 3), map.confidence};
@@ -248,7 +248,7 @@ class RangeColorer {
         picture.ab,
         {},
         ReadProvenance(film_.context, film_.scene.views[view], luminance.width, luminance.height),
-        CarriedInto(frame)};
+        PropagatedColor(frame)};
     if (corrector_) {
       CorrectedColor corrected = corrector_->Predict(picture, 0);
       for (size_t i = 0; i < recolored.changed.data.size(); ++i) {
