@@ -205,7 +205,7 @@ void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& 
     if (error.IsTransient() && backoff->Wait(cancel_, error.RetryDelay())) continue;
     if (turned_away.Wait(error)) continue;
     if (error.grpc_code() == grpc::StatusCode::UNAVAILABLE && error.IsUnreachable()) {
-      throw LostServerError(address_);
+      throw ConnectionLostError(address_);
     }
     throw WithRequestId(error, status, context);
   }
@@ -218,7 +218,7 @@ Error UnreachableError(const std::string& address) {
                address);
 }
 
-Error LostServerError(const std::string& address) {
+Error ConnectionLostError(const std::string& address) {
   return Error(ErrorCode::kUnavailable,
                "lost the server at {}, which was there before; run the command again when it is "
                "back (what it was sent is kept)",

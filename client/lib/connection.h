@@ -138,6 +138,6 @@ class FullServerWait {
 Error UnreachableError(const std::string& address);
 
 // "lost the server at ...": for a server that answered before.
-Error LostServerError(const std::string& address);
+Error ConnectionLostError(const std::string& address);
 
 }  // namespace color3d::client

@@ -39,7 +39,7 @@ class Download {
           status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) {
         throw RpcError(status);
       }
-      if (!backoff.Wait(connection_.cancel())) throw LostServerError(connection_.address());
+      if (!backoff.Wait(connection_.cancel())) throw ConnectionLostError(connection_.address());
     }
     if (digest_.size_bytes == 0) std::ofstream(part_, std::ios::binary);
     if (DigestFile(part_).sha256 == digest_.sha256) return;
@@ -101,7 +101,7 @@ class Download {
   int64_t received_ = 0;
 };
 
-bool HoldsAlready(const fs::path& path, const FileDigest& digest) {
+bool HasSameContent(const fs::path& path, const FileDigest& digest) {
   std::error_code none;
   if (!fs::is_regular_file(fs::symlink_status(path, none))) return false;
   if (static_cast<int64_t>(fs::file_size(path, none)) != digest.size_bytes) return false;
@@ -122,7 +122,7 @@ void DownloadBlob(Connection& connection,
                 digest.sha256,
                 digest.size_bytes);
   }
-  if (HoldsAlready(path, digest)) return progress(digest.size_bytes);
+  if (HasSameContent(path, digest)) return progress(digest.size_bytes);
   std::error_code error;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
   if (error) {

@@ -58,7 +58,7 @@ void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
   if (job.state() == v1::Job::STATE_RUNNING) Draw(ProgressLine(job, Width()));
 }
 
-bool ProgressDisplay::SomethingRuns() const {
+bool ProgressDisplay::IsAnyStageRunning() const {
   return std::any_of(unfinished_.begin(), unfinished_.end(), [](const auto& job) {
     return job.second == v1::Job::STATE_RUNNING;
   });
@@ -66,7 +66,7 @@ bool ProgressDisplay::SomethingRuns() const {
 
 void ProgressDisplay::OnTick(const std::function<v1::Job()>& look) {
   const auto now = steady_clock::now();
-  if (unfinished_.empty() || SomethingRuns() || now - idle_since_ < kIdle) return;
+  if (unfinished_.empty() || IsAnyStageRunning() || now - idle_since_ < kIdle) return;
   if (now - last_look_ >= kIdle) {
     last_look_ = now;
     try {

@@ -37,7 +37,7 @@ class ProgressDisplay {
  private:
   void Draw(const std::string& line);
   int Width() const;
-  bool SomethingRuns() const;
+  bool IsAnyStageRunning() const;
 
   const bool quiet_;
   const bool terminal_;

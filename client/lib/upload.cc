@@ -62,7 +62,7 @@ class Upload {
         if (!status.ok()) ThrowIfFinal(status);
         if (!backoff.Wait(connection_.cancel())) GiveUp(status);
       }
-      AskCommitted();
+      QueryCommittedSize();
     }
   }
 
@@ -104,7 +104,7 @@ class Upload {
     return status;
   }
 
-  void AskCommitted() {
+  void QueryCommittedSize() {
     bs::QueryWriteStatusRequest request;
     request.set_resource_name(resource_);
     const auto response =
@@ -124,7 +124,7 @@ class Upload {
 
   [[noreturn]] void GiveUp(const grpc::Status& status) const {
     if (status.ok() || RpcError(status).IsUnreachable()) {
-      throw LostServerError(connection_.address());
+      throw ConnectionLostError(connection_.address());
     }
     throw RpcError(status);
   }

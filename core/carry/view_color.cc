@@ -23,7 +23,7 @@ bool WantsGuess(const CarriedColor& carried, const Image& distance, const Fusion
 }
 
 // 1 where what was carried decides alone.
-Image SurelyCarried(const CarriedColor& carried) {
+Image ConfidentMask(const CarriedColor& carried) {
   Image sure = carried.confidence;
   for (float& value : sure.data) value = value > kDecisiveConfidence ? 1.0f : 0.0f;
   return sure;
@@ -47,7 +47,7 @@ FusedColor ColorOfView(const Image& luminance,
                        const CancellationToken& cancel) {
   FusionOptions options;
   options.relative_chroma = sources.relative_chroma;
-  const Image known = SurelyCarried(carried);
+  const Image known = ConfidentMask(carried);
   InferredColor inferred = sources.infer(luminance, known);
   CopyKnown(carried, known, &inferred.ab);
   const bool guess = WantsGuess(carried, inferred.distance, options);

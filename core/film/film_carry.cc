@@ -241,7 +241,7 @@ class Walker {
     }
   }
 
-  CarriedColor GoTo(int frame) {
+  CarriedColor CarryTo(int frame) {
     cancel_.ThrowIfCancelled();
     const auto next = frames_.luminance(frame);
     const Image contrast = LocalContrast(*next);
@@ -422,7 +422,7 @@ void CarryAlongFilm(const FilmFrames& frames,
     Walker walker(*walk, frames, options, cancel);
     for (size_t i = 0; i < count; ++i) {
       const int frame = walk->frames[i];
-      const CarriedColor color = walker.GoTo(frame);
+      const CarriedColor color = walker.CarryTo(frame);
       const std::lock_guard lock(handing_over);
       if (resume.on_walk) resume.on_walk(walker.Progress());
       to(frame, color);

@@ -39,8 +39,8 @@ double Difference(const Image& one, const Image& other, int dx, int dy) {
   return sum / (static_cast<double>(x1 - x0) * (y1 - y0));
 }
 
-// Unlikeness of two normalised pictures.
-double UnlikenessOf(const Image& one, const Image& other) {
+// ShotDissimilarity of two normalised pictures.
+double PictureDissimilarity(const Image& one, const Image& other) {
   double best = 1e9;
   const int limit_x = std::min(kMaxShiftPx, one.width / 4),
             limit_y = std::min(kMaxShiftPx, one.height / 4);
@@ -65,12 +65,12 @@ double Usual(const std::vector<double>& steps, int k) {
 
 }  // namespace
 
-double Unlikeness(const Image& one, const Image& other) {
+double ShotDissimilarity(const Image& one, const Image& other) {
   if (one.channels != 1 || other.channels != 1 || one.width != other.width ||
       one.height != other.height || one.Empty()) {
     throw InvalidArgument("shots are found in pictures of one channel and one size");
   }
-  return UnlikenessOf(Normalised(one), Normalised(other));
+  return PictureDissimilarity(Normalised(one), Normalised(other));
 }
 
 FilmShots FindShots(const std::vector<Image>& thumbnails) {
@@ -95,7 +95,7 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   }
   std::vector<double> steps;  // between kept frames k and k + 1
   for (size_t k = 0; k + 1 < kept.size(); ++k) {
-    steps.push_back(UnlikenessOf(normalised[k], normalised[k + 1]));
+    steps.push_back(PictureDissimilarity(normalised[k], normalised[k + 1]));
   }
   const auto is_cut = [&](int k) {
     return steps[k] > kCutUnlikeness && steps[k] > kCutOverUsual * Usual(steps, k);
@@ -107,7 +107,8 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   for (int k = 0; k < count_of_steps; ++k) {
     for (int aliens = 1; cut[k] && aliens <= kMostAlien && k + aliens < count_of_steps; ++aliens) {
       if (!cut[k + aliens]) continue;
-      if (UnlikenessOf(normalised[k], normalised[k + aliens + 1]) > kCutUnlikeness) continue;
+      if (PictureDissimilarity(normalised[k], normalised[k + aliens + 1]) > kCutUnlikeness)
+        continue;
       for (int i = 1; i <= aliens; ++i) result.fault[kept[k + i]] = FrameFault::kAlien;
       std::fill_n(cut.begin() + k, aliens + 1, false);
     }

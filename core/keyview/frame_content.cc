@@ -68,7 +68,7 @@ double MeanLaplacian(const Image& image) {
 }
 
 // 1 - E[(difference of neighbours)^2] / (2 variance).
-double NeighbourCorrelation(const Image& image, double variance) {
+double NeighborCorrelation(const Image& image, double variance) {
   double sum = 0.0;
   double count = 0.0;
   for (int y = 0; y < image.height; ++y) {
@@ -110,7 +110,7 @@ FrameContent MeasureFrameContent(const Image& luminance) {
   return {std::sqrt(whole.variance),
           MeanLaplacian(finite),
           StructuredShare(finite),
-          NeighbourCorrelation(finite, whole.variance)};
+          NeighborCorrelation(finite, whole.variance)};
 }
 
 std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames,

@@ -40,8 +40,8 @@ class FilmDecoder {
   void StartAt(int packet);
   bool SeekTo(int packet, int goal);
   bool ReadUpTo(int packet, bool to_the_end);
-  bool IsLike(int packet) const;
-  bool IsThat(int packet) const;
+  bool HasSizeAndPosition(int packet) const;
+  bool IsPacket(int packet) const;
   int PlacedBefore(int packet) const;
   int Recognize();
   bool Feed();

@@ -42,7 +42,7 @@ constexpr UnreadPoses kUnreadPoses[] = {{"cameras.xml", "Agisoft Metashape"},
                                         {"sfm.json", "Meshroom"}};
 
 // Normalises the separators of a path from a user's file.
-std::string OurPath(std::string path) {
+std::string NormalizedPath(std::string path) {
   std::replace(path.begin(), path.end(), '\\', '/');
   while (path.starts_with("./")) path.erase(0, 2);
   return path;
@@ -114,7 +114,7 @@ std::vector<std::string> FilesOfColmap(const fs::path& root) {
 std::string FileOfPoints(const fs::path& root, const std::string& transforms) {
   const json named = ReadTransforms(root / transforms).value("ply_file_path", json());
   if (named.is_string()) {
-    const std::string path = OurPath(named.get<std::string>());
+    const std::string path = NormalizedPath(named.get<std::string>());
     for (const std::string& file : {path, path.substr(path.rfind('/') + 1)}) {
       if (IsSafeRelativePath(file) && IsFile(root / file)) return file;
     }
@@ -175,7 +175,7 @@ std::set<std::string> FoldersInTransforms(const fs::path& root) {
     for (const json& frame : transforms["frames"]) {
       if (!frame.is_object() || !frame.contains("file_path")) continue;
       if (!frame["file_path"].is_string()) continue;
-      const std::string path = OurPath(frame["file_path"].get<std::string>());
+      const std::string path = NormalizedPath(frame["file_path"].get<std::string>());
       const size_t slash = path.rfind('/');
       if (slash == std::string::npos) continue;
       const std::string folder = path.substr(0, slash);

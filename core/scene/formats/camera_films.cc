@@ -193,7 +193,7 @@ std::vector<CameraFilm> FoldersOfPictures(const std::vector<std::string>& files)
 }
 
 // Returns the films of a folder that has no other pictures.
-std::vector<CameraFilm> FilmsAlone(const std::vector<std::string>& files) {
+std::vector<CameraFilm> FilmsWithoutPoses(const std::vector<std::string>& files) {
   std::vector<CameraFilm> films;
   for (const std::string& file : files) {
     if (IsAugmentFile(file) || IsMaskFile(file)) continue;
@@ -223,7 +223,7 @@ std::vector<CameraFilm> ReadCameraFilms(const fs::path& scene_folder, const Film
       for (CameraFilm& film : films) FitToFilm(size_of(film.file), &film);
     } else {
       from = "the scene";
-      films = FilmsAlone(files);
+      films = FilmsWithoutPoses(files);
     }
   }
   if (films.empty()) return films;

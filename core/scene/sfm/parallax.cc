@@ -69,10 +69,10 @@ Eigen::Matrix3d Rotation(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
 }
 
 // Matches that the rotation explains.
-std::vector<int> Explained(const Matched& points,
-                           const Eigen::Matrix3Xd& rays,
-                           const Eigen::Matrix3d& rotation,
-                           double focal) {
+std::vector<int> Inliers(const Matched& points,
+                         const Eigen::Matrix3Xd& rays,
+                         const Eigen::Matrix3d& rotation,
+                         double focal) {
   std::vector<int> explained;
   const Eigen::Matrix3Xd turned = rotation * rays;
   for (int i = 0; i < turned.cols(); ++i) {
@@ -83,7 +83,7 @@ std::vector<int> Explained(const Matched& points,
   return explained;
 }
 
-int MostExplained(const Matched& points, double focal, Random* random) {
+int MaxInliers(const Matched& points, double focal, Random* random) {
   const Eigen::Matrix3Xd from = Rays(points.a, focal), to = Rays(points.b, focal);
   const auto count = static_cast<uint32_t>(from.cols());
   std::vector<int> best;
@@ -92,12 +92,12 @@ int MostExplained(const Matched& points, double focal, Random* random) {
                                        static_cast<int>(random->NextBelow(count))};
     if (sample[0] == sample[1]) continue;
     std::vector<int> explained =
-        Explained(points, from, Rotation(from(Eigen::all, sample), to(Eigen::all, sample)), focal);
+        Inliers(points, from, Rotation(from(Eigen::all, sample), to(Eigen::all, sample)), focal);
     if (explained.size() > best.size()) best = std::move(explained);
   }
   if (best.size() < 3) return static_cast<int>(best.size());
   const Eigen::Matrix3d refined = Rotation(from(Eigen::all, best), to(Eigen::all, best));
-  return static_cast<int>(std::max(best.size(), Explained(points, from, refined, focal).size()));
+  return static_cast<int>(std::max(best.size(), Inliers(points, from, refined, focal).size()));
 }
 
 // Groups of photos that are connected by pairs with pure rotation.
@@ -135,7 +135,7 @@ PairMotion MeasureMotion(const LocalFeatures& a, const LocalFeatures& b) {
   int most = 0;
   double best = kFocalLengths[0];
   const auto offer = [&](double focal) {
-    const int explained = MostExplained(points, focal, &random);
+    const int explained = MaxInliers(points, focal, &random);
     if (explained <= most) return;
     most = explained;
     best = focal;

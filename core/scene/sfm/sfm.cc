@@ -72,7 +72,7 @@ class Solver {
     const bool planned = plan.pairs.size() < AllPairs(Count()).size();
     if (planned) {
       SolvePlanned(plan);
-      if (PlannedIsEnough()) return std::move(*best_);
+      if (PlannedPairsSuffice()) return std::move(*best_);
       if (order_ == PhotoOrder::kSequence) return best_ ? std::move(*best_) : ColmapModel{};
       if (IsHopeless(plan)) {
         colmap_.Note(
@@ -102,7 +102,7 @@ class Solver {
     return IsHalfPlaced() && 10 * Placed() >= 9 * copies_.names.size();
   }
   // True if further attempts could only add pairs of registered photos, or finer features.
-  bool PlannedIsEnough() const {
+  bool PlannedPairsSuffice() const {
     return AreNearlyAllPlaced() ||
            (IsHalfPlaced() && (!has_coarse_features_ || copies_.names.size() > kExhaustiveLimit));
   }

@@ -87,7 +87,7 @@ void AddSeenMoving(SurveyedView& view) {
 
 // Returns true if the previously detected moving pixels have high residuals; otherwise they are
 // static.
-bool SeenIsConfirmed(const std::vector<SurveyedView>& views) {
+bool IsMotionConfirmed(const std::vector<SurveyedView>& views) {
   double seen = 0.0, confirmed = 0.0;
   for (const SurveyedView& view : views) {
     for (size_t i = 0; i < view.still.data.size(); ++i) {
@@ -131,7 +131,7 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
                                : MaskOf(residuals[i], survey.threshold);
     residual += Sum(views[i].moving);
   }
-  const bool seen = !one_time && SeenIsConfirmed(views);
+  const bool seen = !one_time && IsMotionConfirmed(views);
   survey.least_share = has_median || seen ? kStillShare : kStillShareAlone;
   for (SurveyedView& view : views) {
     if (seen) AddSeenMoving(view);

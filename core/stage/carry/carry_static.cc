@@ -6,7 +6,7 @@
 namespace color3d {
 namespace {
 
-// Neighbours in space are read again and again.
+// CollectNeighbors in space are read again and again.
 constexpr int64_t kPhotosCacheBytes = int64_t{1} << 30;
 
 }  // namespace

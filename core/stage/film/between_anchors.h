@@ -19,9 +19,9 @@ CarriedColor BlendAnchors(CarriedColor before, const CarriedColor& behind, doubl
 // Open share of a frame above which its colours are inferred.
 inline constexpr double kWorthInferring = 0.02;
 // Share of a frame that neither carried colours nor anchors cover surely.
-double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors);
+double UncertainShare(const Image& carried_confidence, const CarriedColor& of_anchors);
 // Takes `others` where they are sure and `color` is not. Returns the number of these pixels.
-size_t FillOpen(const CarriedColor& others, CarriedColor* color);
+size_t FillUncertain(const CarriedColor& others, CarriedColor* color);
 // Takes the colours inferred for a neighbouring frame where `color` is not sure. They are
 // propagated with less confidence than seen colours, since inferring them anew would be no surer.
 void FillFromNeighbor(const CarriedColor& answer, CarriedColor* color);

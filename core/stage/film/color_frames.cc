@@ -88,7 +88,7 @@ class ShotColorer {
         context_(context) {}
 
   void Run() {
-    size_t begin = FirstToColor();
+    size_t begin = FirstUncoloredFrame();
     while (begin < shot_.frames.size()) {
       const size_t end = EndOfStretch(begin);
       Color({shot_.frames.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -100,7 +100,7 @@ class ShotColorer {
 
  private:
   // An interrupted run resumes at the last anchor before all frames that are left.
-  size_t FirstToColor() const {
+  size_t FirstUncoloredFrame() const {
     const auto begin = shot_.frames.begin();
     const auto open = std::find_if(begin, shot_.frames.end(), [&](int frame) {
       return !coloring_.was_done(view_of_frame_[frame]);
@@ -181,7 +181,7 @@ class ShotColorer {
       return x.end - x.begin > y.end - y.begin;
     });
     pool.ForEach(static_cast<int64_t>(gaps.size()), [&](int64_t i, int) {
-      InferOpenFrames(gaps[i], stretch, flow, &of_anchors, &colored);
+      InferUncertainFrames(gaps[i], stretch, flow, &of_anchors, &colored);
     });
     pool.ForEach(count, [&](int64_t i, int) {
       if (colored[i].color.ab.Empty()) colored[i].color = ColorOf(stretch[i], &of_anchors[i]);
@@ -236,17 +236,17 @@ class ShotColorer {
 
   // Infers the frames of a gap that propagation leaves open, the most open one first. Inferred
   // colours are propagated into the other frames.
-  void InferOpenFrames(const Gap& gap,
-                       const std::vector<int>& stretch,
-                       const Flow& flow,
-                       std::vector<CarriedColor>* of_anchors,
-                       std::vector<Colored>* colored) const {
+  void InferUncertainFrames(const Gap& gap,
+                            const std::vector<int>& stretch,
+                            const Flow& flow,
+                            std::vector<CarriedColor>* of_anchors,
+                            std::vector<Colored>* colored) const {
     const std::vector<int> frames(stretch.begin() + static_cast<std::ptrdiff_t>(gap.begin),
                                   stretch.begin() + static_cast<std::ptrdiff_t>(gap.end));
     std::vector<Image> carried;  // confidences
     std::vector<double> open(frames.size());
     const auto measure = [&](size_t i) {
-      open[i] = ShareOpen(carried[i], (*of_anchors)[gap.begin + i]);
+      open[i] = UncertainShare(carried[i], (*of_anchors)[gap.begin + i]);
     };
     for (size_t i = 0; i < frames.size(); ++i) {
       carried.push_back(std::move(PropagatedColor(frames[i]).confidence));
@@ -300,7 +300,7 @@ class ShotColorer {
     const size_t end =
         is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
     // Colours of different key frames are not averaged.
-    std::vector<FrameInMotion> neighbors;
+    std::vector<MovingFrame> neighbors;
     int last_nearest = -1;
     for (const Colored& one : colored_) {
       const int nearest = near_[one.frame].nearest;
