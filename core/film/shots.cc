@@ -39,7 +39,7 @@ double Difference(const Image& one, const Image& other, int dx, int dy) {
   return sum / (static_cast<double>(x1 - x0) * (y1 - y0));
 }
 
-// ShotDissimilarity of two normalised pictures.
+// Dissimilarity of two normalised pictures.
 double PictureDissimilarity(const Image& one, const Image& other) {
   double best = 1e9;
   const int limit_x = std::min(kMaxShiftPx, one.width / 4),

@@ -102,7 +102,7 @@ class CarryStageTest : public StageTest {
 
 TEST_F(CarryStageTest, CarriesKeyViewIntoEveryView) {
   const nlohmann::json facts = Run();
-  // CollectNeighbors share about 74 % of the key view's width, the next ones 48 % and 22 %.
+  // Neighbours share about 74 % of the key view's width, the next ones 48 % and 22 %.
   const double expected[] = {0.74, 1.0, 0.74, 0.48, 0.22};
   for (int i = 0; i < 5; ++i) {
     EXPECT_NEAR(facts["views"][i]["coverage"], expected[i], 0.08) << i;

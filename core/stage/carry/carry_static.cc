@@ -6,7 +6,7 @@
 namespace color3d {
 namespace {
 
-// CollectNeighbors in space are read again and again.
+// Neighbours in space are read again and again.
 constexpr int64_t kPhotosCacheBytes = int64_t{1} << 30;
 
 }  // namespace
