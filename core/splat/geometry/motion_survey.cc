@@ -16,7 +16,7 @@ constexpr int kRadiusPx = 2;
 constexpr double kDeviations = 5.0;
 constexpr double kLeastResidual = 0.03;
 constexpr size_t kMedianFrames = 31;  // at most, evenly over time
-constexpr size_t kFewestFrames = 5;   // that say what cameras still
+constexpr size_t kFewestFrames = 5;   // to tell what is static
 constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
 constexpr double kConfirmed = 0.1;    // of what was seen to move, by residuals, at least
 // Maximum shares of such pixels in static scenes: with a median over time or known moving regions,
