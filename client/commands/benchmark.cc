@@ -65,7 +65,7 @@ struct Selection {
   std::vector<std::string> key_views;  // in the order in which they were chosen
 
   bool IsKey(const std::string& view) const {
-    return std::find(key_views.begin(), key_views.end(), view) != key_views.end();
+    return std::ranges::find(key_views, view) != key_views.end();
   }
 };
 

@@ -8,6 +8,7 @@
 #include "client/lib/text.h"
 #include "core/base/digest.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 
@@ -18,10 +19,8 @@ namespace {
 constexpr int kPageSize = 200;
 
 const v1::Artifact* ModelOf(const v1::Job& job) {
-  const auto found =
-      std::find_if(job.artifacts().begin(), job.artifacts().end(), [](const v1::Artifact& a) {
-        return a.name() == artifact::kModel;
-      });
+  const auto found = std::ranges::find_if(
+      job.artifacts(), [](const v1::Artifact& a) { return a.name() == artifact::kModel; });
   return found != job.artifacts().end() ? &*found : nullptr;
 }
 
@@ -55,17 +54,15 @@ v1::Job WithModel(v1::Job job) {
 }
 
 fs::path ModelFileIn(const fs::path& folder) {
-  std::error_code none;
-  if (!fs::is_directory(folder, none)) {
+  if (!IsFolder(folder)) {
     throw Error(ErrorCode::kNotFound,
                 "there is no folder {}; name the one that `color3d colorize` wrote to (-o), "
                 "jobs/ID or scenes/ID",
                 folder.string());
   }
   const fs::path model = folder / artifact::kModel;
-  if (fs::is_regular_file(model, none)) return model;
-  if (fs::is_regular_file(folder / artifact::kReport, none) &&
-      fs::is_regular_file(folder / artifact::kMovie, none)) {
+  if (IsFile(model)) return model;
+  if (IsFile(folder / artifact::kReport) && IsFile(folder / artifact::kMovie)) {
     RefuseFilm(folder.string());
   }
   throw Error(ErrorCode::kFailedPrecondition,
@@ -105,9 +102,7 @@ bool IsOnServer(const std::string& target) {
 }
 
 v1::Job NewestResult(Connection& connection, const std::string& scene) {
-  v1::GetSceneRequest known;
-  known.set_name(scene);
-  connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), known);
+  GetScene(connection, scene);
   v1::ListJobsRequest request;
   request.set_parent(scene);
   request.set_page_size(kPageSize);

@@ -163,10 +163,8 @@ class Colorize {
     if (!same_stem.empty()) return same_stem;
     const std::string view = SelectedView();
     // The selection may be of another scene.
-    const bool known =
-        std::any_of(folder_.photos.begin(), folder_.photos.end(), [&](const LocalFile& photo) {
-          return Stem(photo.path) == Stem(view);
-        });
+    const bool known = std::ranges::any_of(
+        folder_.photos, [&](const LocalFile& photo) { return Stem(photo.path) == Stem(view); });
     return known ? view : "";
   }
 
@@ -183,21 +181,27 @@ class Colorize {
 
   // Submits the job, follows it and downloads the results; with --detach submits only.
   ExitCode Finish(const v1::JobSpec& spec) {
+    return Submit(spec, {}, [&](nlohmann::ordered_json result) {
+      if (!context_.json) return PrintText(Summary(out_));
+      result["metrics"] = ReadResult(out_, artifact::kMetrics);
+      PrintJson(result);
+    });
+  }
+
+  // `earlier`: jobs that are followed as well. `print` gets the result for --json.
+  ExitCode Submit(const v1::JobSpec& spec,
+                  std::vector<std::string> earlier,
+                  const std::function<void(nlohmann::ordered_json)>& print) {
     const v1::Job submitted = SubmitJob(*connection_, spec, options_.notify);
     if (options_.detach) return Detached(submitted);
-    const v1::Job job =
-        FollowToSuccess(*connection_, context_, {submitted.name()}, out_.string(), display_);
+    earlier.push_back(submitted.name());
+    const v1::Job job = FollowToSuccess(*connection_, context_, earlier, out_.string(), display_);
     const auto files = DownloadResults(*connection_, context_, job, out_, display_);
-    if (context_.json) {
-      PrintJson({{"job", job.name()},
-                 {"scene", spec.scene()},
-                 {"state", StateName(job.state())},
-                 {"out", out_.string()},
-                 {"files", files},
-                 {"metrics", ReadResult(out_, artifact::kMetrics)}});
-    } else {
-      PrintText(Summary(out_));
-    }
+    print({{"job", job.name()},
+           {"scene", spec.scene()},
+           {"state", StateName(job.state())},
+           {"out", out_.string()},
+           {"files", files}});
     return ExitCode::kOk;
   }
 
@@ -209,23 +213,12 @@ class Colorize {
       jobs.push_back(SubmitJob(*connection_, import).name());
       spec.add_inputs(jobs.back());
     }
-    const v1::Job submitted = SubmitJob(*connection_, spec, options_.notify);
-    if (options_.detach) return Detached(submitted);
-    jobs.push_back(submitted.name());
-    const v1::Job job = FollowToSuccess(*connection_, context_, jobs, out_.string(), display_);
-    const auto files = DownloadResults(*connection_, context_, job, out_, display_);
-    const std::string view = SelectedView();
-    if (context_.json) {
-      PrintJson({{"job", job.name()},
-                 {"scene", scene},
-                 {"state", StateName(job.state())},
-                 {"out", out_.string()},
-                 {"files", files},
-                 {"key_view", view}});
-    } else {
-      PrintText(NextCommands(view));
-    }
-    return ExitCode::kOk;
+    return Submit(spec, std::move(jobs), [&](nlohmann::ordered_json result) {
+      const std::string view = SelectedView();
+      if (!context_.json) return PrintText(NextCommands(view));
+      result["key_view"] = view;
+      PrintJson(result);
+    });
   }
 
   std::string NextCommands(const std::string& view) const {
@@ -262,15 +255,14 @@ class Colorize {
 
 void AddColorizeCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<ColorizeOptions>();
-  CLI::App* colorize = app.add_subcommand(
+  CLI::App* colorize = AddCommand(
+      app,
+      context,
       "colorize",
       "Make a coloured 3D scene from photos, or colour a film. Without a source of colour: select "
-      "the photo to colour");
-  colorize->fallthrough();
+      "the photo to colour",
+      [&context, options] { return Colorize(context, *options).Run(); });
   DeclareOptions(*colorize, options.get());
-  colorize->callback([&context, options] {
-    context.action = [&context, options] { return Colorize(context, *options).Run(); };
-  });
 }
 
 }  // namespace color3d::client

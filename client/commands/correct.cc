@@ -152,10 +152,9 @@ void ClearPaintFolder(const Context& context, const fs::path& out, const v1::Job
   for (const fs::path& file : files) {
     const std::string name = artifact::kPaint + file.filename().string();
     const std::string digest = DigestFile(file).sha256;
-    const bool ours = std::any_of(
-        before.artifacts().begin(), before.artifacts().end(), [&](const v1::Artifact& artifact) {
-          return artifact.name() == name && artifact.digest().sha256() == digest;
-        });
+    const bool ours = std::ranges::any_of(before.artifacts(), [&](const v1::Artifact& artifact) {
+      return artifact.name() == name && artifact.digest().sha256() == digest;
+    });
     if (ours) {
       fs::remove(file);
       continue;
@@ -180,10 +179,10 @@ void FetchScene(Connection& connection,
   const v1::Job fresh = GetJob(connection, exported.name());
   for (const v1::Artifact& artifact : fresh.artifacts()) {
     const auto same_name = [&](const char* name) { return artifact.name() == name; };
-    if (std::any_of(results.begin(), results.end(), same_name)) files.push_back(artifact);
+    if (std::ranges::any_of(results, same_name)) files.push_back(artifact);
   }
   const auto fetched = DownloadArtifacts(connection, files, out, display);
-  if (std::find(fetched.begin(), fetched.end(), artifact::kViewPage) == fetched.end()) return;
+  if (std::ranges::find(fetched, artifact::kViewPage) == fetched.end()) return;
   display.Say((out / artifact::kViewPage).string() + " shows the corrected scene; metrics follow");
 }
 
@@ -339,13 +338,12 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
 
 void AddCorrectCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<CorrectOptions>();
-  CLI::App* command =
-      app.add_subcommand("correct", "Correct the colours of a coloured scene; its geometry is kept")
-          ->fallthrough();
-  DeclareOptions(command, options.get());
-  command->callback([&context, options] {
-    context.action = [&context, options] { return RunCorrect(context, *options); };
-  });
+  DeclareOptions(AddCommand(app,
+                            context,
+                            "correct",
+                            "Correct the colours of a coloured scene; its geometry is kept",
+                            [&context, options] { return RunCorrect(context, *options); }),
+                 options.get());
 }
 
 }  // namespace color3d::client

@@ -286,7 +286,6 @@ ExitCode Key::Accept() {
 }
 
 void AddTarget(CLI::App* command, KeyOptions* options) {
-  command->fallthrough();
   command
       ->add_option(
           "SCENE",
@@ -308,14 +307,15 @@ void AddKeyCommands(CLI::App& app, Context& context) {
   CLI::App* key = app.add_subcommand("key", "Select, colour and accept the key view of a scene");
   key->require_subcommand(1)->fallthrough();
   const auto options = std::make_shared<KeyOptions>();
-  const auto run = [&context, options](CLI::App* command, ExitCode (Key::*action)()) {
-    command->callback([&context, options, action] {
-      context.action = [&context, options, action] { return (Key(context, *options).*action)(); };
+  const auto add = [&](const char* name, const char* help, ExitCode (Key::*action)()) {
+    CLI::App* command = AddCommand(*key, context, name, help, [&context, options, action] {
+      return (Key(context, *options).*action)();
     });
+    AddTarget(command, options.get());
+    return command;
   };
 
-  CLI::App* select = key->add_subcommand("select", "Select the photo to colour");
-  AddTarget(select, options.get());
+  CLI::App* select = add("select", "Select the photo to colour", &Key::Select);
   AddView(select, options.get());
   select->add_option("--strategy", options->strategy, "coverage (default), tracks or entropy")
       ->check(CLI::IsMember({"coverage", "tracks", "entropy"}));
@@ -330,24 +330,16 @@ void AddKeyCommands(CLI::App& app, Context& context) {
       "--encoder", options->encoder, "Encoder weights on the server to compare views with");
   select->add_option(
       "--features", options->features, "CLIP weights on the server to compare views with");
-  run(select, &Key::Select);
 
-  CLI::App* color = key->add_subcommand("color", "Colour the key view and download it");
+  CLI::App* color = add("color", "Colour the key view and download it", &Key::Color);
   color->alias("colour");
-  AddTarget(color, options.get());
   AddView(color, options.get());
   DeclareKeyColorFlags(*color, &options->color);
-  run(color, &Key::Color);
 
-  CLI::App* show = key->add_subcommand("show", "Show the selected, coloured and accepted key view");
-  AddTarget(show, options.get());
-  run(show, &Key::Show);
+  add("show", "Show the selected, coloured and accepted key view", &Key::Show);
 
-  CLI::App* accept =
-      key->add_subcommand("accept", "Accept the newest colours of the key view for the scene");
-  AddTarget(accept, options.get());
-  accept->add_option("--job", options->job, "Accept those of this job instead");
-  run(accept, &Key::Accept);
+  add("accept", "Accept the newest colours of the key view for the scene", &Key::Accept)
+      ->add_option("--job", options->job, "Job whose colours to accept instead");
 }
 
 }  // namespace color3d::client

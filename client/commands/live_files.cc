@@ -12,6 +12,7 @@
 #include "client/lib/out_folder.h"
 #include "client/lib/photos/skipped_files.h"
 #include "client/lib/text.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 
 namespace color3d::client {
@@ -21,8 +22,7 @@ namespace {
 constexpr size_t kShownErrors = 2;
 
 void AddFolder(const Context& context, const fs::path& folder, std::vector<LivePicture>* pictures) {
-  std::error_code none;
-  const bool nested = fs::is_directory(folder / "images", none);
+  const bool nested = IsFolder(folder / "images");
   const fs::path root = nested ? folder / "images" : folder;
   SkippedFiles skipped;
   const std::vector<std::string> found = ListPictures(root, /*with_subfolders=*/false, &skipped);
@@ -68,10 +68,9 @@ std::vector<LivePicture> CollectPictures(const Context& context,
                                          const fs::path& out) {
   std::vector<LivePicture> pictures;
   for (const std::string& argument : arguments) {
-    std::error_code none;
-    if (fs::is_directory(argument, none)) {
+    if (IsFolder(argument)) {
       AddFolder(context, argument, &pictures);
-    } else if (fs::is_regular_file(argument, none)) {
+    } else if (IsFile(argument)) {
       pictures.push_back({fs::path(argument).filename().string(), argument, std::nullopt});
     } else {
       throw Error(ErrorCode::kNotFound, "there is no photo or folder {}", argument);
@@ -126,8 +125,8 @@ LiveSummary ColorizeToFiles(Connection& connection,
     ColorizeLive(connection, source, pictures, options, on_answer);
   } catch (const Error& e) {
     if (e.code() != ErrorCode::kUnavailable) throw;
-    const auto there = std::count_if(
-        written.begin(), written.end(), [](const std::string& name) { return !name.empty(); });
+    const auto there =
+        std::ranges::count_if(written, [](const std::string& name) { return !name.empty(); });
     throw Error(ErrorCode::kUnavailable,
                 "{}; {} of {} pictures are complete in {}; run the command again for the rest",
                 e.what(),

@@ -18,6 +18,7 @@
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
 #include "core/base/digest.h"
+#include "core/base/file_kind.h"
 #include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
@@ -75,14 +76,13 @@ void Check(const MovieOptions& options) {
   }
   if (options.out.empty() || IsMovieName(options.out)) return;
   std::error_code none;
-  if (fs::exists(options.out, none) && !fs::is_directory(options.out, none)) {
+  if (fs::exists(options.out, none) && !IsFolder(options.out)) {
     throw InvalidArgument("{} is not a folder; the name of a movie ends in .mp4", options.out);
   }
 }
 
 v1::Digest UploadCameras(Connection& connection, const std::string& path) {
-  std::error_code none;
-  if (!fs::is_regular_file(path, none)) {
+  if (!IsFile(path)) {
     throw Error(
         ErrorCode::kNotFound,
         "there is no file {}; --path takes {}, {}, {} or a file of cameras (transforms.json)",
@@ -195,7 +195,6 @@ ExitCode RunMovie(const Context& context, const MovieOptions& options) {
 }
 
 void AddCommonOptions(CLI::App* command, MovieOptions* options) {
-  command->fallthrough();
   command
       ->add_option("RESULTS",
                    options->target,
@@ -218,23 +217,26 @@ void AddCommonOptions(CLI::App* command, MovieOptions* options) {
 
 void AddMovieCommands(CLI::App& app, Context& context) {
   const auto turning = std::make_shared<MovieOptions>();
-  CLI::App* turntable = app.add_subcommand("turntable", "Render a turntable movie");
+  CLI::App* turntable =
+      AddCommand(app, context, "turntable", "Render a turntable movie", [&context, turning] {
+        if (turning->out.empty()) {
+          turning->out = IsOnServer(turning->target) ? "." : turning->target;
+        }
+        return RunMovie(context, *turning);
+      });
   AddCommonOptions(turntable, turning.get());
   turning->path = kOrbit;
   turning->movie_name = "turntable.mp4";
   turntable->add_option("-o,--out",
                         turning->out,
                         "FILE.mp4 or a folder; default: turntable.mp4 in the folder of results");
-  turntable->callback([&context, turning] {
-    context.action = [&context, turning] {
-      if (turning->out.empty()) turning->out = IsOnServer(turning->target) ? "." : turning->target;
-      return RunMovie(context, *turning);
-    };
-  });
 
   const auto rendering = std::make_shared<MovieOptions>();
-  CLI::App* render =
-      app.add_subcommand("render", "Render a movie along a camera path, or pictures of views");
+  CLI::App* render = AddCommand(app,
+                                context,
+                                "render",
+                                "Render a movie along a camera path, or pictures of views",
+                                [&context, rendering] { return RunMovie(context, *rendering); });
   AddCommonOptions(render, rendering.get());
   rendering->out = "render";
   render->add_option(
@@ -249,9 +251,6 @@ void AddMovieCommands(CLI::App& app, Context& context) {
   render->add_option("-o,--out", rendering->out, "FILE.mp4 or a folder")->capture_default_str();
   render->add_flag("--png", rendering->pictures, "Also write every frame as a picture");
   render->add_flag("!--no-video", rendering->video, "With --png: write no movie");
-  render->callback([&context, rendering] {
-    context.action = [&context, rendering] { return RunMovie(context, *rendering); };
-  });
 }
 
 }  // namespace color3d::client

@@ -86,12 +86,7 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
   PrepareOut(options.out);
   Connection connection(context.server, *context.interrupt);
   WarmUpInference(connection);
-  if (stored) {
-    v1::GetSceneRequest request;
-    request.set_name(options.target);
-    pictures = PicturesOf(
-        connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request));
-  }
+  if (stored) pictures = PicturesOf(GetScene(connection, options.target));
   std::string key = options.key;
   LiveSource source;
   if (options.key_color.empty()) {
@@ -114,10 +109,12 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
 }  // namespace
 
 void AddPreviewCommand(CLI::App& app, Context& context) {
-  CLI::App* preview =
-      app.add_subcommand("preview", "Colour a few photos from a coloured key view within seconds")
-          ->fallthrough();
   const auto options = std::make_shared<PreviewOptions>();
+  CLI::App* preview = AddCommand(app,
+                                 context,
+                                 "preview",
+                                 "Colour a few photos from a coloured key view within seconds",
+                                 [&context, options] { return Preview(context, *options); });
   preview->add_option("photos", options->target, "Folder of photos, or scenes/ID")->required();
   preview->add_option("--key-color",
                       options->key_color,
@@ -135,9 +132,6 @@ void AddPreviewCommand(CLI::App& app, Context& context) {
   preview->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px")
       ->check(CLI::Range(16, 8192))
       ->capture_default_str();
-  preview->callback([&context, options] {
-    context.action = [&context, options] { return Preview(context, *options); };
-  });
 }
 
 }  // namespace color3d::client

@@ -7,6 +7,7 @@
 #include "client/commands/console.h"
 #include "client/lib/scene_upload.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -37,8 +38,7 @@ std::string ResolveScene(Connection& connection,
                          const std::string& text,
                          bool film,
                          ProgressDisplay& display) {
-  std::error_code none;
-  if (!fs::is_directory(text, none) && !fs::is_regular_file(text, none)) {
+  if (!IsFolder(text) && !IsFile(text)) {
     if (film && text.starts_with("scenes/")) {
       throw InvalidArgument(
           "--film is for a folder; whether {} is a film was decided at its upload", text);

@@ -211,6 +211,11 @@ void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& 
   }
 }
 
+v1::ServerInfo GetServerInfo(Connection& connection) {
+  return connection.Call(
+      &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
+}
+
 Error UnreachableError(const std::string& address) {
   return Error(ErrorCode::kUnavailable,
                "cannot reach a server at {}: start one with `color3d-server serve --data-dir DIR`, "

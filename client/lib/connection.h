@@ -134,6 +134,9 @@ class FullServerWait {
   std::chrono::steady_clock::time_point since_;
 };
 
+// Returns version, limits, models and presets of the server. Throws RpcError.
+v1::ServerInfo GetServerInfo(Connection& connection);
+
 // "cannot reach a server at ...: start one with ...".
 Error UnreachableError(const std::string& address);
 

@@ -59,9 +59,8 @@ void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
 }
 
 bool ProgressDisplay::IsAnyStageRunning() const {
-  return std::any_of(unfinished_.begin(), unfinished_.end(), [](const auto& job) {
-    return job.second == v1::Job::STATE_RUNNING;
-  });
+  return std::ranges::any_of(unfinished_,
+                             [](const auto& job) { return job.second == v1::Job::STATE_RUNNING; });
 }
 
 void ProgressDisplay::OnTick(const std::function<v1::Job()>& look) {

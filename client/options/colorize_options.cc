@@ -300,8 +300,7 @@ v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene)
 v1::ColorizeSceneSpec MergeWithPreset(Connection& connection, const ColorizeOptions& options) {
   const v1::ColorizeSceneSpec chosen = RequestedOptions(options);
   v1::ColorizeSceneSpec spec;
-  const auto info = connection.Call(
-      &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
+  const v1::ServerInfo info = GetServerInfo(connection);
   for (const v1::PresetInfo& preset : info.presets()) {
     if (preset.options().preset() == std::max(chosen.preset(), v1::PRESET_FAST)) {
       spec = preset.options();

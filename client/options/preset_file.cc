@@ -10,6 +10,7 @@
 
 #include "client/options/option_fields.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/json_text.h"
 #include "core/base/text/lower_case.h"
@@ -113,12 +114,12 @@ void RejectSceneSpecificFields(const v1::ColorizeSceneSpec& spec, const std::str
 }  // namespace
 
 std::string PresetNames() {
-  std::string names;
+  std::vector<std::string> names;
   const auto* presets = v1::Preset_descriptor();
   for (int i = 1; i < presets->value_count(); ++i) {
-    names += (i > 1 ? ", " : "") + LowerCase(presets->value(i)->name().substr(kPrefix.size()));
+    names.push_back(LowerCase(presets->value(i)->name().substr(kPrefix.size())));
   }
-  return names;
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
@@ -128,8 +129,7 @@ v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
     spec.set_preset(preset);
     return spec;
   }
-  std::error_code none;
-  if (!fs::is_regular_file(name_or_file, none)) {
+  if (!IsFile(name_or_file)) {
     throw Error(ErrorCode::kNotFound,
                 "--preset {}: there is no such preset (there are {}) and no such file",
                 name_or_file,

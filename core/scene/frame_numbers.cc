@@ -63,8 +63,8 @@ int64_t StepOf(const std::vector<int64_t>& numbers) {
   std::map<int64_t, size_t> steps;
   for (size_t i = 1; i < numbers.size(); ++i) ++steps[numbers[i] - numbers[i - 1]];
   if (steps.empty() || steps.begin()->first <= 0) return 0;
-  const auto usual = std::max_element(
-      steps.begin(), steps.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
+  const auto usual =
+      std::ranges::max_element(steps, {}, [](const auto& step) { return step.second; });
   if (2 * usual->second < numbers.size() - 1) return 0;
   for (const auto& [step, count] : steps) {
     if (step % usual->first != 0) return 0;

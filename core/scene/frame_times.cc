@@ -47,9 +47,7 @@ bool AllOrNone(const std::vector<FrameTime>& frames, const char* what, const Has
 std::vector<double> ShiftedTimes(const std::vector<FrameTime>& frames) {
   std::vector<size_t> order(frames.size());
   std::iota(order.begin(), order.end(), size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    return *frames[a].time < *frames[b].time;
-  });
+  std::ranges::stable_sort(order, {}, [&](size_t i) { return *frames[i].time; });
   const double begin = *frames[order.front()].time;
   const double span = *frames[order.back()].time - begin;
   if (!std::isfinite(span)) {
@@ -70,8 +68,8 @@ std::vector<double> ShiftedTimes(const std::vector<FrameTime>& frames) {
 }
 
 bool HasEqualTimes(std::vector<double> times) {
-  std::sort(times.begin(), times.end());
-  return std::adjacent_find(times.begin(), times.end()) != times.end();
+  std::ranges::sort(times);
+  return std::ranges::adjacent_find(times) != times.end();
 }
 
 // Frames of each camera, in order of time.
@@ -81,8 +79,7 @@ FramesByCamera ByCamera(const std::vector<std::string>& camera, const std::vecto
   FramesByCamera frames;
   for (size_t i = 0; i < times.size(); ++i) frames[camera[i]].push_back(i);
   for (auto& [name, own] : frames) {
-    std::stable_sort(
-        own.begin(), own.end(), [&](size_t a, size_t b) { return times[a] < times[b]; });
+    std::ranges::stable_sort(own, {}, [&](size_t i) { return times[i]; });
   }
   return frames;
 }
@@ -168,7 +165,7 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
   const bool named =
       AllOrNone(frames, "camera", [](const FrameTime& f) { return !f.camera.empty(); });
   std::vector<double> times = ShiftedTimes(frames);
-  if (*std::max_element(times.begin(), times.end()) == 0.0) {
+  if (*std::ranges::max_element(times) == 0.0) {
     result.note =
         fmt::format("all {} frames were taken at one time: the scene is static", frames.size());
     return result;
@@ -204,6 +201,15 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
             : ", or give each camera a folder (in transforms.json also: each frame a \"camera\")");
   }
   return result;
+}
+
+void AddMoments(FrameMoments moments,
+                Scene* scene,
+                std::vector<std::string>* warnings,
+                std::vector<std::string>* cameras) {
+  for (size_t i = 0; i < scene->views.size(); ++i) scene->views[i].moment = moments.moments[i];
+  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
+  if (cameras != nullptr) *cameras = std::move(moments.cameras);
 }
 
 }  // namespace color3d

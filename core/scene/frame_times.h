@@ -33,5 +33,11 @@ struct FrameMoments {
 // some name a camera, two of one camera have the same time, or times are too far apart for a
 // number.
 FrameMoments MomentsOf(const std::vector<FrameTime>& frames);
+// Gives the views of the scene their moments, in order. `warnings` (may be null) receives the note,
+// `cameras` (may be null) the names of the cameras.
+void AddMoments(FrameMoments moments,
+                Scene* scene,
+                std::vector<std::string>* warnings,
+                std::vector<std::string>* cameras);
 
 }  // namespace color3d

@@ -1,9 +1,10 @@
 #include "core/scene/named_files.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
+#include <span>
 #include <utility>
 
 #include "core/base/files.h"
@@ -28,7 +29,7 @@ std::string WithoutEnding(const std::string& path) {
 
 // Parts of a name below its drive, root or "..".
 std::vector<std::string> PartsOf(std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
+  std::ranges::replace(name, '\\', '/');
   std::vector<std::string> parts;
   size_t begin = 0;
   while (begin <= name.size()) {
@@ -145,11 +146,10 @@ std::string ViewNameOf(std::string_view file) {
 }
 
 std::string SummarizeNames(const std::vector<std::string>& names, size_t most) {
-  std::string text;
-  for (size_t i = 0; i < std::min(names.size(), most); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  return names.size() > most ? fmt::format("{} and {} more", text, names.size() - most) : text;
+  const std::span shown(names.data(), std::min(names.size(), most));
+  std::string text = fmt::format("{}", fmt::join(shown, ", "));
+  if (names.size() > most) text += fmt::format(" and {} more", names.size() - most);
+  return text;
 }
 
 }  // namespace color3d

@@ -57,7 +57,7 @@ FilmAsFrames DecodeFilmFrames(const PhotoFolder& folder,
   const std::string name = folder.film->file.string();
   FilmReader film(folder.film->file, &cancel);
   const std::vector<double>& times = film.times();
-  const auto end = end_s ? std::lower_bound(times.begin(), times.end(), *end_s) : times.end();
+  const auto end = end_s ? std::ranges::lower_bound(times, *end_s) : times.end();
   const auto count = static_cast<size_t>(end - times.begin());
   if (count > kMostBenchmarkFrames) {
     throw InvalidArgument(

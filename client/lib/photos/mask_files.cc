@@ -8,6 +8,7 @@
 
 #include "client/lib/photos/skipped_files.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/lower_case.h"
 #include "core/image/probe/orientation.h"
@@ -42,8 +43,7 @@ void RequireSizeOf(const fs::path& mask, const fs::path& photo) {
 }  // namespace
 
 void AddMasks(const fs::path& masks, PhotoFolder* folder) {
-  std::error_code none;
-  if (!fs::is_directory(masks, none)) {
+  if (!IsFolder(masks)) {
     throw InvalidArgument("--masks {}: there is no such folder", masks.string());
   }
   std::map<std::string, const LocalFile*> photo_of;

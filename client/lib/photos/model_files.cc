@@ -8,9 +8,9 @@
 #include <optional>
 #include <utility>
 
-#include "client/lib/photos/file_kind.h"
 #include "client/lib/photos/skipped_files.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/json_text.h"
 #include "core/base/text/lower_case.h"
@@ -43,7 +43,7 @@ constexpr UnreadPoses kUnreadPoses[] = {{"cameras.xml", "Agisoft Metashape"},
 
 // Normalises the separators of a path from a user's file.
 std::string NormalizedPath(std::string path) {
-  std::replace(path.begin(), path.end(), '\\', '/');
+  std::ranges::replace(path, '\\', '/');
   while (path.starts_with("./")) path.erase(0, 2);
   return path;
 }
@@ -57,7 +57,7 @@ std::vector<std::string> FoldersIn(const fs::path& root) {
     if (name.starts_with('.') || IsSystemFolder(name)) continue;
     if (IsFolder(entry.path())) folders.push_back(name);
   }
-  std::sort(folders.begin(), folders.end());
+  std::ranges::sort(folders);
   return folders;
 }
 
@@ -98,7 +98,7 @@ std::vector<std::string> FilesOfModels(const fs::path& root) {
     if (stem != "cameras" && stem != "images" && stem != "points3D") continue;
     files.push_back(it->path().lexically_relative(root).generic_string());
   }
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   return files;
 }
 
@@ -137,7 +137,7 @@ void NotePosesNotRead(const fs::path& root, PhotoFolder* result) {
     }
   }
   if (found.empty()) return;
-  std::sort(found.begin(), found.end());
+  std::ranges::sort(found);
   result->notes.push_back(
       fmt::format("the poses in {} are not read, and are found anew; to use them, export them as a "
                   "COLMAP model into {}",

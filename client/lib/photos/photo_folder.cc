@@ -4,12 +4,12 @@
 #include <set>
 
 #include "client/lib/names.h"
-#include "client/lib/photos/file_kind.h"
 #include "client/lib/photos/film_advice.h"
 #include "client/lib/photos/film_copies.h"
 #include "client/lib/photos/model_files.h"
 #include "client/lib/photos/skipped_files.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/name_order.h"
 #include "core/base/text/utf8.h"
@@ -162,7 +162,7 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
                           root.string(),
                           found.size(),
                           what,
-                          (root / *std::min_element(found.begin(), found.end())).string());
+                          (root / *std::ranges::min_element(found)).string());
   }
   return LocalFile{found[0], root / found[0]};
 }
@@ -273,10 +273,9 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   }
   if (!result.splat && !result.film) CollectModelFiles(result.root, &result);
   CollectAugmentFiles(result.root, &result);
-  const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
-  std::sort(result.photos.begin(), result.photos.end(), by_path);
-  std::sort(result.model_files.begin(), result.model_files.end(), by_path);
-  std::sort(result.augment_files.begin(), result.augment_files.end(), by_path);
+  std::ranges::sort(result.photos, {}, &LocalFile::path);
+  std::ranges::sort(result.model_files, {}, &LocalFile::path);
+  std::ranges::sort(result.augment_files, {}, &LocalFile::path);
   CheckCounts(result, as_frames, skipped);
   CheckNames(result);
   const fs::path parent = fs::absolute(result.root).parent_path();
@@ -328,10 +327,7 @@ void UsePhotosAsFrames(PhotoFolder* folder) {
           photo.file.filename().string());
     }
   }
-  const auto as_counted = [](const LocalFile& x, const LocalFile& y) {
-    return ComesBefore(x.path, y.path);
-  };
-  std::sort(folder->photos.begin(), folder->photos.end(), as_counted);
+  std::ranges::sort(folder->photos, &ComesBefore, &LocalFile::path);
 }
 
 namespace {

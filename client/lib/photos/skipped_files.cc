@@ -1,6 +1,6 @@
 #include "client/lib/photos/skipped_files.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/lower_case.h"
 #include "core/catalogue/artifacts.h"
@@ -88,7 +89,7 @@ constexpr const char* kResultRecords[] = {artifact::kKeyView,
                                           artifact::kReport};
 template <typename List>
 bool Holds(const List& list, std::string_view text) {
-  return std::find(std::begin(list), std::end(list), text) != std::end(list);
+  return std::ranges::find(list, text) != std::end(list);
 }
 
 std::string EndingOf(std::string_view name) {
@@ -117,10 +118,8 @@ bool IsCopyFormat(std::string_view name) {
 }
 
 bool HasResultRecord(const fs::path& folder) {
-  std::error_code none;
-  return std::any_of(std::begin(kResultRecords), std::end(kResultRecords), [&](const char* name) {
-    return fs::is_regular_file(folder / name, none);
-  });
+  return std::ranges::any_of(kResultRecords,
+                             [&](const char* name) { return IsFile(folder / name); });
 }
 
 // Counts files in `folder` itself, by names only; 0 if it cannot be read.
@@ -151,7 +150,7 @@ class Lister {
 
   std::vector<std::string> List() {
     ListFolder("");
-    std::sort(found_.begin(), found_.end());
+    std::ranges::sort(found_);
     return std::move(found_);
   }
 
@@ -245,7 +244,7 @@ class Lister {
 
   // Keeps "a.jpg" of "a.heic" and "a.jpg", and one of "a.heic" and "a.webp".
   void AddWithoutCopies(const std::string& below, std::vector<std::string> pictures) {
-    std::sort(pictures.begin(), pictures.end());
+    std::ranges::sort(pictures);
     std::set<std::string> stems;
     for (const std::string& name : pictures) {
       if (!IsCopyFormat(name)) stems.insert(LowerCase(fs::path(name).stem().string()));
@@ -274,7 +273,7 @@ void SkippedFiles::Add(const std::string& kind, const std::string& name, size_t 
   if (files.count == 0 && bar != std::string::npos) files.remedy = kind.substr(bar + 1);
   files.count += count;
   files.first.push_back(name);
-  std::sort(files.first.begin(), files.first.end());
+  std::ranges::sort(files.first);
   if (files.first.size() <= kShownNames) return;
   files.first.pop_back();
   files.has_more_names = true;
@@ -283,19 +282,16 @@ void SkippedFiles::Add(const std::string& kind, const std::string& name, size_t 
 std::vector<std::string> SkippedFiles::Notes() const {
   std::vector<std::pair<size_t, std::string>> lines;
   for (const auto& [kind, files] : kinds_) {
-    std::string names;
-    for (const std::string& name : files.first) names += (names.empty() ? "" : ", ") + name;
     lines.push_back({files.count,
                      fmt::format("{} passed over: {} ({}{}){}{}",
                                  kind,
                                  files.count,
-                                 names,
+                                 fmt::join(files.first, ", "),
                                  files.has_more_names ? ", ..." : "",
                                  files.remedy.empty() ? "" : "; ",
                                  files.remedy)});
   }
-  std::stable_sort(
-      lines.begin(), lines.end(), [](const auto& x, const auto& y) { return x.first > y.first; });
+  std::ranges::stable_sort(lines, std::ranges::greater(), &std::pair<size_t, std::string>::first);
   std::vector<std::string> notes;
   for (auto& [count, line] : lines) notes.push_back(std::move(line));
   return notes;

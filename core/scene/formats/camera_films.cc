@@ -10,6 +10,7 @@
 
 #include "core/base/equal_files.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
@@ -149,7 +150,7 @@ void RefuseCopies(const std::vector<CameraFilm>& films, const fs::path& scene_fo
     const std::vector<fs::path> files = FilesOf(film, scene_folder);
     for (const CameraFilm* other : alike) {
       const std::vector<fs::path> of_other = FilesOf(*other, scene_folder);
-      if (std::equal(files.begin(), files.end(), of_other.begin(), &HaveEqualBytes)) {
+      if (std::ranges::equal(files, of_other, &HaveEqualBytes)) {
         throw InvalidArgument(
             "{} and {} are the same film, byte for byte; films of several cameras are each taken "
             "from another place: leave one of them out",
@@ -208,16 +209,15 @@ std::vector<CameraFilm> FilmsWithoutPoses(const std::vector<std::string>& files)
 }  // namespace
 
 std::vector<CameraFilm> ReadCameraFilms(const fs::path& scene_folder, const FilmSize& size_of) {
-  std::error_code error;
-  if (!fs::is_directory(scene_folder, error)) return {};
+  if (!IsFolder(scene_folder)) return {};
   const std::vector<std::string> files = ListFiles(scene_folder);
   std::vector<CameraFilm> films = FoldersOfPictures(files);
   std::string from = "frames/";
-  if (films.empty() && std::any_of(files.begin(), files.end(), HasFilmExtension)) {
-    if (fs::is_regular_file(scene_folder / kTransforms, error)) {
+  if (films.empty() && std::ranges::any_of(files, HasFilmExtension)) {
+    if (IsFile(scene_folder / kTransforms)) {
       from = kTransforms;
       films = FilmsOfTransforms(scene_folder, size_of);
-    } else if (fs::is_regular_file(scene_folder / kPosesBounds, error)) {
+    } else if (IsFile(scene_folder / kPosesBounds)) {
       from = kPosesBounds;
       films = ReadPosesBounds(scene_folder);
       for (CameraFilm& film : films) FitToFilm(size_of(film.file), &film);
@@ -229,9 +229,7 @@ std::vector<CameraFilm> ReadCameraFilms(const fs::path& scene_folder, const Film
   if (films.empty()) return films;
   CheckFilms(films, from);
   RefuseCopies(films, scene_folder);
-  std::sort(films.begin(), films.end(), [](const CameraFilm& x, const CameraFilm& y) {
-    return x.camera < y.camera;
-  });
+  std::ranges::sort(films, {}, &CameraFilm::camera);
   return films;
 }
 

@@ -12,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/base/evenly.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
@@ -62,9 +63,8 @@ std::string FileOfPoints(const json& transforms,
     }
     return file;
   }
-  std::error_code error;
   for (const std::string_view file : kPointFiles) {
-    if (fs::is_regular_file(scene_folder / file, error)) return std::string(file);
+    if (IsFile(scene_folder / file)) return std::string(file);
   }
   return "";
 }

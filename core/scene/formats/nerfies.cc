@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/json_text.h"
 #include "core/catalogue/film_rate.h"
@@ -30,8 +31,7 @@ constexpr char kPoints[] = "points.npy";
 constexpr size_t kMaxPoints = 500'000;
 
 json ParseObject(const fs::path& folder, const std::string& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(folder / file, error)) throw InvalidArgument("{} is missing", file);
+  if (!IsFile(folder / file)) throw InvalidArgument("{} is missing", file);
   json root = ParseJson(ReadFile(folder / file), file);
   if (!root.is_object()) throw InvalidArgument("{} is not a JSON object", file);
   return root;
@@ -80,9 +80,7 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
     throw InvalidArgument(
         "{}: orientation is not a rotation (determinant {:g})", file, axes.determinant());
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
-  view->cam_from_world.rotation = Eigen::Quaterniond(rotation).normalized();
+  view->cam_from_world.rotation = Eigen::Quaterniond(NearestRotation(axes)).normalized();
   const std::vector<double> position = NumbersOf(fields, "position", 3);
   const Eigen::Vector3d place(position[0], position[1], position[2]);
   RequireWithinReach(place, file);
@@ -109,7 +107,7 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
   }
   view->distortion.k = {radial[0], radial[1], tangential[0], tangential[1], radial[2]};
   const auto& k = view->distortion.k;
-  if (std::any_of(k.begin(), k.end(), [](double v) { return v != 0.0; })) {
+  if (std::ranges::any_of(k, [](double v) { return v != 0.0; })) {
     view->distortion.model = Distortion::Model::kBrown;
   }
 }
@@ -137,8 +135,7 @@ FrameTime TimeOf(const json& entry, const std::string& name, const std::string& 
 
 // Occlusion is unknown: a point lists the views whose picture it falls into.
 std::vector<SparsePoint> ReadPoints(const fs::path& scene_folder, const Scene& scene) {
-  std::error_code error;
-  if (!fs::is_regular_file(scene_folder / kPoints, error)) return {};
+  if (!IsFile(scene_folder / kPoints)) return {};
   const NpyArray array = ReadNpy(ReadFile(scene_folder / kPoints), kPoints, 3 * kMaxPoints);
   if (array.shape.size() != 2 || array.shape[1] != 3) {
     throw InvalidArgument("{} must have three columns", kPoints);
@@ -155,9 +152,7 @@ std::vector<SparsePoint> ReadPoints(const fs::path& scene_folder, const Scene& s
 }  // namespace
 
 bool IsNerfiesFolder(const fs::path& folder) {
-  std::error_code error;
-  return fs::is_regular_file(folder / kMetadata, error) &&
-         fs::is_directory(folder / "camera", error) && fs::is_directory(folder / "rgb", error);
+  return IsFile(folder / kMetadata) && IsFolder(folder / "camera") && IsFolder(folder / "rgb");
 }
 
 Scene ReadNerfies(const fs::path& scene_folder,
@@ -182,9 +177,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
     times.push_back(TimeOf(entry, name, view.image_file));
     const std::string camera_file = "camera/" + name + ".json";
     ReadCamera(ParseObject(scene_folder, camera_file), camera_file, &view);
-    Photo photo{view.name, view.image_file};
-    ProbePhoto(scene_folder, &photo);
-    FitViewToPhoto(photo, &view);
+    FitViewToFile(scene_folder, &view);
     scene.views.push_back(std::move(view));
   }
   if (scene.views.size() < 2) {
@@ -195,9 +188,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
         frames.size(),
         scene.views.size());
   }
-  FrameMoments moments = MomentsOf(times);
-  for (size_t i = 0; i < times.size(); ++i) scene.views[i].moment = moments.moments[i];
-  if (warnings != nullptr && !moments.note.empty()) warnings->push_back(moments.note);
+  AddMoments(MomentsOf(times), &scene, warnings, cameras);
   if (warnings != nullptr && !missing.empty()) {
     warnings->push_back(
         fmt::format("{} of the {} frames of {} have no picture in rgb/ and were left out: {}",
@@ -206,10 +197,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
                     kMetadata,
                     SummarizeNames(missing)));
   }
-  if (cameras != nullptr) *cameras = std::move(moments.cameras);
-  std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {
-    return x.name < y.name;
-  });
+  std::ranges::sort(scene.views, {}, &View::name);
   scene.points = ReadPoints(scene_folder, scene);
   return scene;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/pose_files.h"
 #include "core/scene/formats/given_points.h"
@@ -132,26 +133,15 @@ void RefuseTwice(const std::vector<Frame>& frames,
   }
 }
 
-void AddMoments(const std::vector<FrameTime>& times,
-                Scene* scene,
-                std::vector<std::string>* warnings,
-                std::vector<std::string>* cameras) {
-  FrameMoments moments = MomentsOf(times);
-  for (size_t i = 0; i < times.size(); ++i) scene->views[i].moment = moments.moments[i];
-  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
-  if (cameras != nullptr) *cameras = std::move(moments.cameras);
-}
-
 }  // namespace
 
 std::vector<fs::path> TransformsFiles(const fs::path& scene_folder) {
-  std::error_code error;
-  if (const fs::path file = scene_folder / kTransformsFile; fs::is_regular_file(file, error)) {
+  if (const fs::path file = scene_folder / kTransformsFile; IsFile(file)) {
     return {file};
   }
   std::vector<fs::path> files;
   for (const std::string_view name : kBlenderFiles) {
-    if (fs::is_regular_file(scene_folder / name, error)) files.push_back(scene_folder / name);
+    if (IsFile(scene_folder / name)) files.push_back(scene_folder / name);
   }
   return files;
 }
@@ -160,7 +150,7 @@ size_t CountTransformsPhotos(const std::vector<fs::path>& json_files,
                              const fs::path& scene_folder) {
   const std::vector<Source> sources = ReadSources(json_files);
   const std::vector<std::string> files = FilesOf(FramesOf(sources), scene_folder);
-  return files.size() - static_cast<size_t>(std::count(files.begin(), files.end(), ""));
+  return files.size() - static_cast<size_t>(std::ranges::count(files, ""));
 }
 
 Scene ReadTransformsJson(const std::vector<fs::path>& json_files,
@@ -186,10 +176,8 @@ Scene ReadTransformsJson(const std::vector<fs::path>& json_files,
     scene.views.push_back(ReadView(fields, files[i], scene_folder));
   }
   NoteMissing(missing, frames.size(), scene.views.size(), file_name, warnings);
-  AddMoments(times, &scene, warnings, cameras);
-  std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {
-    return x.name < y.name;
-  });
+  AddMoments(MomentsOf(times), &scene, warnings, cameras);
+  std::ranges::sort(scene.views, {}, &View::name);
   if (sources.size() > 1 && warnings != nullptr) {
     warnings->push_back(fmt::format("the frames of {} are taken together", file_name));
   }

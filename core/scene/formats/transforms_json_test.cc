@@ -23,7 +23,7 @@ TEST(Transforms, RoundTrip) {
     const Scene scene = ArcScene(3, distortion);
     WritePhotos(scene, folder.path());
     WriteTransformsJson(scene, folder.path() / "transforms.json");
-    const Scene read = ReadTransformsJson(folder.path() / "transforms.json", folder.path());
+    const Scene read = ReadTransformsJson({folder.path() / "transforms.json"}, folder.path());
     ASSERT_EQ(read.views.size(), 3u);
     for (int i = 0; i < 3; ++i) {
       const View& g = read.views[i];
@@ -66,7 +66,7 @@ class TransformsFile : public testing::Test {
   }
   Scene Read(const std::string& text) {
     WriteFileAtomic(file(), text);
-    return ReadTransformsJson(file(), folder_.path());
+    return ReadTransformsJson({file()}, folder_.path());
   }
   std::string Said(const std::string& text) {
     return Refusal([&] { Read(text); });
@@ -121,7 +121,7 @@ TEST_F(TransformsFile, LeavesOutMissingPhotosWithWarning) {
                "{\"file_path\":\"images/gone.png\",\"transform_matrix\":[]},");
   WriteFileAtomic(file(), text);
   std::vector<std::string> warnings;
-  EXPECT_EQ(ReadTransformsJson(file(), folder_.path(), &warnings).views.size(), 2u);
+  EXPECT_EQ(ReadTransformsJson({file()}, folder_.path(), &warnings).views.size(), 2u);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_THAT(warnings[0], HasSubstr("1 of the 3 photos"));
   EXPECT_THAT(warnings[0], HasSubstr("images/gone.png"));
@@ -153,7 +153,7 @@ TEST_F(TransformsFile, FramesHaveTimes) {
   EXPECT_EQ(scene.views[1].moment, (Moment{0.0, 0}));
   std::vector<std::string> warnings;
   WriteFileAtomic(file(), TimedJson("\"time\":2,", "\"time\":2,"));
-  EXPECT_FALSE(ReadTransformsJson(file(), folder_.path(), &warnings).views[0].moment);
+  EXPECT_FALSE(ReadTransformsJson({file()}, folder_.path(), &warnings).views[0].moment);
   EXPECT_THAT(warnings.at(0), HasSubstr("the scene is static"));
 }
 

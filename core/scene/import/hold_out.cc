@@ -23,9 +23,7 @@ std::set<double> TrainingTimes(const Scene& scene) {
 }
 
 bool AllHaveTimes(const Scene& scene) {
-  return std::all_of(scene.views.begin(), scene.views.end(), [](const View& view) {
-    return view.moment.has_value();
-  });
+  return std::ranges::all_of(scene.views, [](const View& view) { return view.moment.has_value(); });
 }
 
 }  // namespace
@@ -61,7 +59,7 @@ std::vector<HoldOutKind> HeldOutKinds(const Scene& scene) {
       how[i] = HoldOutKind::kCamera;
       continue;
     }
-    const auto time = std::lower_bound(times.begin(), times.end(), view.time_s()) - times.begin();
+    const auto time = std::ranges::lower_bound(times, view.time_s()) - times.begin();
     how[i] = is_open(time - 1) || is_open(time + 1) ? HoldOutKind::kBlock : HoldOutKind::kMoment;
   }
   return how;

@@ -131,7 +131,7 @@ TEST_F(ImportedScene, WritersUseWorldCoordinates) {
   WriteColmapText(scene, again.path());
   WriteTransformsJson(scene, again.path() / "transforms.json");
   const Scene colmap = ReadColmapModel(again.path(), again.path());
-  const Scene transforms = ReadTransformsJson(again.path() / "transforms.json", again.path());
+  const Scene transforms = ReadTransformsJson({again.path() / "transforms.json"}, again.path());
   const Scene written = ReadColmapModel(folder_.path(), folder_.path());
   for (size_t i = 0; i < written.views.size(); ++i) {
     const Eigen::Vector3d there = written.views[i].cam_from_world.Center();

@@ -108,7 +108,7 @@ class Groups {
   int Largest() {
     std::vector<int> sizes(parent_.size(), 0);
     for (size_t i = 0; i < parent_.size(); ++i) ++sizes[Find(static_cast<int>(i))];
-    return sizes.empty() ? 0 : *std::max_element(sizes.begin(), sizes.end());
+    return sizes.empty() ? 0 : *std::ranges::max_element(sizes);
   }
 
  private:

@@ -292,16 +292,7 @@ SfmResult SceneOfModel(const ColmapModel& model,
     result.scene.views.push_back(std::move(view));
   }
   for (const ColmapPoint& from : model.points) {
-    SparsePoint point;
-    point.position = from.position;
-    point.reprojection_error_px = from.error_px;
-    std::set<int> views;
-    for (uint32_t id : from.image_ids) {
-      const auto it = view_of_image.find(id);
-      if (it != view_of_image.end()) views.insert(it->second);
-    }
-    point.views.assign(views.begin(), views.end());
-    result.scene.points.push_back(std::move(point));
+    result.scene.points.push_back(MakeSparsePoint(from, view_of_image));
   }
   return result;
 }
