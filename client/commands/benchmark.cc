@@ -20,7 +20,7 @@
 namespace color3d::client {
 namespace {
 
-constexpr int kPhotosToLookAt = 5;
+constexpr int kInspectedPhotos = 5;
 constexpr size_t kMinPhotos = 3;
 
 struct BenchmarkView {
@@ -189,7 +189,7 @@ void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& canc
                           folder.photos.size(),
                           kMinPhotos);
   }
-  const ColorCount count = CountColorPhotos(folder, kPhotosToLookAt, cancel);
+  const ColorCount count = CountColorPhotos(folder, kInspectedPhotos, cancel);
   if (count.MostlyColor()) return;
   throw InvalidArgument(
       "the photographs in {} are monochrome ({} of {} looked at); --benchmark drops the colour of "
@@ -205,7 +205,8 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
                              const PhotoFolder& folder,
                              ProgressDisplay& display) {
   const ScratchFolder scratch;
-  display.Say(fmt::format("benchmark: dropping the colour of {} photos", folder.photos.size()));
+  display.PrintLine(
+      fmt::format("benchmark: dropping the colour of {} photos", folder.photos.size()));
   const GrayCopies copies = MakeGrayCopies(folder, scratch.path(), *context.interrupt);
   const v1::Scene scene = UploadScene(
       connection,
@@ -226,10 +227,10 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);
   });
-  display.Say(fmt::format("key {} {}; {} views are held out and scored",
-                          selection.key_views.size() == 1 ? "view" : "views",
-                          fmt::join(selection.key_views, ", "),
-                          colorize->truth_size()));
+  display.PrintLine(fmt::format("key {} {}; {} views are held out and scored",
+                                selection.key_views.size() == 1 ? "view" : "views",
+                                fmt::join(selection.key_views, ", "),
+                                colorize->truth_size()));
   return spec;
 }
 

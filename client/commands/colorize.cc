@@ -83,7 +83,7 @@ class Colorize {
                                 ? ", each camera's in a folder of its own, with --film"
                                 : ", named in transforms.json with their times");
     }
-    if (options_.benchmark && folder_.film) TakeFilmForBenchmark();
+    if (options_.benchmark && folder_.film) DecodeFilmForBenchmark();
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);
     Connect();
@@ -101,7 +101,7 @@ class Colorize {
   }
 
   // Replaces the film by its frames as pictures, so that their colour can be dropped.
-  void TakeFilmForBenchmark() {
+  void DecodeFilmForBenchmark() {
     frames_.emplace();
     const v1::ImportSceneSpec import = ImportSpec(options_, "").import_scene();
     FilmAsFrames film = DecodeFilmFrames(
@@ -142,9 +142,9 @@ class Colorize {
     for (const std::string& input : JobAndInputs(*connection_, *state.accepted)) {
       spec.add_inputs(input);
     }
-    display_.Say(fmt::format("key view {}, as accepted ({})",
-                             ReadChoice(*connection_, *state.accepted).view,
-                             state.accepted->name()));
+    display_.PrintLine(fmt::format("key view {}, as accepted ({})",
+                                   ReadChoice(*connection_, *state.accepted).view,
+                                   state.accepted->name()));
     return spec;
   }
 
@@ -174,8 +174,8 @@ class Colorize {
     colorize->set_key_view(KeyView());
     *colorize->mutable_key_color() = UploadKeyColor(*connection_, options_.color);
     AddKeyViews(*connection_, options_, colorize);
-    display_.Say("key view " + (colorize->key_view().empty() ? std::string("will be selected")
-                                                             : colorize->key_view()));
+    display_.PrintLine("key view " + (colorize->key_view().empty() ? std::string("will be selected")
+                                                                   : colorize->key_view()));
     return spec;
   }
 

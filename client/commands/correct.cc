@@ -27,7 +27,7 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr char kAllOfThem[] = "all";
+constexpr char kAllCorrections[] = "all";
 
 struct CorrectOptions {
   std::string target;  // folder of results, jobs/ID or scenes/ID
@@ -37,12 +37,12 @@ struct CorrectOptions {
   std::string at;       // "X,Y" px of the photo
   std::string color;    // "#rrggbb"
   double radius = 8.0;  // px
-  std::string undo;     // a number of corrections, or kAllOfThem
+  std::string undo;     // a number of corrections, or kAllCorrections
   std::optional<double> saturation, tint, warmth;
   std::optional<int> proposals;
 
   bool Paints() const { return paint.HasSource() || !at.empty(); }
-  bool ChangesWhole() const { return saturation || tint || warmth; }
+  bool ChangesScene() const { return saturation || tint || warmth; }
 };
 
 // A disc, in the format of hints.
@@ -84,10 +84,10 @@ void Check(const CorrectOptions& options) {
 }
 
 // Removes the last corrections. Throws Error{kInvalidArgument} if there are fewer.
-void Undo(const std::string& how_many, v1::CorrectColorsSpec* correct) {
+void RemoveCorrections(const std::string& how_many, v1::CorrectColorsSpec* correct) {
   const int count = correct->corrections_size();
   int drop = 0, end = 0;
-  if (how_many == kAllOfThem) {
+  if (how_many == kAllCorrections) {
     drop = count;
   } else if (std::sscanf(how_many.c_str(), "%d%n", &drop, &end) != 1 || drop < 1 ||
              static_cast<size_t>(end) != how_many.size()) {
@@ -113,12 +113,12 @@ v1::KeyColorSource Upload(Connection& connection, const CorrectOptions& options)
   return UploadKeyColor(connection, flags);
 }
 
-v1::JobSpec SpecOf(Connection& connection, const CorrectOptions& options, const v1::Job& job) {
+v1::JobSpec MakeSpec(Connection& connection, const CorrectOptions& options, const v1::Job& job) {
   v1::JobSpec spec = job.spec();
   spec.set_skip_cache(false);
   v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
   v1::CorrectColorsSpec* correct = scene->mutable_correct_colors();
-  if (!options.undo.empty()) Undo(options.undo, correct);
+  if (!options.undo.empty()) RemoveCorrections(options.undo, correct);
   if (options.Paints()) {
     v1::FurtherKeyView* correction = correct->add_corrections();
     correction->set_view(options.view);
@@ -127,7 +127,7 @@ v1::JobSpec SpecOf(Connection& connection, const CorrectOptions& options, const 
   if (options.proposals) correct->set_proposals(*options.proposals);
   // Changes of the whole scene need no stage for places.
   if (correct->corrections().empty() && !options.proposals &&
-      (options.ChangesWhole() || !options.undo.empty())) {
+      (options.ChangesScene() || !options.undo.empty())) {
     scene->clear_correct_colors();
   }
   v1::SolveChromaSpec* solve = scene->mutable_solve_chroma();
@@ -183,7 +183,8 @@ void FetchScene(Connection& connection,
   }
   const auto fetched = DownloadArtifacts(connection, files, out, display);
   if (std::ranges::find(fetched, artifact::kViewPage) == fetched.end()) return;
-  display.Say((out / artifact::kViewPage).string() + " shows the corrected scene; metrics follow");
+  display.PrintLine((out / artifact::kViewPage).string() +
+                    " shows the corrected scene; metrics follow");
 }
 
 std::string ProposalText(const Context& context,
@@ -227,7 +228,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
   const bool folder = !IsOnServer(options.target);
   if (options.out.empty()) options.out = folder ? options.target : "corrected";
   // Without a correction: proposals only.
-  if (!options.Paints() && !options.ChangesWhole() && options.undo.empty() && !options.proposals) {
+  if (!options.Paints() && !options.ChangesScene() && options.undo.empty() && !options.proposals) {
     options.proposals = 3;
   }
   Connection connection(context.server, *context.interrupt);
@@ -240,7 +241,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
                 kind::kColorizeScene);
   }
   PrepareOut(options.out);
-  const v1::Job submitted = SubmitJob(connection, SpecOf(connection, options, before));
+  const v1::Job submitted = SubmitJob(connection, MakeSpec(connection, options, before));
   ProgressDisplay display(context.json);
   // The corrected scene can be viewed before it is scored and reported.
   const auto fetch_scene = [&](const v1::Job& stage) {

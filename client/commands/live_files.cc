@@ -34,7 +34,7 @@ void AddFolder(const Context& context, const fs::path& folder, std::vector<LiveP
 }
 
 // Distinct names for the coloured pictures.
-std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
+std::vector<std::string> OutputNames(const std::vector<LivePicture>& pictures) {
   std::set<std::string> taken;
   std::vector<std::string> names;
   for (const LivePicture& picture : pictures) {
@@ -95,7 +95,7 @@ LiveSummary ColorizeToFiles(Connection& connection,
                             const LiveOptions& options,
                             const fs::path& out) {
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<std::string> names = NamesFor(pictures);
+  const std::vector<std::string> names = OutputNames(pictures);
   std::vector<std::string> written(pictures.size());
   std::vector<std::string> errors(pictures.size());
   LiveSummary summary;

@@ -97,7 +97,7 @@ v1::Digest UploadCameras(Connection& connection, const std::string& path) {
   return ToProto(upload.digest);
 }
 
-int FramesOf(const MovieOptions& options) {
+int FrameCount(const MovieOptions& options) {
   const double frames = options.seconds.value_or(kSeconds) * options.frames_per_second;
   if (!std::isfinite(frames) || frames > 1e9) {
     throw InvalidArgument("--seconds {} at --fps {} are more frames than can be counted",
@@ -107,7 +107,7 @@ int FramesOf(const MovieOptions& options) {
   return static_cast<int>(std::lround(frames));
 }
 
-v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1::Job& of) {
+v1::JobSpec MakeSpec(Connection& connection, const MovieOptions& options, const v1::Job& of) {
   v1::JobSpec spec;
   spec.set_scene(of.spec().scene());
   spec.set_skip_cache(options.skip_cache);
@@ -135,7 +135,7 @@ v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1
       !options.seconds &&
       (render->has_cameras() || options.path == kStill ||
        (options.path == kOriginal && options.frames_per_second == kFramesPerSecond));
-  if (!as_in_the_file) render->set_frames(FramesOf(options));
+  if (!as_in_the_file) render->set_frames(FrameCount(options));
   render->set_frames_per_second(options.frames_per_second);
   render->set_video(options.video);
   render->set_pictures(options.pictures);
@@ -170,7 +170,7 @@ ExitCode RunMovie(const Context& context, const MovieOptions& options) {
   Connection connection(context.server, *context.interrupt);
   const v1::Job of = FindColoredScene(connection, options.target);
   PrepareOut(folder.empty() ? fs::path(".") : folder);
-  const v1::Job submitted = SubmitJob(connection, SpecOf(connection, options, of));
+  const v1::Job submitted = SubmitJob(connection, MakeSpec(connection, options, of));
   ProgressDisplay display(context.json);
   const v1::Job job = FollowToSuccess(
       connection, context, {submitted.name()}, folder.empty() ? "." : folder.string(), display);

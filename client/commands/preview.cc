@@ -62,7 +62,7 @@ v1::Digest UploadExample(Connection& connection, const fs::path& file) {
 }
 
 // The coloured key view of the scene: the accepted one, else the newest.
-v1::Digest ExampleOf(Connection& connection, const std::string& scene, std::string* key) {
+v1::Digest FindExample(Connection& connection, const std::string& scene, std::string* key) {
   const KeyState state = ReadKeyState(connection, scene);
   const std::optional<v1::Job>& job = state.accepted ? state.accepted : state.colored;
   if (!job) {
@@ -91,7 +91,7 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
   LiveSource source;
   if (options.key_color.empty()) {
     std::string of_scene;
-    source.example = ExampleOf(connection, options.target, &of_scene);
+    source.example = FindExample(connection, options.target, &of_scene);
     if (key.empty()) key = of_scene;
   } else {
     source.example = UploadExample(connection, options.key_color);

@@ -21,15 +21,15 @@ std::string UploadFolder(Connection& connection,
       UploadScene(connection, entries, folder.Name(), [&](int64_t done, int64_t total) {
         display.OnTransfer("uploading", done, total);
       });
-  display.Say(folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
-              : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
-              : !folder.camera_films.empty()
-                  ? fmt::format("{}: {} films of cameras{}",
-                                scene.name(),
-                                folder.camera_films.size(),
-                                folder.model_files.empty() ? "; their poses will be estimated"
-                                                           : " with poses")
-                  : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
+  display.PrintLine(folder.splat  ? fmt::format("{}: the splat {}", scene.name(), folder.Name())
+                    : folder.film ? fmt::format("{}: the film {}", scene.name(), folder.Name())
+                    : !folder.camera_films.empty()
+                        ? fmt::format("{}: {} films of cameras{}",
+                                      scene.name(),
+                                      folder.camera_films.size(),
+                                      folder.model_files.empty() ? "; their poses will be estimated"
+                                                                 : " with poses")
+                        : fmt::format("{}: {} photos", scene.name(), scene.photo_count()));
   return scene.name();
 }
 

@@ -32,11 +32,11 @@ struct ViewOptions {
   bool open = true;
 };
 
-constexpr const char* kHowToGetPage =
+constexpr const char* kPageRemedy =
     "the scene is of an older version, or the worker was built without the viewer; build it where "
     "npm reaches its registry, and run `color3d colorize` again";
 
-fs::path PageIn(const fs::path& target) {
+fs::path FindPage(const fs::path& target) {
   std::error_code none;
   if (IsFile(target) && target.extension() == ".html") return target;
   if (!IsFolder(target)) {
@@ -52,7 +52,7 @@ fs::path PageIn(const fs::path& target) {
                 "{} has results, but no {}: {}",
                 target.string(),
                 artifact::kViewPage,
-                kHowToGetPage);
+                kPageRemedy);
   }
   throw Error(ErrorCode::kFailedPrecondition,
               "{} has no {}: it holds no finished results of `color3d colorize`; when the job is "
@@ -92,7 +92,7 @@ fs::path Download(const Context& context, const ViewOptions& options) {
               "{} has results, but no {}: {}",
               job.name(),
               artifact::kViewPage,
-              kHowToGetPage);
+              kPageRemedy);
 }
 
 // Starts `program` on a file in a session of its own, because it may become the browser and must
@@ -136,7 +136,7 @@ bool OpenInBrowser(const fs::path& page) {
 
 ExitCode RunView(const Context& context, const ViewOptions& options) {
   const fs::path page = fs::absolute(IsOnServer(options.target) ? Download(context, options)
-                                                                : PageIn(options.target));
+                                                                : FindPage(options.target));
   const bool opened = options.open && OpenInBrowser(page);
   if (context.json) {
     PrintJson({{"page", page.string()}, {"opened", opened}});

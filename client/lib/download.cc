@@ -43,7 +43,7 @@ class Download {
     }
     if (digest_.size_bytes == 0) std::ofstream(part_, std::ios::binary);
     if (DigestFile(part_).sha256 == digest_.sha256) return;
-    if (digest_.size_bytes > 0) ReceiveWhole(progress);
+    if (digest_.size_bytes > 0) ReceiveAll(progress);
     if (fs::exists(part_, none) && DigestFile(part_).sha256 == digest_.sha256) return;
     fs::remove(part_, none);
     throw Error(ErrorCode::kDataLoss,
@@ -54,7 +54,7 @@ class Download {
  private:
   // The server notices that a blob is damaged only if it sends all of it in one stream; it then
   // moves it aside, so that the next upload or run replaces it. Throws the error of the server.
-  void ReceiveWhole(const std::function<void(int64_t)>& progress) {
+  void ReceiveAll(const std::function<void(int64_t)>& progress) {
     std::error_code none;
     fs::remove(part_, none);
     received_ = 0;

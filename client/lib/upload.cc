@@ -60,7 +60,7 @@ class Upload {
       best = std::max(best, committed_);
       if (status.ok() || !turned_away.Wait(RpcError(status))) {
         if (!status.ok()) ThrowIfFinal(status);
-        if (!backoff.Wait(connection_.cancel())) GiveUp(status);
+        if (!backoff.Wait(connection_.cancel())) ThrowFinalError(status);
       }
       QueryCommittedSize();
     }
@@ -122,7 +122,7 @@ class Upload {
     if (!again) throw error;
   }
 
-  [[noreturn]] void GiveUp(const grpc::Status& status) const {
+  [[noreturn]] void ThrowFinalError(const grpc::Status& status) const {
     if (status.ok() || RpcError(status).IsUnreachable()) {
       throw ConnectionLostError(connection_.address());
     }

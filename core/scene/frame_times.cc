@@ -94,7 +94,7 @@ double MedianStep(const FramesByCamera& cameras, const std::vector<double>& time
 
 // Returns the tick of each frame if all cameras follow one clock to a quarter of a step; else
 // empty. Steps are counted one by one, since rounded times drift against any constant step.
-std::vector<int64_t> TicksOf(const FramesByCamera& cameras, const std::vector<double>& times) {
+std::vector<int64_t> CountTicks(const FramesByCamera& cameras, const std::vector<double>& times) {
   constexpr double kMaxSteps = 1e6;  // missing between two frames
   const double step = MedianStep(cameras, times);
   if (!(step > 0.0)) return {};
@@ -132,7 +132,7 @@ void ShareMoments(const std::vector<std::string>& camera,
                   FrameMoments* result) {
   const FramesByCamera cameras = ByCamera(camera, *times);
   if (cameras.size() < 2) return;
-  const std::vector<int64_t> ticks = TicksOf(cameras, *times);
+  const std::vector<int64_t> ticks = CountTicks(cameras, *times);
   result->one_clock = !ticks.empty();
   if (ticks.empty()) return;
   std::map<int64_t, double> earliest;

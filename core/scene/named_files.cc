@@ -28,7 +28,7 @@ std::string WithoutEnding(const std::string& path) {
 }
 
 // Parts of a name below its drive, root or "..".
-std::vector<std::string> PartsOf(std::string name) {
+std::vector<std::string> SplitPath(std::string name) {
   std::ranges::replace(name, '\\', '/');
   std::vector<std::string> parts;
   size_t begin = 0;
@@ -46,7 +46,8 @@ std::vector<std::string> PartsOf(std::string name) {
   return parts;
 }
 
-std::vector<std::string> FilesOf(const fs::path& scene_folder, bool (*is_one)(std::string_view)) {
+std::vector<std::string> ListNamedFiles(const fs::path& scene_folder,
+                                        bool (*is_one)(std::string_view)) {
   std::vector<std::string> files;
   for (std::string& file : ListFiles(scene_folder)) {
     if (is_one(file) && !IsAugmentFile(file) && !IsMaskFile(file)) files.push_back(std::move(file));
@@ -67,12 +68,12 @@ NamedFiles::NamedFiles(std::vector<std::string> files) : files_(std::move(files)
 
 NamedFiles NamedFiles::Photos(const fs::path& scene_folder) {
   return NamedFiles(
-      FilesOf(scene_folder, [](std::string_view path) { return HasImageExtension(path); }));
+      ListNamedFiles(scene_folder, [](std::string_view path) { return HasImageExtension(path); }));
 }
 
 NamedFiles NamedFiles::Films(const fs::path& scene_folder) {
   return NamedFiles(
-      FilesOf(scene_folder, [](std::string_view path) { return HasFilmExtension(path); }));
+      ListNamedFiles(scene_folder, [](std::string_view path) { return HasFilmExtension(path); }));
 }
 
 const std::string* NamedFiles::Only(const Index& index, const std::string& key) {
@@ -105,7 +106,7 @@ NamedFiles::Match NamedFiles::LookUp(const std::string& path) const {
 }
 
 NamedFiles::Match NamedFiles::Look(const std::string& name) const {
-  std::vector<std::string> parts = PartsOf(name);
+  std::vector<std::string> parts = SplitPath(name);
   for (int left_out = 0; !parts.empty(); ++left_out) {
     std::string path;
     for (const std::string& part : parts) path += (path.empty() ? "" : "/") + part;

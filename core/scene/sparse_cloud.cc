@@ -32,7 +32,7 @@ double Baseline(const Scene& scene, const Eigen::Vector3d& mean) {
   return radius > 1e-12 ? radius : 1.0;
 }
 
-bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
+bool IsVisible(const View& view, const Eigen::Vector3d& world, double near) {
   const Eigen::Vector3d p = view.cam_from_world.Apply(world);
   if (p.z() <= 0.0 || p.z() < near) return false;
   return view.camera.Contains(view.camera.Project(p));
@@ -41,7 +41,7 @@ bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
 std::vector<int> AllViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
   std::vector<int> views;
   for (size_t i = 0; i < scene.views.size(); ++i) {
-    if (Sees(scene.views[i], world, near)) views.push_back(static_cast<int>(i));
+    if (IsVisible(scene.views[i], world, near)) views.push_back(static_cast<int>(i));
   }
   return views;
 }
@@ -61,7 +61,7 @@ struct DepthRange {
 // Range around the point where the axes meet. Measured on three scenes without their points
 // (held-out luminance after 800 iterations at 252 px): 0.4 to 1.4 dB better than a box around the
 // focus, which is better than a range of 0.3..4, whose nearest points hide all others.
-DepthRange RangeOf(const View& view, const Eigen::Vector3d& focus, double distance) {
+DepthRange PlausibleDepths(const View& view, const Eigen::Vector3d& focus, double distance) {
   const double depth = std::max(view.cam_from_world.Apply(focus).z(), distance);
   return {0.6 * depth, 2.0 * depth};
 }
@@ -117,7 +117,7 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     if (static_cast<int>(points.size()) == count) break;
     // Picks pixels of all views in turn, at a depth uniform in 1 / z, as parallax is.
     const View& view = scene.views[attempt % static_cast<int64_t>(scene.views.size())];
-    const DepthRange range = RangeOf(view, focus, 0.3 * distance);
+    const DepthRange range = PlausibleDepths(view, focus, 0.3 * distance);
     const double z = 1.0 / random.NextUniform(1.0 / range.far, 1.0 / range.near);
     const double u = random.NextUniform(0.0, view.camera.width);
     const double v = random.NextUniform(0.0, view.camera.height);

@@ -145,7 +145,7 @@ struct ViewImages::Impl {
   // and times for photos of 50 megapixels.
   int RemapSide() const { return max_side_px > 0 ? 2 * max_side_px : 0; }
 
-  std::shared_ptr<const RemapTable> TableOf(int view) {
+  std::shared_ptr<const RemapTable> FindTable(int view) {
     constexpr size_t kMaxTables = 4;
     const int lens = lens_of_view[view];
     {
@@ -187,7 +187,7 @@ struct ViewImages::Impl {
     const View& v = At(view);
     if (IsUndistorted(v.distortion)) return picture;
     const Camera working = v.camera.FitWithin(max_side_px);
-    return Resize(Remap(picture, *TableOf(view)), working.width, working.height);
+    return Resize(Remap(picture, *FindTable(view)), working.width, working.height);
   }
 
   Image Undistorted(int view, const Image& captured) {

@@ -80,7 +80,7 @@ json ReadTransforms(const fs::path& file) {
 }
 
 // Returns files below `root` with the names of a COLMAP model's files.
-std::vector<std::string> FilesOfModels(const fs::path& root) {
+std::vector<std::string> FindModelFiles(const fs::path& root) {
   std::vector<std::string> files;
   std::error_code error;
   const auto options = fs::directory_options::skip_permission_denied |
@@ -102,16 +102,16 @@ std::vector<std::string> FilesOfModels(const fs::path& root) {
   return files;
 }
 
-std::vector<std::string> FilesOfColmap(const fs::path& root) {
+std::vector<std::string> FindColmapFiles(const fs::path& root) {
   std::vector<std::string> files;
-  for (const ColmapPlace& place : ColmapPlaces(FilesOfModels(root))) {
+  for (const ColmapPlace& place : ColmapPlaces(FindModelFiles(root))) {
     files.insert(files.end(), place.files.begin(), place.files.end());
   }
   return files;
 }
 
 // Returns the file of points of transforms; empty if there is none.
-std::string FileOfPoints(const fs::path& root, const std::string& transforms) {
+std::string FindPointFile(const fs::path& root, const std::string& transforms) {
   const json named = ReadTransforms(root / transforms).value("ply_file_path", json());
   if (named.is_string()) {
     const std::string path = NormalizedPath(named.get<std::string>());
@@ -125,7 +125,7 @@ std::string FileOfPoints(const fs::path& root, const std::string& transforms) {
   return "";
 }
 
-void NotePosesNotRead(const fs::path& root, PhotoFolder* result) {
+void NoteUnreadPoses(const fs::path& root, PhotoFolder* result) {
   std::error_code none;
   std::vector<std::string> found;
   for (const auto& entry : fs::directory_iterator(root, none)) {
@@ -145,7 +145,7 @@ void NotePosesNotRead(const fs::path& root, PhotoFolder* result) {
                   (root / "sparse").string()));
 }
 
-void NoteTimesNotRead(PhotoFolder* result) {
+void NoteUnreadTimes(PhotoFolder* result) {
   result->notes.push_back(
       std::string(kTimesFile) + " is not read: it goes with a COLMAP model" +
       (result->model_files.empty()
@@ -195,7 +195,7 @@ std::string ImagesFolder(const fs::path& root) {
 
 bool HasPoses(const fs::path& root) {
   return !TransformsIn(root).empty() || IsFile(root / kPosesBoundsFile) ||
-         !FilesOfColmap(root).empty();
+         !FindColmapFiles(root).empty();
 }
 
 std::string FindSiblingPoses(const fs::path& root) {
@@ -222,21 +222,21 @@ std::string FindSinglePhotoFolder(const fs::path& root) {
 void CollectModelFiles(const fs::path& root, PhotoFolder* folder) {
   std::vector<LocalFile>& files = folder->model_files;
   const auto add = [&](const std::string& file) { files.push_back({file, root / file}); };
-  const std::vector<std::string> colmap = FilesOfColmap(root);
+  const std::vector<std::string> colmap = FindColmapFiles(root);
   for (const std::string& file : colmap) add(file);
   const std::vector<std::string> transforms = TransformsIn(root);
   for (const std::string& file : transforms) add(file);
   const bool of_photos = folder->camera_films.empty();
   if (of_photos && !transforms.empty()) {
-    const std::string points = FileOfPoints(root, transforms[0]);
+    const std::string points = FindPointFile(root, transforms[0]);
     if (!points.empty()) add(points);
   }
   if (transforms.empty() && colmap.empty() && IsFile(root / kPosesBoundsFile)) {
     add(std::string(kPosesBoundsFile));
   }
-  if (of_photos && files.empty()) NotePosesNotRead(root, folder);
+  if (of_photos && files.empty()) NoteUnreadPoses(root, folder);
   if (!IsFile(root / kTimesFile)) return;
-  if (colmap.empty()) return NoteTimesNotRead(folder);
+  if (colmap.empty()) return NoteUnreadTimes(folder);
   add(std::string(kTimesFile));
 }
 

@@ -88,7 +88,7 @@ constexpr const char* kResultRecords[] = {artifact::kKeyView,
                                           artifact::kImportFacts,
                                           artifact::kReport};
 template <typename List>
-bool Holds(const List& list, std::string_view text) {
+bool Contains(const List& list, std::string_view text) {
   return std::ranges::find(list, text) != std::end(list);
 }
 
@@ -133,7 +133,7 @@ size_t CountPictures(const fs::path& folder) {
   return count;
 }
 
-bool HoldsPictures(const fs::path& folder) {
+bool ContainsPictures(const fs::path& folder) {
   std::error_code error;
   constexpr auto kOptions = fs::directory_options::skip_permission_denied;
   fs::recursive_directory_iterator entries(folder, kOptions, error);
@@ -155,7 +155,7 @@ class Lister {
   }
 
  private:
-  void PassOver(const std::string& kind, const std::string& path) {
+  void Skip(const std::string& kind, const std::string& path) {
     if (skipped_ != nullptr) skipped_->Add(kind, path);
   }
 
@@ -175,53 +175,53 @@ class Lister {
       const std::string name = entry.path().filename().string();
       std::error_code none;
       if (entry.is_directory(none)) {
-        LookAtFolder(entry, below + name, name, has_results);
-      } else if (LookAtFile(entry, below + name, name)) {
+        VisitFolder(entry, below + name, name, has_results);
+      } else if (VisitFile(entry, below + name, name)) {
         pictures.push_back(name);
       }
     }
     AddWithoutCopies(below, std::move(pictures));
   }
 
-  void LookAtFolder(const fs::directory_entry& entry,
-                    const std::string& path,
-                    const std::string& name,
-                    bool beside_results) {
+  void VisitFolder(const fs::directory_entry& entry,
+                   const std::string& path,
+                   const std::string& name,
+                   bool beside_results) {
     if (!with_subfolders_) return;
     if (IsSystemFolder(name)) {
-      if (!HoldsPictures(entry.path())) return;
-      PassOver("folders that programs keep for thumbnails and the like", path);
+      if (!ContainsPictures(entry.path())) return;
+      Skip("folders that programs keep for thumbnails and the like", path);
       return;
     }
     if (name.starts_with('.')) return;
     std::error_code none;
     if (entry.is_symlink(none)) {
-      PassOver("links to folders|put the photographs themselves there", path);
+      Skip("links to folders|put the photographs themselves there", path);
     } else if (beside_results && FindArtifact(name + "/") != nullptr) {
-      PassOver("folders of results", path);
+      Skip("folders of results", path);
     } else {
       ListFolder(path + "/");
     }
   }
 
   // Returns true for files that may be photos.
-  bool LookAtFile(const fs::directory_entry& entry,
-                  const std::string& path,
-                  const std::string& name) {
+  bool VisitFile(const fs::directory_entry& entry,
+                 const std::string& path,
+                 const std::string& name) {
     std::error_code none;
     const bool readable = HasImageExtension(name);
     const Kind* kind = KindOf(name);
     if (!readable && kind == nullptr) return false;
     if (IsSystemFile(name)) {
-      PassOver("hidden pictures", path);
+      Skip("hidden pictures", path);
     } else if (entry.is_symlink(none) && !fs::exists(entry.status(none))) {
-      PassOver("links that lead nowhere|put the pictures themselves there", path);
+      Skip("links that lead nowhere|put the pictures themselves there", path);
     } else if (!entry.is_regular_file(none)) {
       return false;
     } else if (IsResultFile(entry.path())) {
-      PassOver("results of color3d|name another folder with -o to keep them apart", path);
+      Skip("results of color3d|name another folder with -o to keep them apart", path);
     } else if (!readable) {
-      PassOver(std::string(kind->name) + "|" + kind->remedy, path);
+      Skip(std::string(kind->name) + "|" + kind->remedy, path);
     } else if (IsHeic(name)) {
       return IsGoodHeic(entry.path(), path);
     } else {
@@ -236,8 +236,8 @@ class Lister {
       ProbeImage(ReadFile(file), path);
       return true;
     } catch (const Error& e) {
-      PassOver(fmt::format("HEIC pictures that cannot be read|{} ({})", kKinds[0].remedy, e.what()),
-               path);
+      Skip(fmt::format("HEIC pictures that cannot be read|{} ({})", kKinds[0].remedy, e.what()),
+           path);
       return false;
     }
   }
@@ -251,7 +251,7 @@ class Lister {
     }
     for (const std::string& name : pictures) {
       if (IsCopyFormat(name) && !stems.insert(LowerCase(fs::path(name).stem().string())).second) {
-        PassOver("pictures beside another of the same name", below + name);
+        Skip("pictures beside another of the same name", below + name);
       } else {
         found_.push_back(below + name);
       }
@@ -332,8 +332,8 @@ void AddUnusedNeighbors(const fs::path& root,
       // A companion file that a phone stores beside the photo of the same name.
       if (stems.contains(LowerCase(fs::path(name).stem().string()))) continue;
       skipped->Add("films|give the film itself to colour it", name);
-    } else if (entry.is_directory(none) && !IsSystemFolder(name) && !Holds(kOurs, name) &&
-               !Holds(used, name) && !HasResultRecord(entry.path())) {
+    } else if (entry.is_directory(none) && !IsSystemFolder(name) && !Contains(kOurs, name) &&
+               !Contains(used, name) && !HasResultRecord(entry.path())) {
       const size_t count = CountPictures(entry.path());
       if (count == 0) continue;
       skipped->Add("pictures in subfolders|put all photographs into one folder, or below images/",
@@ -358,14 +358,14 @@ bool IsResultFile(const fs::path& file) {
 
 bool IsSystemFolder(std::string_view name) {
   const std::string lowered = LowerCase(name);
-  return Holds(kSystemFolders, lowered) || lowered == ".thumbnails" || lowered == ".thumbs" ||
+  return Contains(kSystemFolders, lowered) || lowered == ".thumbnails" || lowered == ".thumbs" ||
          lowered == ".appledouble" || lowered == ".picasaoriginals" || lowered == ".trash" ||
          lowered.starts_with(".trash-") || lowered.ends_with(".lrdata") ||
          lowered.ends_with(".photoslibrary");
 }
 
 bool IsSystemFile(std::string_view name) {
-  return name.starts_with('.') || Holds(kSystemFiles, LowerCase(name));
+  return name.starts_with('.') || Contains(kSystemFiles, LowerCase(name));
 }
 
 bool IsSystemPath(std::string_view path) {

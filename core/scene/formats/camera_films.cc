@@ -27,7 +27,7 @@ using nlohmann::json;
 
 constexpr char kTransforms[] = "transforms.json";
 
-std::string FileOf(const FrameFields& frame) {
+std::string FilmPath(const FrameFields& frame) {
   std::string file = frame.TextOr("file_path", "");
   while (file.starts_with("./")) file.erase(0, 2);
   return file;
@@ -43,9 +43,9 @@ CameraFilm ReadFilm(const FrameFields& own,
                     const NamedFiles& given,
                     const FilmSize& size) {
   CameraFilm film;
-  film.file = given.Find(FileOf(fields));
+  film.file = given.Find(FilmPath(fields));
   if (film.file.empty()) {
-    throw InvalidArgument("{}: there is no film {} in the scene", fields.place(), FileOf(fields));
+    throw InvalidArgument("{}: there is no film {} in the scene", fields.place(), FilmPath(fields));
   }
   film.camera = own.TextOr("camera", fs::path(film.file).stem().string());
   film.time_offset_s = own.NumberOr("time_offset", 0.0);
@@ -67,7 +67,7 @@ std::vector<CameraFilm> FilmsOfTransforms(const fs::path& scene_folder, const Fi
     const std::string place = fmt::format("{}: frame {}", kTransforms, i);
     if (!frame.is_object()) throw InvalidArgument("{} must be an object", place);
     const FrameFields own(frame, frame, place);
-    if (!HasFilmExtension(FileOf(own))) {
+    if (!HasFilmExtension(FilmPath(own))) {
       photo = place;
       continue;
     }
@@ -75,7 +75,7 @@ std::vector<CameraFilm> FilmsOfTransforms(const fs::path& scene_folder, const Fi
       throw InvalidArgument(
           "{}: {} is a film, whose frames have times of their own; leave `time` out",
           place,
-          FileOf(own));
+          FilmPath(own));
     }
     films.push_back(ReadFilm(own, FrameFields(root, frame, place), given, size));
   }
@@ -128,7 +128,7 @@ void CheckFilms(const std::vector<CameraFilm>& films, const std::string& from) {
 }
 
 // Returns the files of the film's pictures, in order.
-std::vector<fs::path> FilesOf(const CameraFilm& film, const fs::path& scene_folder) {
+std::vector<fs::path> PictureFiles(const CameraFilm& film, const fs::path& scene_folder) {
   if (!film.is_pictures) return {scene_folder / film.file};
   std::vector<fs::path> files;
   for (const std::string& file : ListFiles(scene_folder / film.file)) {
@@ -138,18 +138,18 @@ std::vector<fs::path> FilesOf(const CameraFilm& film, const fs::path& scene_fold
 }
 
 // Throws for copies: they show nothing from a second position.
-void RefuseCopies(const std::vector<CameraFilm>& films, const fs::path& scene_folder) {
+void RejectDuplicateFilms(const std::vector<CameraFilm>& films, const fs::path& scene_folder) {
   std::map<std::vector<uintmax_t>, std::vector<const CameraFilm*>> by_sizes;
   for (const CameraFilm& film : films) {
     std::vector<uintmax_t> sizes;
     std::error_code error;
-    for (const fs::path& file : FilesOf(film, scene_folder)) {
+    for (const fs::path& file : PictureFiles(film, scene_folder)) {
       sizes.push_back(fs::file_size(file, error));
     }
     std::vector<const CameraFilm*>& alike = by_sizes[sizes];
-    const std::vector<fs::path> files = FilesOf(film, scene_folder);
+    const std::vector<fs::path> files = PictureFiles(film, scene_folder);
     for (const CameraFilm* other : alike) {
-      const std::vector<fs::path> of_other = FilesOf(*other, scene_folder);
+      const std::vector<fs::path> of_other = PictureFiles(*other, scene_folder);
       if (std::ranges::equal(files, of_other, &HaveEqualBytes)) {
         throw InvalidArgument(
             "{} and {} are the same film, byte for byte; films of several cameras are each taken "
@@ -228,7 +228,7 @@ std::vector<CameraFilm> ReadCameraFilms(const fs::path& scene_folder, const Film
   }
   if (films.empty()) return films;
   CheckFilms(films, from);
-  RefuseCopies(films, scene_folder);
+  RejectDuplicateFilms(films, scene_folder);
   std::ranges::sort(films, {}, &CameraFilm::camera);
   return films;
 }

@@ -87,7 +87,7 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
 
 // Orders views by the names of their photos, so that the result does not depend on COLMAP's
 // numbers.
-NamedViews NamesOf(const ColmapModel& model, const NamedFiles& photos) {
+NamedViews MatchPhotos(const ColmapModel& model, const NamedFiles& photos) {
   std::vector<std::pair<std::string, uint32_t>> order;
   for (const auto& [id, image] : model.images) order.emplace_back(image.name, id);
   std::ranges::sort(order);
@@ -148,9 +148,9 @@ void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>
 }
 
 // Points without tracks get the views whose picture they fall into.
-std::vector<SparsePoint> PointsOf(const ColmapModel& model,
-                                  const std::map<uint32_t, int>& view_of_image,
-                                  const Scene& scene) {
+std::vector<SparsePoint> MakePoints(const ColmapModel& model,
+                                    const std::map<uint32_t, int>& view_of_image,
+                                    const Scene& scene) {
   std::vector<SparsePoint> points;
   points.reserve(model.points.size());
   for (const ColmapPoint& from : model.points) {
@@ -170,12 +170,12 @@ std::vector<SparsePoint> PointsOf(const ColmapModel& model,
   return points;
 }
 
-Scene SceneOf(const ColmapModel& model,
-              const NamedViews& named,
-              const NamedFiles& photos,
-              const fs::path& scene_folder,
-              std::vector<std::string>* warnings,
-              std::vector<std::string>* cameras) {
+Scene MakeScene(const ColmapModel& model,
+                const NamedViews& named,
+                const NamedFiles& photos,
+                const fs::path& scene_folder,
+                std::vector<std::string>* warnings,
+                std::vector<std::string>* cameras) {
   if (model.images.empty()) throw InvalidArgument("the COLMAP model has no images");
   NoteMissing(named, model.images.size(), warnings);
   if (warnings != nullptr) {
@@ -203,11 +203,11 @@ Scene SceneOf(const ColmapModel& model,
     scene.views.push_back(std::move(view));
   }
   AddMoments(ReadMoments(scene_folder, photos, scene.views), &scene, warnings, cameras);
-  scene.points = PointsOf(model, view_of_image, scene);
+  scene.points = MakePoints(model, view_of_image, scene);
   return scene;
 }
 
-std::string Shown(const std::string& folder) {
+std::string FolderText(const std::string& folder) {
   return folder.empty() ? "the scene's own folder" : folder;
 }
 
@@ -219,7 +219,7 @@ Scene ReadColmapModel(const fs::path& model_folder,
                       std::vector<std::string>* cameras) {
   const ColmapModel model = LoadColmapModel(model_folder);
   const NamedFiles photos = NamedFiles::Photos(scene_folder);
-  return SceneOf(model, NamesOf(model, photos), photos, scene_folder, warnings, cameras);
+  return MakeScene(model, MatchPhotos(model, photos), photos, scene_folder, warnings, cameras);
 }
 
 std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
@@ -233,13 +233,14 @@ std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
   for (const ColmapPlace& place : places) {
     try {
       const ColmapModel model = LoadColmapModel(scene_folder / place.folder);
-      const size_t found = NamesOf(model, photos).images.size();
-      counts.push_back(fmt::format("{} has {} of {}", Shown(place.folder), found, photos.size()));
+      const size_t found = MatchPhotos(model, photos).images.size();
+      counts.push_back(
+          fmt::format("{} has {} of {}", FolderText(place.folder), found, photos.size()));
       if (!choice || found > choice->photos) choice = ColmapChoice{place.folder, found, {}};
     } catch (const Error& e) {
       if (!refusal) refusal = e;
-      notes.push_back(
-          fmt::format("the COLMAP model in {} is not used: {}", Shown(place.folder), e.what()));
+      notes.push_back(fmt::format(
+          "the COLMAP model in {} is not used: {}", FolderText(place.folder), e.what()));
     }
   }
   if (!choice) throw *refusal;
@@ -248,7 +249,7 @@ std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
     choice->notes.push_back(fmt::format(
         "there are {} COLMAP models; the one in {} is used, since it has most photos ({})",
         counts.size(),
-        Shown(choice->folder),
+        FolderText(choice->folder),
         SummarizeNames(counts, 8)));
   }
   return choice;

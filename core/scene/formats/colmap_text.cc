@@ -126,7 +126,7 @@ bool IsNumber(std::string_view word) {
 
 // Returns true for the line of a photo (number, pose, camera, name), false for one of observations
 // (three numbers each): some programs write no second line for photos without observations.
-bool IsLineOfPhoto(std::string_view line) {
+bool IsImageLine(std::string_view line) {
   constexpr size_t kWordsBeforeName = 9;
   size_t count = 0;
   while (!line.empty() && count < kWordsBeforeName + 2) {
@@ -188,7 +188,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
     bool more = lines.NextLine();
     while (more && lines.Line().starts_with('#')) more = lines.NextLine();
     if (more) {
-      if (IsLineOfPhoto(lines.Line())) lines.PutBack();
+      if (IsImageLine(lines.Line())) lines.PutBack();
       while (!lines.AtEndOfLine()) {
         ColmapObservation observation;
         observation.pixel.x() = lines.Number<double>();

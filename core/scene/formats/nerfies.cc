@@ -38,7 +38,7 @@ json ParseObject(const fs::path& folder, const std::string& file) {
 }
 
 // Flattens nested lists of numbers.
-std::vector<double> NumbersOf(const FrameFields& fields, const char* key, size_t count) {
+std::vector<double> ReadNumbers(const FrameFields& fields, const char* key, size_t count) {
   const json* list = fields.Find(key);
   std::vector<double> numbers;
   bool good = list != nullptr && list->is_array() && list->size() <= count;
@@ -72,7 +72,7 @@ double Positive(const FrameFields& fields, const char* key, double absent) {
 // OpenCV's axes; orientation: from world to camera.
 void ReadCamera(const json& root, const std::string& file, View* view) {
   const FrameFields fields(root, root, file);
-  const std::vector<double> r = NumbersOf(fields, "orientation", 9);
+  const std::vector<double> r = ReadNumbers(fields, "orientation", 9);
   const Eigen::Matrix3d axes =
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data());
   if (!(std::abs(axes.determinant() - 1.0) < 1e-2) ||
@@ -81,12 +81,12 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
         "{}: orientation is not a rotation (determinant {:g})", file, axes.determinant());
   }
   view->cam_from_world.rotation = Eigen::Quaterniond(NearestRotation(axes)).normalized();
-  const std::vector<double> position = NumbersOf(fields, "position", 3);
+  const std::vector<double> position = ReadNumbers(fields, "position", 3);
   const Eigen::Vector3d place(position[0], position[1], position[2]);
   RequireWithinReach(place, file);
   view->cam_from_world.translation = -(view->cam_from_world.rotation * place);
-  const std::vector<double> size = NumbersOf(fields, "image_size", 2);
-  const std::vector<double> center = NumbersOf(fields, "principal_point", 2);
+  const std::vector<double> size = ReadNumbers(fields, "image_size", 2);
+  const std::vector<double> center = ReadNumbers(fields, "principal_point", 2);
   if (!(size[0] >= 1.0 && size[1] >= 1.0 && size[0] <= 1e6 && size[1] <= 1e6)) {
     throw InvalidArgument("{}: image_size is {:g} x {:g} px", file, size[0], size[1]);
   }
@@ -101,9 +101,9 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
                            center[0],
                            center[1]};
   std::vector<double> radial(3, 0.0), tangential(2, 0.0);
-  if (fields.Find("radial_distortion")) radial = NumbersOf(fields, "radial_distortion", 3);
+  if (fields.Find("radial_distortion")) radial = ReadNumbers(fields, "radial_distortion", 3);
   if (fields.Find("tangential_distortion")) {
-    tangential = NumbersOf(fields, "tangential_distortion", 2);
+    tangential = ReadNumbers(fields, "tangential_distortion", 2);
   }
   view->distortion.k = {radial[0], radial[1], tangential[0], tangential[1], radial[2]};
   const auto& k = view->distortion.k;
@@ -113,7 +113,7 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
 }
 
 // Returns the picture of the frame, relative to the scene's folder; empty if there is none.
-std::string PictureOf(const NamedFiles& photos, const std::string& name) {
+std::string FindPicture(const NamedFiles& photos, const std::string& name) {
   for (const char* scale : {"2x", "1x", "4x", "8x"}) {
     const std::string file = photos.Find(fmt::format("rgb/{}/{}", scale, name));
     if (file.starts_with("rgb/")) return file;
@@ -121,7 +121,7 @@ std::string PictureOf(const NamedFiles& photos, const std::string& name) {
   return "";
 }
 
-FrameTime TimeOf(const json& entry, const std::string& name, const std::string& file) {
+FrameTime ReadFrameTime(const json& entry, const std::string& name, const std::string& file) {
   const std::string place = fmt::format("{}: {}", kMetadata, name);
   if (!entry.is_object()) throw InvalidArgument("{} must be an object", place);
   const FrameFields fields(entry, entry, place);
@@ -168,13 +168,13 @@ Scene ReadNerfies(const fs::path& scene_folder,
       throw InvalidArgument("{}: '{}' is no name of a frame", kMetadata, name);
     }
     View view;
-    view.image_file = PictureOf(photos, name);
+    view.image_file = FindPicture(photos, name);
     if (view.image_file.empty()) {
       missing.push_back(name);
       continue;
     }
     view.name = name + fs::path(view.image_file).extension().string();
-    times.push_back(TimeOf(entry, name, view.image_file));
+    times.push_back(ReadFrameTime(entry, name, view.image_file));
     const std::string camera_file = "camera/" + name + ".json";
     ReadCamera(ParseObject(scene_folder, camera_file), camera_file, &view);
     FitViewToFile(scene_folder, &view);

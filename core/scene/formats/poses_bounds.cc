@@ -26,7 +26,7 @@ constexpr size_t kColumns = 17;
 constexpr size_t kMaxValues = 17 * 10'000;
 constexpr double kMaxSidePx = 1e6;
 
-View ViewOf(const double* row, const std::string& place) {
+View MakeView(const double* row, const std::string& place) {
   const auto column = [&](int c) -> Eigen::Vector3d { return {row[c], row[5 + c], row[10 + c]}; };
   Eigen::Matrix3d world_from_cam;  // x right, y down, z forward
   world_from_cam << column(1), column(0), -column(2);
@@ -88,7 +88,7 @@ std::optional<Scene> ReadPosesOfPhotos(const fs::path& scene_folder,
   }
   Scene scene;
   for (size_t i = 0; i < photos.size(); ++i) {
-    View view = ViewOf(&poses.values[i * kColumns], fmt::format("{}: row {}", kPosesBounds, i));
+    View view = MakeView(&poses.values[i * kColumns], fmt::format("{}: row {}", kPosesBounds, i));
     view.name = photos[i].name;
     view.image_file = photos[i].file;
     FitViewToFile(scene_folder, &view);
@@ -120,8 +120,9 @@ std::vector<CameraFilm> ReadPosesBounds(const fs::path& scene_folder) {
   std::vector<CameraFilm> films;
   for (size_t i = 0; i < files.size(); ++i) {
     const std::string place = fmt::format("{}: row {}", kPosesBounds, i);
-    films.push_back(
-        {fs::path(files[i]).stem().string(), files[i], ViewOf(&poses.values[i * kColumns], place)});
+    films.push_back({fs::path(files[i]).stem().string(),
+                     files[i],
+                     MakeView(&poses.values[i * kColumns], place)});
   }
   return films;
 }

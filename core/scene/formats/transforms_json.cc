@@ -37,7 +37,7 @@ std::vector<Source> ReadSources(const std::vector<fs::path>& files) {
   return sources;
 }
 
-std::string NamesOf(const std::vector<Source>& sources) {
+std::string JoinNames(const std::vector<Source>& sources) {
   std::string names;
   for (const Source& source : sources) names += (names.empty() ? "" : " and ") + source.name;
   return names;
@@ -51,7 +51,7 @@ struct Frame {
   std::string photo;
 };
 
-std::vector<Frame> FramesOf(const std::vector<Source>& sources) {
+std::vector<Frame> ReadFrames(const std::vector<Source>& sources) {
   std::vector<Frame> frames;
   for (const Source& source : sources) {
     for (size_t i = 0; i < source.root["frames"].size(); ++i) {
@@ -67,7 +67,8 @@ std::vector<Frame> FramesOf(const std::vector<Source>& sources) {
 }
 
 // Returns the photo of each frame; empty if there is none.
-std::vector<std::string> FilesOf(const std::vector<Frame>& frames, const fs::path& scene_folder) {
+std::vector<std::string> FindPhotos(const std::vector<Frame>& frames,
+                                    const fs::path& scene_folder) {
   std::vector<std::string> names;
   for (const Frame& frame : frames) names.push_back(frame.photo);
   return NamedFiles::Photos(scene_folder).Find(names);
@@ -117,9 +118,9 @@ void NoteMissing(const std::vector<std::string>& missing,
                   SummarizeNames(missing)));
 }
 
-void RefuseTwice(const std::vector<Frame>& frames,
-                 const std::vector<std::string>& files,
-                 const std::string& file_name) {
+void RejectDuplicateFrames(const std::vector<Frame>& frames,
+                           const std::vector<std::string>& files,
+                           const std::string& file_name) {
   std::map<std::string, size_t> frame_of_file;
   for (size_t i = 0; i < files.size(); ++i) {
     if (files[i].empty()) continue;
@@ -149,7 +150,7 @@ std::vector<fs::path> TransformsFiles(const fs::path& scene_folder) {
 size_t CountTransformsPhotos(const std::vector<fs::path>& json_files,
                              const fs::path& scene_folder) {
   const std::vector<Source> sources = ReadSources(json_files);
-  const std::vector<std::string> files = FilesOf(FramesOf(sources), scene_folder);
+  const std::vector<std::string> files = FindPhotos(ReadFrames(sources), scene_folder);
   return files.size() - static_cast<size_t>(std::ranges::count(files, ""));
 }
 
@@ -158,10 +159,10 @@ Scene ReadTransformsJson(const std::vector<fs::path>& json_files,
                          std::vector<std::string>* warnings,
                          std::vector<std::string>* cameras) {
   const std::vector<Source> sources = ReadSources(json_files);
-  const std::string file_name = NamesOf(sources);
-  const std::vector<Frame> frames = FramesOf(sources);
-  const std::vector<std::string> files = FilesOf(frames, scene_folder);
-  RefuseTwice(frames, files, file_name);
+  const std::string file_name = JoinNames(sources);
+  const std::vector<Frame> frames = ReadFrames(sources);
+  const std::vector<std::string> files = FindPhotos(frames, scene_folder);
+  RejectDuplicateFrames(frames, files, file_name);
   Scene scene;
   std::vector<std::string> missing;
   std::vector<FrameTime> times;

@@ -118,7 +118,7 @@ std::vector<PhotoPair> AllPairs(int count) {
 namespace {
 
 // Indices by camera, each ascending.
-std::vector<std::vector<int>> FramesOf(const std::vector<int>& camera) {
+std::vector<std::vector<int>> FramesByCamera(const std::vector<int>& camera) {
   std::map<int, std::vector<int>> frames;
   for (size_t i = 0; i < camera.size(); ++i) frames[camera[i]].push_back(static_cast<int>(i));
   std::vector<std::vector<int>> all;
@@ -142,7 +142,7 @@ int CountRelated(const SimilarityTable& similarity) {
 
 PairPlan PairsInSequence(const std::vector<int>& camera) {
   PairPlan plan;
-  for (const std::vector<int>& frames : FramesOf(camera)) {
+  for (const std::vector<int>& frames : FramesByCamera(camera)) {
     for (size_t i = 0; i < frames.size(); ++i) {
       for (size_t step = 1; step <= 16 && i + step < frames.size(); step *= 2) {
         plan.pairs.push_back(Sorted(frames[i], frames[i + step]));
@@ -157,7 +157,7 @@ PairPlan PairsInSequence(const std::vector<int>& camera) {
 
 std::vector<int> FramesToCompare(const std::vector<int>& camera) {
   constexpr size_t kMostCompared = 120;
-  const std::vector<std::vector<int>> cameras = FramesOf(camera);
+  const std::vector<std::vector<int>> cameras = FramesByCamera(camera);
   if (cameras.size() < 2) return {};
   const size_t share = std::max<size_t>(1, kMostCompared / cameras.size());
   std::vector<int> compared;

@@ -38,7 +38,7 @@ struct Matched {
   Points a, b;
 };
 
-Matched PointsOf(const LocalFeatures& a, const LocalFeatures& b) {
+Matched MatchedPoints(const LocalFeatures& a, const LocalFeatures& b) {
   const auto matches = MutualMatches(a, b);
   Matched out{Points(2, matches.size()), Points(2, matches.size())};
   for (size_t i = 0; i < matches.size(); ++i) {
@@ -122,7 +122,7 @@ class Groups {
 }  // namespace
 
 PairMotion MeasureMotion(const LocalFeatures& a, const LocalFeatures& b) {
-  const Matched points = PointsOf(a, b);
+  const Matched points = MatchedPoints(a, b);
   PairMotion motion;
   motion.matches = static_cast<int>(points.a.cols());
   if (motion.matches < 2) return motion;
@@ -155,7 +155,7 @@ bool ParallaxEvidence::IsFromOnePlace() const {
          turned >= kTurnedPairs * matched && largest_place >= kOnePlace * photos;
 }
 
-ParallaxEvidence LookForParallax(const std::vector<LocalFeatures>& photos,
+ParallaxEvidence MeasureParallax(const std::vector<LocalFeatures>& photos,
                                  ThreadPool& pool,
                                  const CancellationToken& cancel) {
   ParallaxEvidence evidence;

@@ -36,7 +36,7 @@ struct ParallaxEvidence {
   bool IsFromOnePlace() const;
 };
 
-ParallaxEvidence LookForParallax(const std::vector<LocalFeatures>& photos,
+ParallaxEvidence MeasureParallax(const std::vector<LocalFeatures>& photos,
                                  ThreadPool& pool,
                                  const CancellationToken& cancel);
 

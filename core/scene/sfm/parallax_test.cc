@@ -56,7 +56,7 @@ class Points {
 
 ParallaxEvidence Look(const std::vector<LocalFeatures>& photos) {
   ThreadPool pool(2);
-  return LookForParallax(photos, pool, {});
+  return MeasureParallax(photos, pool, {});
 }
 
 TEST(Parallax, DetectsStaticOrRotatingCamera) {

@@ -82,7 +82,7 @@ class Solver {
                         Count()));
         return ColmapModel{};
       }
-      Say(
+      colmap_.Warn(
           fmt::format("{} of {} photos hang together by the planned pairs; comparing all pairs, "
                       "which takes longer",
                       Placed(),
@@ -110,11 +110,6 @@ class Solver {
   // The most similar pairs failed, and they are not similar.
   bool IsHopeless(const PairPlan& plan) const {
     return Placed() == 0 && plan.related < static_cast<int>(kMinPlaced);
-  }
-
-  void Say(const std::string& warning) {
-    colmap_.Note(warning);
-    run_.progress.OnWarning(warning);
   }
 
   void Extract(FeatureDetail detail) {
@@ -168,7 +163,8 @@ class Solver {
     Attempt("exhaustive", Strictness::kDefault);
     if (!AreNearlyAllPlaced()) Attempt("exhaustive_straight", Strictness::kStraight);
     if (!IsHalfPlaced()) Attempt("exhaustive_loose", Strictness::kLoose);
-    if (is_loose_) Say("camera positions were found with loose thresholds only; check them");
+    if (is_loose_)
+      colmap_.Warn("camera positions were found with loose thresholds only; check them");
   }
 
   std::vector<bool> PlacedPhotos() const {
@@ -198,7 +194,7 @@ void RequireParallax(const std::vector<LocalFeatures>& features,
                      const ColmapProcess& colmap,
                      PhotoOrder order,
                      const RunControl& run) {
-  const ParallaxEvidence evidence = LookForParallax(features, run.pool, run.cancel);
+  const ParallaxEvidence evidence = MeasureParallax(features, run.pool, run.cancel);
   colmap.Note(Describe(evidence));
   if (!evidence.IsFromOnePlace()) return;
   if (order == PhotoOrder::kSequence) {
@@ -264,9 +260,9 @@ void RequirePlaced(size_t placed, size_t count, PhotoOrder order, const fs::path
 
 // Converts COLMAP's cameras for the copies to cameras for the photos, and its image numbers to
 // views.
-SfmResult SceneOfModel(const ColmapModel& model,
-                       const std::vector<Photo>& photos,
-                       const std::vector<std::string>& copies) {
+SfmResult MakeScene(const ColmapModel& model,
+                    const std::vector<Photo>& photos,
+                    const std::vector<std::string>& copies) {
   std::map<std::string, uint32_t> image_of_copy;
   for (const auto& [id, image] : model.images) image_of_copy[image.name] = id;
   SfmResult result;
@@ -340,7 +336,7 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
   colmap.Note("planned " + plan.reason);
   const ColmapModel model = Solver(colmap, work, copies, options, order, run, &report).Solve(plan);
   RequirePlaced(model.images.size(), photos.size(), order, colmap.log());
-  SfmResult result = SceneOfModel(model, photos, copies.names);
+  SfmResult result = MakeScene(model, photos, copies.names);
   result.report = std::move(report);
   return result;
 }

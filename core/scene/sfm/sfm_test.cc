@@ -269,7 +269,7 @@ TEST(Parallax, TellsRealCapturesFromStaticCamera) {
                              "video/athlete4cam/cam03"}) {
     if (!fs::exists(data / folder)) continue;
     const bool fixed = std::string(folder).find("athlete") != std::string::npos;
-    const ParallaxEvidence evidence = LookForParallax(FeaturesOf(data / folder), pool, {});
+    const ParallaxEvidence evidence = MeasureParallax(FeaturesOf(data / folder), pool, {});
     EXPECT_EQ(evidence.IsFromOnePlace(), fixed) << folder << ": " << Describe(evidence);
     const double share = evidence.matched > 0 ? 1.0 * evidence.turned / evidence.matched : 0.0;
     EXPECT_TRUE(fixed ? share > 0.95 : share < 0.75) << folder << ": " << Describe(evidence);
