@@ -141,7 +141,8 @@ TEST(SpecNames, RefusesUnknownNames) {
 
 // The files' digests are added to the key by whoever knows the files.
 TEST(SpecNames, CacheKeysNameTheirFiles) {
-  const NewGraph graph = PlanJob(SpecWithNames(), {}, {.photos = 20, .has_poses = true});
+  const NewGraph graph =
+      PlanJob(SpecWithNames(), {}, {.pictures = 20, .layout = CaptureLayout::kColmap});
   std::map<std::string, StageKeyPart> parts;
   for (const NewJob& job : graph.jobs) {
     v1::JobSpec stage;
@@ -169,7 +170,8 @@ TEST(SpecNames, ColorizerKeepsItsEncoder) {
   personalize.name = "jobs/p";
   personalize.kind = "personalize";
   personalize.spec = trained.SerializeAsString();
-  const NewGraph graph = PlanJob(spec, {import, personalize}, {.photos = 20, .has_poses = true});
+  const NewGraph graph =
+      PlanJob(spec, {import, personalize}, {.pictures = 20, .layout = CaptureLayout::kColmap});
   v1::JobSpec planned;
   ASSERT_TRUE(planned.ParseFromString(graph.jobs.back().spec));
   EXPECT_EQ(planned.colorize_views().encoder(), "tiny");
