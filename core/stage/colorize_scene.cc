@@ -47,7 +47,7 @@ void AddByHeldOut(const ordered_json& scores, ordered_json* metrics) {
     (*metrics)[fmt::format("views_{}", how)] = means.at("views");
     for (const std::string& key : KeysInOrder(means)) {
       const Metric* metric = FindMetric(key).metric;
-      if (key == "views" || (metric != nullptr && !metric->by_held_out)) continue;
+      if (key == "views" || (metric != nullptr && !metric->Is(Metric::kByHeldOut))) continue;
       (*metrics)[fmt::format("{}_{}", key, how)] = means.at(key);
     }
   }
@@ -244,7 +244,7 @@ std::vector<std::pair<std::string, std::string>> Headline(const ordered_json& me
   std::vector<std::pair<std::string, std::string>> headline;
   for (const Metric& metric : MetricCatalogue()) {
     const auto found = metrics.find(metric.key);
-    if (!metric.in_headline || found == metrics.end() || !found->is_number()) continue;
+    if (!metric.Is(Metric::kInHeadline) || found == metrics.end() || !found->is_number()) continue;
     headline.emplace_back(metric.label, MetricText(metric.key, found->get<double>()));
   }
   return headline;

@@ -66,10 +66,8 @@ void CheckGiven(const std::map<std::string, JobRecord>& given, const ColorizeSce
       missing = kind;
     }
   }
-  for (const auto& entry : given) {
-    const JobRecord& job = entry.second;
-    const auto is_its_kind = [&](const GivenStage& stage) { return job.kind == stage.kind; };
-    if (std::any_of(std::begin(stages), std::end(stages), is_its_kind)) continue;
+  for (const auto& [kind, job] : given) {
+    if (std::ranges::find(stages, kind, &GivenStage::kind) != std::end(stages)) continue;
     throw InvalidArgument("the input {} is a {} job; {} takes {}, {} and {} jobs only",
                           job.name,
                           job.kind,
