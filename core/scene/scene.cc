@@ -25,11 +25,6 @@ std::vector<int> SelectViews(const std::vector<View>& views, bool held_out) {
   return indices;
 }
 
-bool HasMoments(const std::vector<View>& views) {
-  return !views.empty() &&
-         std::ranges::all_of(views, [](const View& view) { return view.moment.has_value(); });
-}
-
 // Returns true unless all views have the same position and direction.
 bool HasPoses(const std::vector<View>& views) {
   return std::ranges::any_of(views, [&](const View& view) {
@@ -65,8 +60,13 @@ int Scene::FindView(std::string_view name) const {
                                  : "; it has " + known + (views.size() > 3 ? ", ..." : "")));
 }
 
+bool Scene::HasTimes() const {
+  return !views.empty() &&
+         std::ranges::all_of(views, [](const View& view) { return view.moment.has_value(); });
+}
+
 CaptureKind Scene::kind() const {
-  if (!HasMoments(views)) return CaptureKind::kStatic;
+  if (!HasTimes()) return CaptureKind::kStatic;
   if (relief) return CaptureKind::kRelief;
   return HasPoses(views) ? CaptureKind::kDynamic : CaptureKind::kFilm;
 }

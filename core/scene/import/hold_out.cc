@@ -22,10 +22,6 @@ std::set<double> TrainingTimes(const Scene& scene) {
   return times;
 }
 
-bool AllHaveTimes(const Scene& scene) {
-  return std::ranges::all_of(scene.views, [](const View& view) { return view.moment.has_value(); });
-}
-
 }  // namespace
 
 const char* NameOf(HoldOutKind how) {
@@ -44,7 +40,7 @@ const char* NameOf(HoldOutKind how) {
 
 std::vector<HoldOutKind> HeldOutKinds(const Scene& scene) {
   std::vector<HoldOutKind> how(scene.views.size(), HoldOutKind::kNot);
-  if (!AllHaveTimes(scene)) return how;
+  if (!scene.HasTimes()) return how;
   const std::vector<double> times = scene.Times();
   const std::set<double> learnt_from = TrainingTimes(scene);
   std::set<int> cameras;  // of training views
@@ -66,7 +62,7 @@ std::vector<HoldOutKind> HeldOutKinds(const Scene& scene) {
 }
 
 void HoldOutBlock(double share, Scene* scene) {
-  if (!AllHaveTimes(*scene)) {
+  if (!scene->HasTimes()) {
     throw InvalidArgument(
         "hold_out_block is {:g}, but these views have no times: it holds out a part of a film's "
         "time; leave it out",
