@@ -43,7 +43,7 @@ std::vector<BenchmarkView> ParseViews(const std::string& scene_json) {
   }
 }
 
-// In the order in which they were chosen.
+// Returns the key views in the order in which they were chosen.
 std::vector<std::string> ParseKeyViews(const std::string& key_view_json) {
   try {
     const auto json = nlohmann::json::parse(key_view_json);
@@ -112,7 +112,7 @@ const BenchmarkView* FindView(const std::vector<BenchmarkView>& views, const std
   return nullptr;
 }
 
-// The checks of carry_color, before the time for the geometry is spent.
+// Makes the checks of carry_color before time is spent on geometry.
 void CheckAdditionalKeyViews(const ColorizeOptions& options, const Selection& selection) {
   for (const std::string& text : options.additional_key_views) {
     const AdditionalKeyView key = ParseAdditionalKeyView(text);
@@ -192,7 +192,7 @@ void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& canc
   const ColorCount count = CountColorPhotos(folder, kInspectedPhotos, cancel);
   if (count.MostlyColor()) return;
   throw InvalidArgument(
-      "the photographs in {} are monochrome ({} of {} looked at); --benchmark drops the colour of "
+      "the photographs in {} are monochrome ({} of {} inspected); --benchmark drops the colour of "
       "colour photos and scores against it: leave it out",
       root,
       count.looked_at - count.in_color,

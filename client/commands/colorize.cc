@@ -117,7 +117,7 @@ class Colorize {
         fmt::format("import_scene.film_frames_per_second={}", film.frames_per_second));
   }
 
-  // A scene on the server: coloured from the given source, else from the accepted key view.
+  // Colours a scene on the server from the given source, else from its accepted key view.
   ExitCode RunStored() {
     Connect();
     const std::string scene = ResourceName(options_.scene, "scenes");
@@ -149,14 +149,14 @@ class Colorize {
     return spec;
   }
 
-  // The key view of an earlier selection in the folder of results; may be empty.
+  // Returns the key view of an earlier selection in the folder of results; may be empty.
   std::string SelectedView() const {
     const auto key_view = ReadResult(out_, artifact::kKeyView);
     const auto view = key_view.find("view");
     return view != key_view.end() && view->is_string() ? view->get<std::string>() : "";
   }
 
-  // The view that the given colour belongs to; empty: the server selects it.
+  // Returns the view that the given colour belongs to; empty: the server selects it.
   std::string KeyView() const {
     if (!options_.key_view.empty()) return options_.key_view;
     // A file with the name of a photo is that photo, regardless of an earlier selection.
@@ -180,7 +180,6 @@ class Colorize {
     return spec;
   }
 
-  // Submits the job, follows it and downloads the results; with --detach submits only.
   ExitCode Finish(const v1::JobSpec& spec) {
     return Submit(spec, {}, [&](nlohmann::ordered_json result) {
       if (!context_.json) return PrintText(Summary(out_));
@@ -189,7 +188,8 @@ class Colorize {
     });
   }
 
-  // `earlier`: jobs that are followed as well. `print` gets the result for --json.
+  // Submits the job, follows it and `earlier` ones, and downloads its results. With --detach
+  // submits only. `print` receives the facts that --json prints.
   ExitCode Submit(const v1::JobSpec& spec,
                   std::vector<std::string> earlier,
                   const std::function<void(nlohmann::ordered_json)>& print) {

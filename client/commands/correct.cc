@@ -45,14 +45,14 @@ struct CorrectOptions {
   bool ChangesScene() const { return saturation || tint || warmth; }
 };
 
-// A disc, in the format of hints.
+// Returns a disc in the format of hints.
 std::string PointHints(const CorrectOptions& options) {
   double x = 0.0, y = 0.0;
   int end = 0;
   if (std::sscanf(options.at.c_str(), "%lf,%lf%n", &x, &y, &end) != 2 ||
       static_cast<size_t>(end) != options.at.size()) {
-    throw InvalidArgument("--at {} is not a place; give X,Y in px of the photo, e.g. --at 320,180",
-                          options.at);
+    throw InvalidArgument(
+        "--at {} is not a position; give X,Y in px of the photo, e.g. --at 320,180", options.at);
   }
   const nlohmann::json hints = {
       {{"x", x}, {"y", y}, {"radius", options.radius}, {"color", options.color}}};
@@ -103,7 +103,7 @@ void RemoveCorrections(const std::string& how_many, v1::CorrectColorsSpec* corre
   for (int i = 0; i < drop; ++i) correct->mutable_corrections()->RemoveLast();
 }
 
-// Writes the place as a file of hints, which stays among the results.
+// Writes the disc as a file of hints, which stays among the results.
 v1::KeyColorSource Upload(Connection& connection, const CorrectOptions& options) {
   if (options.at.empty()) return UploadKeyColor(connection, options.paint);
   const fs::path file = fs::path(options.out) / "point.json";
@@ -125,7 +125,7 @@ v1::JobSpec MakeSpec(Connection& connection, const CorrectOptions& options, cons
     *correction->mutable_color() = Upload(connection, options);
   }
   if (options.proposals) correct->set_proposals(*options.proposals);
-  // Changes of the whole scene need no stage for places.
+  // Changes of the whole scene need no correct_colors stage.
   if (correct->corrections().empty() && !options.proposals &&
       (options.ChangesScene() || !options.undo.empty())) {
     scene->clear_correct_colors();
@@ -288,14 +288,14 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
       ->required();
   command->add_option(
       "-o,--out", options->out, "Folder for the results; default: RESULTS if that is a folder");
-  const char* place = "One place: the colour spreads to similar surfaces nearby, in all views";
-  command->add_option("--view", options->view, "The photo that was painted on")->group(place);
+  const char* place = "One place (its colour spreads to similar surfaces nearby, in all views)";
+  command->add_option("--view", options->view, "Name of the photo that was painted on")
+      ->group(place);
   command
       ->add_option("--hints,--strokes,--points",
                    options->paint.hints,
                    "Colour strokes (PNG with the aspect ratio of the photo, transparent "
-                   "elsewhere), or points, "
-                   "lines and regions (JSON)")
+                   "elsewhere), or points, lines and regions (JSON)")
       ->group(place);
   command
       ->add_option("--labels",
@@ -305,12 +305,13 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
   command
       ->add_option("--image",
                    options->paint.image,
-                   "The photo in its right colours, e.g. RESULTS/paint/NAME.png after painting on "
-                   "it; only changed pixels count")
+                   "Corrected copy of the photo, e.g. RESULTS/paint/NAME.png after painting on it; "
+                   "only changed pixels count")
       ->group(place);
-  command->add_option("--at", options->at, "X,Y: the place, px of the photo")->group(place);
-  command->add_option("--color", options->color, "\"#rrggbb\": the colour at --at")->group(place);
-  command->add_option("--radius", options->radius, "Radius of the place at --at, px")
+  command->add_option("--at", options->at, "Position of a disc to correct: X,Y in px of the photo")
+      ->group(place);
+  command->add_option("--color", options->color, "Colour of the disc: \"#rrggbb\"")->group(place);
+  command->add_option("--radius", options->radius, "Radius of the disc, px")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->group(place);
@@ -329,7 +330,7 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
           "--tint", options->tint, "White balance, green to red: a of a middle grey, -50 to 50")
       ->group(whole);
   command->add_option(
-      "--undo", options->undo, "Remove this many corrections of places, the last first, or all");
+      "--undo", options->undo, "Number of corrections to remove, the last first; or all");
   command->add_option("--proposals",
                       options->proposals,
                       "Number of places to propose for a stroke (default without a correction: 3)");

@@ -69,8 +69,8 @@ class Key {
   v1::Job Follow(const std::vector<std::string>& jobs) {
     return FollowToSuccess(connection_, context_, jobs, options_.out, display_);
   }
-  // Follows a submitted job to its end; downloads its files to options_.out. Warnings of the import
-  // are printed with those of its selection.
+  // A job that was followed to its end, and its files in options_.out. Warnings of the import are
+  // printed with those of its selection.
   struct Fetched {
     v1::Job job;
     KeyViewChoice choice;
@@ -86,12 +86,12 @@ class Key {
             ReadChoice(connection_, job),
             DownloadResults(connection_, context_, job, options_.out, display_)};
   }
-  // The selection for a new colour: the requested one, else the newest.
+  // Returns the jobs of the selection to colour: the requested one, else the newest.
   std::vector<std::string> SelectionFor(const std::string& scene);
   std::string Command(std::vector<std::string> arguments) const {
     return "  " + CommandLine(context_, std::move(arguments)) + "\n";
   }
-  // The next commands for the chosen view.
+  // Returns the commands that may follow, one a line.
   std::string NextCommands(const std::string& scene) const;
 
   const Context& context_;
@@ -292,7 +292,7 @@ void AddTarget(CLI::App* command, KeyOptions* options) {
           options->target,
           "scenes/ID, a folder of photos, a splat (.ply, .sog, .spz), or a film (.mp4, ...)")
       ->required();
-  command->add_flag("--film", options->film, "The photos are frames of a film");
+  command->add_flag("--film", options->film, "Treat the photos as frames of a film");
 }
 
 void AddView(CLI::App* command, KeyOptions* options) {
@@ -323,8 +323,7 @@ void AddKeyCommands(CLI::App& app, Context& context) {
       ->add_option("--count",
                    options->count,
                    "Number of key views, chosen together for the least expected error; for films "
-                   "one for each "
-                   "shot, the longest first")
+                   "one for each shot, the longest first")
       ->check(CLI::Range(1, kMaxAdditionalKeyViews + 1));
   select->add_option(
       "--encoder", options->encoder, "Encoder weights on the server to compare views with");

@@ -55,8 +55,7 @@ void Check(const MovieOptions& options) {
       (options.seconds || options.time_s || options.bounce || options.pictures)) {
     throw InvalidArgument(
         "--seconds, --at, --bounce and --png need a path: --path orbit, --path original, --path "
-        "still "
-        "or --path FILE");
+        "still or --path FILE");
   }
   if (options.path.empty() && IsMovieName(options.out)) {
     throw InvalidArgument(
@@ -131,11 +130,11 @@ v1::JobSpec MakeSpec(Connection& connection, const MovieOptions& options, const 
     *render->mutable_cameras() = UploadCameras(connection, options.path);
   }
   // A path of the capture itself keeps its own speed unless another is given.
-  const bool as_in_the_file =
+  const bool keeps_speed =
       !options.seconds &&
       (render->has_cameras() || options.path == kStill ||
        (options.path == kOriginal && options.frames_per_second == kFramesPerSecond));
-  if (!as_in_the_file) render->set_frames(FrameCount(options));
+  if (!keeps_speed) render->set_frames(FrameCount(options));
   render->set_frames_per_second(options.frames_per_second);
   render->set_video(options.video);
   render->set_pictures(options.pictures);
@@ -206,7 +205,7 @@ void AddCommonOptions(CLI::App* command, MovieOptions* options) {
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str();
   command->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px");
-  command->add_option("--at", options->time_s, "Dynamic scenes: show this time throughout, s")
+  command->add_option("--at", options->time_s, "Dynamic scenes only: time to show throughout, s")
       ->check(CLI::Range(0.0, 86400.0));
   command->add_flag("--bounce", options->bounce, "Go back along the path at its end");
   command->add_flag(
@@ -239,13 +238,15 @@ void AddMovieCommands(CLI::App& app, Context& context) {
                                 [&context, rendering] { return RunMovie(context, *rendering); });
   AddCommonOptions(render, rendering.get());
   rendering->out = "render";
-  render->add_option(
-      "--path",
-      rendering->path,
-      "orbit, original (through the cameras of the photos; for dynamic scenes along the key view's "
-      "camera), still (dynamic scenes: the key view's camera stands still while time passes) or a "
-      "file of cameras (transforms.json, for dynamic scenes with the `time` of each frame); "
-      "default: no movie, but pictures of views");
+  render->add_option("--path",
+                     rendering->path,
+                     "Camera path: orbit; original (through the cameras of the photos; in dynamic "
+                     "scenes along the "
+                     "camera of the key view); still (dynamic scenes only: the fixed camera of the "
+                     "key view); or a "
+                     "file of cameras (transforms.json; in dynamic scenes with the `time` of each "
+                     "frame). Default: "
+                     "pictures of views instead of a movie");
   render->add_option(
       "--views", rendering->views, "Names of the views to render, or to pass on the path original");
   render->add_option("-o,--out", rendering->out, "FILE.mp4 or a folder")->capture_default_str();

@@ -20,8 +20,8 @@ namespace {
 
 struct PreviewOptions {
   std::string target;     // folder of photos or scenes/ID
-  std::string key_color;  // a coloured key view
-  std::string key;        // the photo that it is of; empty: the one with its name
+  std::string key_color;  // the coloured key view
+  std::string key;        // the photo that it shows; empty: the one of the same name
   std::string out = "preview";
   int count = 5;
   int max_side_px = 500;
@@ -37,7 +37,7 @@ std::vector<LivePicture> PicturesOf(const v1::Scene& scene) {
   return pictures;
 }
 
-// Evenly spread over all photos but the key view.
+// Returns `count` photos, evenly spread, without the key view.
 std::vector<LivePicture> Spread(const std::vector<LivePicture>& all,
                                 const std::string& key,
                                 int count) {
@@ -98,7 +98,7 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
     if (key.empty()) key = options.key_color;
   }
   pictures = Spread(pictures, key, options.count);
-  if (pictures.empty()) throw InvalidArgument("there is no photo but the key view");
+  if (pictures.empty()) throw InvalidArgument("there is no photo besides the key view");
   return PrintSummary(
       context,
       ColorizeToFiles(
@@ -122,8 +122,8 @@ void AddPreviewCommand(CLI::App& app, Context& context) {
   preview->add_option(
       "--key",
       options->key,
-      "The photo that the key view is, which is left out of the preview; default: the "
-      "one with the same name");
+      "Photo that the key view shows, which is left out of the preview; default: the photo of the "
+      "same name");
   preview->add_option("-o,--out", options->out, "Folder for the coloured pictures")
       ->capture_default_str();
   preview->add_option("--count", options->count, "Number of photos, evenly spread")

@@ -122,10 +122,9 @@ void AddSceneCommands(CLI::App& app, Context& context) {
       ->add_option(
           "PHOTOS", *text, "Folder of photos, a splat (.ply, .sog, .spz), or a film (.mp4, ...)")
       ->required();
-  create->add_option(
-      "--masks",
-      *masks,
-      "Folder of masks with the names of the photos: white counts, black is ignored");
+  create->add_option("--masks",
+                     *masks,
+                     "Folder of PNG masks named like the photos: white is used, black is ignored");
   create->add_flag("--film", *film, "Treat the photos as frames of a film");
 
   AddCommand(*scene,

@@ -46,8 +46,7 @@ std::string ResolveScene(Connection& connection,
     if (text.starts_with("scenes/")) return text;
     throw Error(ErrorCode::kNotFound,
                 "'{}' is neither a folder of photos, a splat or a film, nor a scene on the server "
-                "(scenes/ID; "
-                "see `color3d scene list`)",
+                "(scenes/ID; see `color3d scene list`)",
                 text);
   }
   PhotoFolder folder = CollectPhotos(text, film);

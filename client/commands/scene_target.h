@@ -1,5 +1,5 @@
-// The scene that a user names: a folder of photos, a film or a splat on this machine, or a scene on
-// the server.
+// Finds the scene that a user names: a folder of photos, a film or a splat on this machine, or a
+// scene on the server.
 #pragma once
 
 #include <string>

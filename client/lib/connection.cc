@@ -69,8 +69,8 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
   const bool is_here = IsLoopback(address);
   if (!server.token.empty() && !server.UsesTls() && !is_here) {
     throw InvalidArgument(
-        "the token would travel to {} for everybody to read; say --server https://{}, with --ca "
-        "where the server's certificate is of your own making",
+        "the token would be sent to {} unencrypted; give --server https://{}, with --ca if the "
+        "server's certificate is self-signed",
         address,
         address);
   }
@@ -170,8 +170,8 @@ Connection::Connection(const ServerTarget& server, const CancellationToken& canc
   }
   if (!connected && server.UsesTls()) {
     throw Error(ErrorCode::kUnavailable,
-                "cannot reach a server at {} over TLS: {}; look at --server, --ca and, where the "
-                "server asks for it, --client-cert",
+                "cannot reach a server at {} over TLS: {}; check --server, --ca and, if the server "
+                "requires one, --client-cert",
                 server.address,
                 UnreachableReason(channel_));
   }
@@ -225,8 +225,8 @@ Error UnreachableError(const std::string& address) {
 
 Error ConnectionLostError(const std::string& address) {
   return Error(ErrorCode::kUnavailable,
-               "lost the server at {}, which was there before; run the command again when it is "
-               "back (what it was sent is kept)",
+               "lost the server at {}; run the command again when it is back (uploaded files are "
+               "kept)",
                address);
 }
 

@@ -46,7 +46,7 @@ class Backoff {
 struct ServerTarget {
   std::string address = kDefaultServer;    // HOST:PORT, unix:PATH, or https://HOST:PORT for TLS
   std::filesystem::path ca;                // PEM: roots in place of the system's; TLS
-  std::filesystem::path certificate, key;  // PEM: our own, where the server asks for one; TLS
+  std::filesystem::path certificate, key;  // PEM, for servers that require one; TLS
   std::string token;                       // empty: none
   // Called when a busy server makes the client wait; may be empty.
   std::function<void(const std::string&)> on_wait = {};

@@ -20,7 +20,7 @@ class Download {
   Download(Connection& connection, const FileDigest& digest, fs::path part)
       : connection_(connection), digest_(digest), part_(std::move(part)) {}
 
-  // Writes the whole verified blob to the part file.
+  // Writes the verified blob to the part file.
   void Run(const std::function<void(int64_t)>& progress) {
     RemoveUnlessPlainFile(part_);
     std::error_code none;
@@ -116,8 +116,7 @@ void DownloadBlob(Connection& connection,
                   const std::function<void(int64_t)>& progress) {
   if (!IsSha256Hex(digest.sha256) || digest.size_bytes < 0) {
     throw Error(ErrorCode::kDataLoss,
-                "the server names the bytes of {} by '{}', {} bytes, which is no digest; nothing "
-                "was written",
+                "the server sent a malformed digest of {}: '{}', {} bytes; nothing was written",
                 path.filename().string(),
                 digest.sha256,
                 digest.size_bytes);

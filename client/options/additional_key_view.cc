@@ -11,7 +11,7 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-// "10-14.5", "10-" or "-14.5"; false for other text.
+// Parses "10-14.5", "10-" or "-14.5". Returns false for other text.
 bool ParseRange(std::string_view text, AdditionalKeyView* key) {
   const auto seconds = [](std::string_view number, std::optional<double>* to) {
     if (number.empty()) return true;
@@ -26,7 +26,7 @@ bool ParseRange(std::string_view text, AdditionalKeyView* key) {
          seconds(text.substr(dash + 1), &key->end_s) && key->HasRange();
 }
 
-// Takes the range of time off the end of `value`, where it has one. A file may be called
+// Moves a range of time at the end of `value`, if there is one, to `key`. A file may be called
 // "a@2x.png".
 void ExtractRange(std::string* value, AdditionalKeyView* key) {
   const size_t at = value->rfind('@');

@@ -109,8 +109,8 @@ FrameNumbers FramePositions(const std::vector<std::string>& names) {
     result.places[i] = (numbers[i] - numbers.front()) / step;
   }
   result.note = fmt::format(
-      "{} {} missing {}: what follows keeps its time, and the frame before a gap is shown longer; "
-      "number the frames anew if there is no gap",
+      "{} {} missing {}: later frames keep their time, and the frame before a gap is shown longer; "
+      "renumber the frames if there is no gap",
       missing,
       missing == 1 ? "frame is" : "frames are",
       where);

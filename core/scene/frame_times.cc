@@ -15,9 +15,9 @@
 namespace color3d {
 namespace {
 
-constexpr double kSameTime = 1e-6;    // fraction of the whole range
-constexpr double kSameTick = 0.25;    // fraction of a step of the cameras' clock
-constexpr double kToldOffset = 0.05;  // likewise: a larger offset is no rounding error
+constexpr double kSameTime = 1e-6;     // fraction of the whole range
+constexpr double kSameTick = 0.25;     // fraction of a step of the cameras' clock
+constexpr double kNotedOffset = 0.05;  // likewise: a larger offset is no rounding error
 
 // Relative to images/.
 std::string Folder(std::string file) {
@@ -140,17 +140,17 @@ void ShareMoments(const std::vector<std::string>& camera,
     double& time = earliest.try_emplace(ticks[i], (*times)[i]).first->second;
     time = std::min(time, (*times)[i]);
   }
-  const double told = kToldOffset * MedianStep(cameras, *times);
+  const double rounding = kNotedOffset * MedianStep(cameras, *times);
   double moved = 0.0;
   for (size_t i = 0; i < ticks.size(); ++i) {
     const double time = earliest.at(ticks[i]);
     moved = std::max(moved, (*times)[i] - time);
     (*times)[i] = time;
   }
-  if (moved <= told) return;
+  if (moved <= rounding) return;
   result->note = fmt::format(
-      "the cameras' clocks differ by up to {:.3g} s: frames less than that apart are taken for one "
-      "moment",
+      "the cameras' clocks differ by up to {:.3g} s: frames closer than that count as "
+      "simultaneous",
       moved);
 }
 

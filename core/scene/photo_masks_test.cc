@@ -139,9 +139,9 @@ TEST_F(PhotoMasksTest, FollowSceneAndLens) {
   ASSERT_EQ(mask->width, working.width);
   EXPECT_EQ(mask->At(0, 5, working.width / 2 - 2), 0.0f);
   EXPECT_EQ(mask->At(0, 5, working.width / 2 + 1), 1.0f);
-  EXPECT_EQ(images.Mask(1), mask) << "kept";
+  EXPECT_EQ(images.Mask(1), mask) << "cached";
 
-  // Points lose what the masked half has seen of them, and go when too little is left.
+  // Points lose their observations in the masked half and are dropped if too few remain.
   Scene pointed = again;
   pointed.points.clear();
   const Pose& pose = again.views[1].cam_from_world;

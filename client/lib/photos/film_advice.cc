@@ -129,16 +129,16 @@ std::string DescribeEnding(const Ending& ending) {
     case Kind::kAnimation:
       return fmt::format("an animated picture ({})", ending.name);
     case Kind::kFrame:
-      return fmt::format("a picture ({}) of a kind that is not read", ending.name);
+      return fmt::format("a picture in an unsupported format ({})", ending.name);
     case Kind::kCameraRaw:
-      return fmt::format("a camera's raw film ({}), which is not read", ending.name);
+      return fmt::format("a camera's raw film ({}), which is not supported", ending.name);
     case Kind::kList:
       return fmt::format("a list of other files ({}), which are not opened", ending.name);
     case Kind::kContainer:
     case Kind::kNone:
       break;
   }
-  return fmt::format("a film ({}) of a kind that is not read", ending.name);
+  return fmt::format("a film in an unsupported format ({})", ending.name);
 }
 
 bool IsHidden(const fs::path& path) { return path.filename().string().starts_with('.'); }

@@ -40,7 +40,7 @@ void RequireColor(FilmReader* film, int frames, const std::string& name) {
   }
   if (2 * in_color > looked_at) return;
   throw InvalidArgument(
-      "{} is monochrome ({} of {} frames looked at); --benchmark drops the colour of a film in "
+      "{} is monochrome ({} of {} frames inspected); --benchmark drops the colour of a film in "
       "colour and scores against it: leave it out",
       name,
       looked_at - in_color,

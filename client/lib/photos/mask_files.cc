@@ -29,7 +29,7 @@ std::string Size(int width, int height) { return fmt::format("{} x {} px", width
 void RequireSizeOf(const fs::path& mask, const fs::path& photo) {
   const ImageInfo of_mask = ProbeImage(ReadFile(mask), mask.string());
   if (of_mask.format != ImageFormat::kPng) {
-    throw InvalidArgument("{} is no PNG, as masks must be; save it as one", mask.string());
+    throw InvalidArgument("the mask {} is not a PNG; save it as one", mask.string());
   }
   const std::string bytes = ReadFile(photo);
   const PictureSize size = OrientedSize(ProbeImage(bytes, photo.string()), ReadOrientation(bytes));

@@ -138,11 +138,11 @@ void NoteUnreadPoses(const fs::path& root, PhotoFolder* result) {
   }
   if (found.empty()) return;
   std::ranges::sort(found);
-  result->notes.push_back(
-      fmt::format("the poses in {} are not read, and are found anew; to use them, export them as a "
-                  "COLMAP model into {}",
-                  found[0],
-                  (root / "sparse").string()));
+  result->notes.push_back(fmt::format(
+      "the poses in {} cannot be read and will be estimated; to use them, export them as a "
+      "COLMAP model into {}",
+      found[0],
+      (root / "sparse").string()));
 }
 
 void NoteUnreadTimes(PhotoFolder* result) {

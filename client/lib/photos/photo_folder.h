@@ -19,13 +19,13 @@ struct LocalFile {
 struct PhotoFolder {
   std::filesystem::path root;
   std::vector<LocalFile> photos;         // sorted by path
-  std::vector<LocalFile> model_files;    // tell poses and times, sorted by path
+  std::vector<LocalFile> model_files;    // poses and times, sorted by path
   std::vector<LocalFile> augment_files;  // pictures in colour for the colorizer, sorted by path
   std::vector<LocalFile> mask_files;     // of photos, see mask_files.h
   std::optional<LocalFile> splat;        // in place of photos: views are drawn from it
   std::optional<LocalFile> film;         // in place of photos: a video file, whose frames are views
   std::vector<LocalFile> camera_films;   // in place of photos: of several cameras
-  std::vector<std::string> notes;        // what the user may want to know, one line each
+  std::vector<std::string> notes;        // for the user, one line each
 
   std::vector<LocalFile> AllFiles() const;
   // Layout of all files, as the server and import will detect it.

@@ -48,8 +48,8 @@ TEST_F(PhotoFolderTest, TakesPhotosOnly) {
   EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.JPG", "c.tiff"));
   EXPECT_THAT(folder.model_files, IsEmpty());
   EXPECT_THAT(folder.notes,
-              ElementsAre(HasSubstr("hidden pictures passed over: 1 (.hidden.jpg)"),
-                          HasSubstr("pictures in subfolders passed over: 1 (sub/)")));
+              ElementsAre(HasSubstr("hidden pictures skipped: 1 (.hidden.jpg)"),
+                          HasSubstr("pictures in subfolders skipped: 1 (sub/)")));
 }
 
 TEST_F(PhotoFolderTest, PrefersImagesFolderAtAnyDepth) {

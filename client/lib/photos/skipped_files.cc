@@ -283,7 +283,7 @@ std::vector<std::string> SkippedFiles::Notes() const {
   std::vector<std::pair<size_t, std::string>> lines;
   for (const auto& [kind, files] : kinds_) {
     lines.push_back({files.count,
-                     fmt::format("{} passed over: {} ({}{}){}{}",
+                     fmt::format("{} skipped: {} ({}{}){}{}",
                                  kind,
                                  files.count,
                                  fmt::join(files.first, ", "),

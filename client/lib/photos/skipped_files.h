@@ -16,7 +16,7 @@ class SkippedFiles {
  public:
   // `kind`: plural noun; after an optional '|', the remedy.
   void Add(const std::string& kind, const std::string& name, size_t count = 1);
-  // Returns one line for each kind, the most frequent first: "HEIC pictures passed over: 10
+  // Returns one line for each kind, the most frequent first: "HEIC pictures skipped: 10
   // (a.heic, b.heic, ...); convert them to JPEG".
   std::vector<std::string> Notes() const;
   // Returns the first three in one line, to append to an error; empty if nothing was skipped.

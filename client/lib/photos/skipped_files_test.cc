@@ -20,7 +20,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// A HEIC file's first bytes, as exports leave them whose pictures are in a cloud.
+// First bytes of a HEIC file, as left by exports whose pictures are stored in a cloud.
 const std::string kStub = std::string(
                               "\0\0\0\x18"
                               "ftypheic\0\0\0\0mif1heic",
@@ -74,9 +74,9 @@ TEST_F(SkippedFilesTest, CountsUnsupportedPicturesWithRemedy) {
   EXPECT_THAT(Photos(), ElementsAre("a.jpg", "b.jpg"));
   const std::vector<std::string> notes = Notes();
   EXPECT_EQ(notes.size(), 10u);
-  EXPECT_THAT(notes[0],
-              AllOf(HasSubstr("raw files passed over: 4 (c.NEF, d.nef, e.cr3, ...)"),
-                    HasSubstr("darktable")));
+  EXPECT_THAT(
+      notes[0],
+      AllOf(HasSubstr("raw files skipped: 4 (c.NEF, d.nef, e.cr3, ...)"), HasSubstr("darktable")));
   for (const char* kind : {"files of paint programs",
                            "DPX",
                            "GIF",
@@ -118,7 +118,7 @@ TEST_F(SkippedFilesTest, TakesHeicWebpAndBmpWithoutCopies) {
   EXPECT_EQ(Photos().size(), reads_heic ? 5u : 4u);
   EXPECT_THAT(Notes(),
               ElementsAre(HasSubstr("pictures beside another of the same name "
-                                    "passed over: " +
+                                    "skipped: " +
                                     std::string(reads_heic ? "3" : "2"))));
 }
 
@@ -140,8 +140,8 @@ TEST_F(SkippedFilesTest, SkipsThumbnailsOfOtherPrograms) {
   EXPECT_THAT(Photos(), ElementsAre("images/a.jpg", "images/left/b.jpg"));
   EXPECT_THAT(Notes(),
               ElementsAre(HasSubstr("folders that programs keep for thumbnails and the "
-                                    "like passed over: 7 ("),
-                          HasSubstr("hidden pictures passed over: 1 (._a.jpg)")));
+                                    "like skipped: 7 ("),
+                          HasSubstr("hidden pictures skipped: 1 (._a.jpg)")));
 }
 
 TEST_F(SkippedFilesTest, FollowsOrReportsLinks) {
@@ -153,8 +153,8 @@ TEST_F(SkippedFilesTest, FollowsOrReportsLinks) {
   fs::create_directory_symlink(root(), root() / "images/loop");
   EXPECT_THAT(Photos(), ElementsAre("images/a.jpg", "images/b.jpg", "images/c.jpg"));
   EXPECT_THAT(Notes(),
-              ElementsAre(HasSubstr("links that lead nowhere passed over: 2 (d.jpg, e.jpg)"),
-                          HasSubstr("links to folders passed over: 2 (loop, more)")));
+              ElementsAre(HasSubstr("links that lead nowhere skipped: 2 (d.jpg, e.jpg)"),
+                          HasSubstr("links to folders skipped: 2 (loop, more)")));
 }
 
 TEST_F(SkippedFilesTest, SkipsResults) {
@@ -170,8 +170,8 @@ TEST_F(SkippedFilesTest, SkipsResults) {
   }
   EXPECT_THAT(Photos(), ElementsAre("a.jpg", "b.jpg"));
   EXPECT_THAT(Notes(),
-              Contains(AllOf(HasSubstr("results of color3d passed over: 4"), HasSubstr("-o"))));
-  // Below images/ the folders of results, but not other folders of their names.
+              Contains(AllOf(HasSubstr("results of color3d skipped: 4"), HasSubstr("-o"))));
+  // Below images/, skips folders of results, but no other folders of their names.
   for (const char* name : {"images/a.jpg",
                            "images/b.jpg",
                            "images/metrics.json",
@@ -191,14 +191,14 @@ TEST_F(SkippedFilesTest, SkipsOwnFilmsAndSplats) {
                            "scene.sog",
                            "metrics.json",
                            "report.html"}) {
-    Write(name, name);  // films of equal bytes would be copies
+    Write(name, name);  // equal films would be copies
   }
   const PhotoFolder folder = CollectPhotos(root());
   EXPECT_FALSE(folder.splat.has_value());
   EXPECT_TRUE(folder.camera_films.empty());
   ASSERT_TRUE(folder.film.has_value());
   EXPECT_EQ(folder.film->path, "walk.mov");
-  // Without a record of ours they are the user's.
+  // Without a record of results they are films of the user.
   fs::remove(root() / "metrics.json"), fs::remove(root() / "report.html");
   EXPECT_EQ(CollectPhotos(root()).camera_films.size(), 3u);
 }
@@ -217,8 +217,8 @@ TEST_F(SkippedFilesTest, ReportsUnusedNeighbors) {
     Write(name);
   }
   EXPECT_THAT(Notes(),
-              ElementsAre(HasSubstr("pictures in subfolders passed over: 2 (more/)"),
-                          HasSubstr("films passed over: 1 (walk.mp4)")));
+              ElementsAre(HasSubstr("pictures in subfolders skipped: 2 (more/)"),
+                          HasSubstr("films skipped: 1 (walk.mp4)")));
 }
 
 TEST_F(SkippedFilesTest, SkipsThumbnailsOfMasksAndAugmentations) {

@@ -130,7 +130,7 @@ TEST_F(TransformsFile, LeavesOutMissingPhotosWithWarning) {
   EXPECT_THAT(Said(text), testing::Not(HasSubstr(folder_.path().string())));
 }
 
-// Json() with the fields that each of the two frames has on its own.
+// Json() with additional fields for each of the two frames.
 std::string TimedJson(const std::string& of_a, const std::string& of_b) {
   std::string text = Json("\"fl_x\":50");
   for (const auto& [name, fields] : {std::pair("./images/a", of_a), {"images/b.png", of_b}}) {
@@ -141,7 +141,7 @@ std::string TimedJson(const std::string& of_a, const std::string& of_b) {
 }
 
 TEST_F(TransformsFile, FramesHaveTimes) {
-  EXPECT_FALSE(Read(Json("\"fl_x\":50,\"time\":3")).views[0].moment);  // of no frame
+  EXPECT_FALSE(Read(Json("\"fl_x\":50,\"time\":3")).views[0].moment);  // not in a frame
   Scene scene = Read(TimedJson("\"time\":0.75,", "\"time\":0.25,"));
   EXPECT_EQ(scene.views[0].moment, (Moment{0.5, 0}));
   EXPECT_EQ(scene.views[1].moment, (Moment{0.0, 0}));

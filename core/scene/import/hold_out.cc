@@ -72,7 +72,8 @@ void HoldOutBlock(double share, Scene* scene) {
   const int64_t all = std::ssize(times), count = std::llround(share * static_cast<double>(all));
   if (count < kFewestInBlock) {
     throw InvalidArgument(
-        "hold_out_block is {:g} of {} moments, which is less than two of them; give {:.2g} or more "
+        "hold_out_block is {:g} of {} time steps, which is less than two of them; give {:.2g} or "
+        "more "
         "(at most 0.5), or leave it out",
         share,
         all,
@@ -88,8 +89,8 @@ void HoldOutBlock(double share, Scene* scene) {
   const auto behind = std::distance(left.upper_bound(end_s), left.end());
   if (before >= kFewestBeside && behind >= kFewestBeside) return;
   throw InvalidArgument(
-      "hold_out_block is {:g}: of {} moments {} are left to learn from before the block and {} "
-      "behind it, and two are needed on each side; give less, or leave it out",
+      "hold_out_block is {:g}: of {} time steps, {} are left for training before the block and {} "
+      "after it, and two are needed on each side; give less, or leave it out",
       share,
       all,
       before,

@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// Cameras in different places, each with as many moments; of one place where `film`.
+// Cameras in different places, each with as many moments; `film`: all at one position.
 Scene SceneOf(int cameras, int moments, bool film = false) {
   Scene scene;
   for (int camera = 0; camera < cameras; ++camera) {
@@ -50,7 +50,7 @@ TEST(HoldOutBlockTest, IsRefusedIfTooFewMomentsRemain) {
   EXPECT_EQ(Said(0.5, SceneOf(2, 8)), "");
   EXPECT_THAT(Said(0.05, SceneOf(2, 20)),
               HasSubstr("0.05 of 20 moments, which is less than two of them; give 0.1 or more"));
-  EXPECT_THAT(Said(0.5, SceneOf(2, 6)), HasSubstr("1 are left to learn from before the block"));
+  EXPECT_THAT(Said(0.5, SceneOf(2, 6)), HasSubstr("1 are left for training before the block"));
   Scene still = SceneOf(1, 20);
   for (View& view : still.views) view.moment.reset();
   EXPECT_THAT(Said(0.2, still), HasSubstr("these views have no times"));
@@ -59,7 +59,7 @@ TEST(HoldOutBlockTest, IsRefusedIfTooFewMomentsRemain) {
   EXPECT_THAT(Said(0.2, scene), HasSubstr("and 1 behind it"));
 }
 
-TEST(HeldOutKindsTest, TellsCamerasMomentsAndBlocksApart) {
+TEST(HeldOutKindsTest, DistinguishesCamerasTimesAndBlocks) {
   Scene scene = SceneOf(3, 40);
   for (View& view : scene.views) {
     const int t = static_cast<int>(2.0 * view.moment->time_s);

@@ -55,8 +55,8 @@ void AddRandomPointsWhenEmpty(ImportResult* result) {
   scene.points = RandomPoints(scene, kRandomPoints, kRandomPointSeed);
   if (scene.points.empty()) {
     throw InvalidArgument(
-        "the scene has no sparse points, and its cameras look at nothing in "
-        "common; check the poses");
+        "the scene has no sparse points, and its cameras look at nothing in common; check the "
+        "poses");
   }
   result->random_points = true;
   result->warnings.push_back(fmt::format(
@@ -233,14 +233,14 @@ void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
                       : "; transforms.json and metadata.json have times of their own"));
 }
 
-// Dynamic scenes: holds out the views of all cameras at every eighth moment from the fifth on, so
-// that each has moments before and after it.
+// Dynamic scenes: holds out the views of all cameras at every eighth time from the fifth on, so
+// that each has times before and after it.
 void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
   std::set<double> times;
   for (const View& view : scene->views) times.insert(view.time_s());
   if (times.size() < kHoldOutEvery) {
     warnings->push_back(fmt::format(
-        "no view is held out for evaluation: the scene has only {} moments", times.size()));
+        "no view is held out for evaluation: the scene has only {} time steps", times.size()));
     return;
   }
   for (View& view : scene->views) {
@@ -358,7 +358,7 @@ void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
   if (!options.hold_out_camera.empty()) HoldOutCamera(options.hold_out_camera, result);
   if (options.hold_out_block > 0.0) HoldOutBlock(options.hold_out_block, &scene);
   if (scene.TrainingViews().size() < kMinTrainingViews) {
-    throw InvalidArgument("only {} view is left to learn from when the others are held out",
+    throw InvalidArgument("only {} view is left for training when the others are held out",
                           scene.TrainingViews().size());
   }
 }

@@ -175,7 +175,7 @@ void AddPairsAcross(const std::vector<int>& camera,
                     const std::vector<int>& compared,
                     const SimilarityTable& similarity,
                     PairPlan* plan) {
-  constexpr size_t kAlike = 4, kAtAnyRate = 8;
+  constexpr size_t kMostSimilar = 4, kPairsOfCameras = 8;
   // Similarity and index: for each frame and other camera, and for each pair of cameras.
   using Candidates = std::vector<std::pair<float, PhotoPair>>;
   std::map<std::pair<int, int>, Candidates> of_frame, of_cameras;
@@ -197,8 +197,8 @@ void AddPairsAcross(const std::vector<int>& camera,
       if (-unlike >= least) across.insert(pair);
     }
   };
-  for (const auto& [frame, candidates] : of_frame) take(candidates, kAlike, kClearlySimilar);
-  for (const auto& [cameras, candidates] : of_cameras) take(candidates, kAtAnyRate, 0.0f);
+  for (const auto& [frame, candidates] : of_frame) take(candidates, kMostSimilar, kClearlySimilar);
+  for (const auto& [cameras, candidates] : of_cameras) take(candidates, kPairsOfCameras, 0.0f);
   plan->pairs.insert(plan->pairs.end(), across.begin(), across.end());
   std::ranges::sort(plan->pairs);
   plan->reason += fmt::format(", {} across cameras", across.size());

@@ -193,9 +193,8 @@ ParallaxEvidence MeasureParallax(const std::vector<LocalFeatures>& photos,
 
 std::string Describe(const ParallaxEvidence& e) {
   return fmt::format(
-      "{} of {} pairs of photos that show the same differ by a turn of the camera at most (they "
-      "are shifted by {:.1f} % of their width in the middle), which ties {} of {} photos to one "
-      "place",
+      "{} of {} overlapping pairs of photos differ by a rotation of the camera only (median shift "
+      "{:.1f} % of the longer side), which connects {} of {} photos to one place",
       e.turned,
       e.matched,
       100.0 * e.median_shift,

@@ -83,8 +83,8 @@ class Solver {
         return ColmapModel{};
       }
       colmap_.Warn(
-          fmt::format("{} of {} photos hang together by the planned pairs; comparing all pairs, "
-                      "which takes longer",
+          fmt::format("the planned pairs connect {} of {} photos; comparing all pairs, which takes "
+                      "longer",
                       Placed(),
                       Count()));
     }
