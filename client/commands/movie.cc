@@ -241,12 +241,10 @@ void AddMovieCommands(CLI::App& app, Context& context) {
   render->add_option("--path",
                      rendering->path,
                      "Camera path: orbit; original (through the cameras of the photos; in dynamic "
-                     "scenes along the "
-                     "camera of the key view); still (dynamic scenes only: the fixed camera of the "
-                     "key view); or a "
-                     "file of cameras (transforms.json; in dynamic scenes with the `time` of each "
-                     "frame). Default: "
-                     "pictures of views instead of a movie");
+                     "scenes along the camera of the key view); still (dynamic scenes only: the "
+                     "fixed camera of the key view); or a file of cameras (transforms.json; in "
+                     "dynamic scenes with the `time` of each frame). Default: pictures of views "
+                     "instead of a movie");
   render->add_option(
       "--views", rendering->views, "Names of the views to render, or to pass on the path original");
   render->add_option("-o,--out", rendering->out, "FILE.mp4 or a folder")->capture_default_str();

@@ -58,8 +58,7 @@ AdditionalKeyView ParseAdditionalKeyView(const std::string& text) {
     throw InvalidArgument(
         "--add-key-view wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
         "VIEW=POINTS.json, VIEW=auto), of a film also VIEW=COLOURED.png@BEGIN-END, in seconds; "
-        "'{}' "
-        "is not of that form",
+        "'{}' is not of that form",
         text);
   }
   std::string value = text.substr(equals + 1);

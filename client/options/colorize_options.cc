@@ -150,8 +150,8 @@ void ColorizeOptions::Check() const {
   color.Check();
   if (keys > 1 && !benchmark) {
     throw InvalidArgument(
-        "--keys needs --benchmark, where photos have true colours. To "
-        "colour several photos, see `color3d key select --count` and --add-key-view");
+        "--keys needs --benchmark, where photos have true colours. To colour several photos, see "
+        "`color3d key select --count` and --add-key-view");
   }
   if (keys > 1 && (!additional_key_views.empty() || color.HasSource())) {
     throw InvalidArgument(

@@ -108,8 +108,7 @@ TEST_F(PhotoMasksTest, LeavesOutMasksOfDeletedPhotosWithNote) {
   EXPECT_THAT(FindMasks(root(), {"images/a.jpg"}, {}, &warnings), ElementsAre("masks/A.PNG"));
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_THAT(warnings[0],
-              HasSubstr("1 of 2 masks are of no photo and were left out: "
-                        "masks/gone.jpg.png"));
+              HasSubstr("1 of 2 masks are of no photo and were left out: masks/gone.jpg.png"));
 }
 
 TEST_F(PhotoMasksTest, ReducedPixelNeedsFullCoverage) {

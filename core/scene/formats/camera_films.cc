@@ -120,8 +120,8 @@ void CheckFilms(const std::vector<CameraFilm>& films, const std::string& from) {
   }
   if (films.size() < 2) {
     throw InvalidArgument(
-        "{} has the pose of one film; a static camera gives no depth. "
-        "Colour it as a film, without {}",
+        "{} has the pose of one film; a static camera gives no depth. Colour it as a film, without "
+        "{}",
         from,
         from);
   }

@@ -73,8 +73,7 @@ void HoldOutBlock(double share, Scene* scene) {
   if (count < kFewestInBlock) {
     throw InvalidArgument(
         "hold_out_block is {:g} of {} time steps, which is less than two of them; give {:.2g} or "
-        "more "
-        "(at most 0.5), or leave it out",
+        "more (at most 0.5), or leave it out",
         share,
         all,
         static_cast<double>(kFewestInBlock) / static_cast<double>(all));
