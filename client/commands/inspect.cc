@@ -54,7 +54,7 @@ void AddInspectCommand(CLI::App& app, Context& context) {
   AddCommand(app,
              context,
              "inspect",
-             "Tell whether photos are in colour or monochrome",
+             "Report whether photos are in colour or monochrome",
              [&context, photos] { return RunInspect(context, *photos); })
       ->add_option("PHOTOS", *photos, "Folder of photos")
       ->required();

@@ -27,8 +27,8 @@ struct FrameMoments {
 // Keeps the times, shifted so that the earliest is 0; times closer than a millionth of the whole
 // range are made equal. Without camera names: if frames share a time, each folder is a camera; else
 // all frames are of one camera. If several cameras follow one clock to a quarter of its step (the
-// median step), all frames of a tick get the time of its earliest frame; the note says so if the
-// difference is more than rounding. Without moments, with a note, if all times are equal: nothing
+// median step), all frames of a tick get the time of its earliest frame; a note reports
+// differences beyond rounding. Without moments, with a note, if all times are equal: nothing
 // can move. Throws Error{kInvalidArgument} that names the frames if only some have a time, only
 // some name a camera, two of one camera have the same time, or times are too far apart for a
 // number.

@@ -1,5 +1,5 @@
 // Files in a user's folder that are no photos of the scene: thumbnails of cameras, servers and
-// viewers, results of this program, pictures in unsupported formats. Counts them, to tell the user.
+// viewers, results of this program, pictures in unsupported formats. Counts them for the user.
 // Reads names, and the contents of HEIC files.
 #pragma once
 

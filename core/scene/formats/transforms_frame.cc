@@ -122,7 +122,7 @@ Camera ReadIntrinsics(const FrameFields& fields, int width, int height) {
     throw InvalidArgument("{}: fl_x or camera_angle_x is missing", fields.place());
   }
   camera.fx = *fx;
-  camera.fy = fy.value_or(*fx);  // square pixels unless told otherwise
+  camera.fy = fy.value_or(*fx);  // square pixels unless given
   camera.cx = fields.NumberOr("cx", 0.5 * camera.width);
   camera.cy = fields.NumberOr("cy", 0.5 * camera.height);
   if (!(camera.fx > 0.0 && camera.fy > 0.0 && camera.fx < 1e9 && camera.fy < 1e9)) {

@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// Cameras in different places, each with as many moments; `film`: all at one position.
+// Cameras at different positions with the same times; `film`: all at one position.
 Scene SceneOf(int cameras, int moments, bool film = false) {
   Scene scene;
   for (int camera = 0; camera < cameras; ++camera) {
@@ -54,7 +54,7 @@ TEST(HoldOutBlockTest, IsRefusedIfTooFewMomentsRemain) {
   Scene still = SceneOf(1, 20);
   for (View& view : still.views) view.moment.reset();
   EXPECT_THAT(Said(0.2, still), HasSubstr("these views have no times"));
-  Scene scene = SceneOf(1, 20);  // all moments behind the block are held out already
+  Scene scene = SceneOf(1, 20);  // all times after the block are held out already
   for (int t = 12; t < 19; ++t) scene.views[t].held_out = true;
   EXPECT_THAT(Said(0.2, scene), HasSubstr("and 1 behind it"));
 }
