@@ -112,6 +112,9 @@ for folder in blobs jobs live scenes; do
     "core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|$folder))"
 done
 allow server/rpc/calls 'core/(base|catalogue)|server/(base|access|net|store|planning|storage|ops|rpc/calls)'
+allow server/worker/supervision 'core/base|server/(store|ops|worker/supervision)'
+allow server/worker/live \
+  'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/live)'
 allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
@@ -169,7 +172,7 @@ public server/planning asked_formats job_spec key_view_jobs plan_scenes planner 
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store chore_store client_store job job_store project_store worker_store sqlite_job_store store_file user_models
-public server/worker supervisor worker_settings
+public server/worker supervision/supervisor supervision/worker_settings
 
 # Branches on the kind of a capture belong to its tables (core/catalogue/captures) and to import, which
 # determines the kind. Other sources read a property of it on at most this many lines each; lower a

@@ -12,7 +12,7 @@
 
 #include "color3d/internal/v1/inference.grpc.pb.h"
 #include "core/base/mutex.h"
-#include "server/worker/live_engine.h"
+#include "server/worker/live/live_engine.h"
 
 namespace color3d {
 

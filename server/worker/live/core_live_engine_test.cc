@@ -12,7 +12,7 @@
 #include "core/image/codec.h"
 #include "server/base/service_error.h"
 #include "server/storage/file_blob_store.h"
-#include "server/worker/live_engine.h"
+#include "server/worker/live/live_engine.h"
 
 namespace color3d {
 namespace {

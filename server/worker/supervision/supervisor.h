@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "server/store/chore_store.h"
-#include "server/worker/orphaned_workers.h"
+#include "server/worker/supervision/orphaned_workers.h"
 
 namespace color3d {
 

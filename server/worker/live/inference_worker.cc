@@ -1,4 +1,4 @@
-#include "server/worker/inference_worker.h"
+#include "server/worker/live/inference_worker.h"
 
 #include <grpcpp/security/server_credentials.h>
 #include <grpcpp/server.h>
@@ -13,7 +13,7 @@
 #include "server/ops/socket_folder.h"
 #include "server/storage/data_folder.h"
 #include "server/store/sqlite_job_store.h"
-#include "server/worker/inference_queue.h"
+#include "server/worker/live/inference_queue.h"
 
 namespace color3d {
 namespace {

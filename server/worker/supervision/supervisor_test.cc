@@ -1,5 +1,5 @@
 // Workers that say nothing: killed, but not for a disk that takes no reports.
-#include "server/worker/supervisor.h"
+#include "server/worker/supervision/supervisor.h"
 
 #include <atomic>
 #include <fstream>

@@ -1,4 +1,4 @@
-#include "server/worker/colorizer_cache.h"
+#include "server/worker/live/colorizer_cache.h"
 
 #include <utility>
 

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "server/storage/blob_store.h"
-#include "server/worker/live_engine.h"
+#include "server/worker/live/live_engine.h"
 
 namespace color3d {
 

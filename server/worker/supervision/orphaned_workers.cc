@@ -1,4 +1,4 @@
-#include "server/worker/orphaned_workers.h"
+#include "server/worker/supervision/orphaned_workers.h"
 
 #include <poll.h>
 #include <signal.h>

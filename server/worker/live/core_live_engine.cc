@@ -11,8 +11,8 @@
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
 #include "server/base/service_error.h"
-#include "server/worker/colorizer_cache.h"
-#include "server/worker/live_engine.h"
+#include "server/worker/live/colorizer_cache.h"
+#include "server/worker/live/live_engine.h"
 
 namespace color3d {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/worker/inference_queue.h"
+#include "server/worker/live/inference_queue.h"
 
 #include <spdlog/spdlog.h>
 

@@ -1,4 +1,4 @@
-#include "server/worker/supervisor.h"
+#include "server/worker/supervision/supervisor.h"
 
 #include <signal.h>
 #include <spawn.h>

@@ -1,4 +1,4 @@
-#include "server/worker/worker_settings.h"
+#include "server/worker/supervision/worker_settings.h"
 
 #include <fmt/format.h>
 
