@@ -3,6 +3,7 @@
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
 #           <- {keyview, augment, carry <- film, splat, metrics, report, video, view, matching <- {keycolor, colorizer}}
 #           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- {recolor, report} <- stages
+#   colorizer: colorizer <- model <- neighbors <- training <- personal
 #   scene:  scene <- {masks, formats} <- sfm <- import
 #   server: base <- store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers never below the server, SQL there only for
@@ -71,7 +72,12 @@ for source in references words automatic external; do
     "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/hints)?|keycolor/$source)"
 done
 allow core/carry 'core/(base|grid|color|image|scene|carry)'
-allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer)'
+colorizer='base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer'
+allow_own core/colorizer "core/($colorizer)"
+for part in model neighbors training personal; do
+  colorizer="$colorizer|colorizer/$part"
+  allow "core/colorizer/$part" "core/($colorizer)"
+done
 lower=
 for part in model motion raster training geometry chroma export import; do
   lower="$lower${lower:+|}$part"
@@ -140,7 +146,7 @@ public() {
 
 public core/augment augment outpaint surrogates
 public core/carry carry carry_views confidence dense_points plane_sweep view_color
-public core/colorizer colorizer corrector scene_batch scene_colorizers
+public core/colorizer colorizer corrector scene_batch personal/scene_colorizers personal/train_colorizer
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
   embedded/embedded_weights

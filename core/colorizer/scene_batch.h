@@ -89,4 +89,10 @@ class SceneBatch {
   std::map<std::string, std::weak_ptr<const Encoder>> encoders_ COLOR3D_GUARDED_BY(encoder_mutex_);
 };
 
+// The place of a scene that trains in a batch.
+struct BatchPlace {
+  SceneBatch& batch;
+  std::string project;  // what fairness is between, e.g. the submitted job
+};
+
 }  // namespace color3d

@@ -12,7 +12,8 @@
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
-#include "core/colorizer/scene_colorizers.h"
+#include "core/colorizer/personal/scene_colorizers.h"
+#include "core/colorizer/personal/train_colorizer.h"
 
 namespace color3d {
 namespace {

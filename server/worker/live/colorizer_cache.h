@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/colorizer/colorizer.h"
+#include "core/encoder/encoder.h"
 
 namespace color3d {
 
