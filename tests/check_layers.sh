@@ -151,7 +151,7 @@ public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
   embedded/embedded_weights
 public core/grid edge_weights grid_solver
-public core/image box_mean codec decode_budget draw fill_holes feature_matches flow_agreement guided_upsample local_features optical_flow plane_sampling reduced weighted_resize \
+public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling reduced weighted_resize \
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt

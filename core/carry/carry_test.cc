@@ -192,13 +192,13 @@ TEST(PlaneSweep, FindsDepthOfWallAndForeground) {
     return PosedLuminance{
         seen.surface.camera, seen.surface.cam_from_world, &seen.surface.luminance};
   };
-  const DepthMap map =
+  const Image depth =
       SweepPlanes(posed(reference), {posed(left), posed(right)}, 1.2, 8.0, PlaneSweepOptions{}, {});
   int wall = 0, right_wall = 0, square = 0, right_square = 0;
   for (int y = 10; y < kHeight - 10; ++y) {
     for (int x = 20; x < kWidth - 20; ++x) {
       const double truth = reference.surface.depth.At(0, y, x);
-      const bool close = std::abs(map.depth.At(0, y, x) - truth) < 0.04 * truth;
+      const bool close = std::abs(depth.At(0, y, x) - truth) < 0.04 * truth;
       (truth == kWallDepth ? wall : square) += 1;
       (truth == kWallDepth ? right_wall : right_square) += close;
     }
@@ -230,12 +230,12 @@ TEST(PlaneSweep, DoesNotMatchMaskedPixels) {
                             &surface.luminance,
                             i == 0 ? of_reference : of_sources};
     };
-    const DepthMap map =
+    const Image depth =
         SweepPlanes(posed(0), {posed(1), posed(2)}, 1.2, 8.0, PlaneSweepOptions{}, {});
     int close = 0;
     for (int y = 45; y < 75; ++y) {
       for (int x = 60; x < 100; ++x) {
-        close += std::abs(map.depth.At(0, y, x) - kWallDepth) < 0.05 * kWallDepth;
+        close += std::abs(depth.At(0, y, x) - kWallDepth) < 0.05 * kWallDepth;
       }
     }
     return close / (30.0 * 40.0);
@@ -262,16 +262,16 @@ TEST(PlaneSweep, GivesFiniteDepthsWithoutTexture) {
   for (Seen* s : {&seen, &other}) {
     for (float& value : s->surface.luminance.data) value = 42.0f;
   }
-  const DepthMap map =
+  const Image depth =
       SweepPlanes({seen.surface.camera, seen.surface.cam_from_world, &seen.surface.luminance},
                   {{other.surface.camera, other.surface.cam_from_world, &other.surface.luminance}},
                   1.0,
                   9.0,
                   PlaneSweepOptions{},
                   {});
-  for (float depth : map.depth.data) {
-    ASSERT_GE(depth, 0.99f);
-    ASSERT_LE(depth, 9.01f);
+  for (float value : depth.data) {
+    ASSERT_GE(value, 0.99f);
+    ASSERT_LE(value, 9.01f);
   }
 }
 

@@ -62,10 +62,11 @@ std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rend
   };
   std::vector<PosedLuminance> sources;
   for (int index : plan.sources) sources.push_back(posed(index));
-  const DepthMap map =
-      SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, sweep_, cancel_);
   SurfaceView swept = rendered;
-  swept.depth = Resize(map.depth, rendered.camera.width, rendered.camera.height);
+  swept.depth =
+      Resize(SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, sweep_, cancel_),
+             rendered.camera.width,
+             rendered.camera.height);
   ClearMasked(images_.Mask(view).get(), &swept.depth);
   return swept;
 }

@@ -67,7 +67,7 @@ void Sweep(const Scene& scene,
   std::vector<PosedLuminance> sources;
   for (const int index : plan.sources) sources.push_back(posed(index));
   swept[view].depth =
-      SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, options.sweep, cancel).depth;
+      SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, options.sweep, cancel);
   ClearMasked(swept[view].mask.Empty() ? nullptr : &swept[view].mask, &swept[view].depth);
   swept[view].sources = plan.sources;
 }
@@ -119,15 +119,6 @@ std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
   return points;
 }
 
-// The training views of each time, in order of time.
-std::vector<std::vector<int>> Moments(const Scene& scene) {
-  std::map<double, std::vector<int>> moments;
-  for (const int view : scene.TrainingViews()) moments[scene.views[view].time_s()].push_back(view);
-  std::vector<std::vector<int>> in_order;
-  for (auto& [time, views] : moments) in_order.push_back(std::move(views));
-  return in_order;
-}
-
 struct SweepPlan {
   std::vector<int> views;                    // ascending
   std::vector<std::vector<int>> candidates;  // views to compare with, by view of the scene
@@ -136,24 +127,27 @@ struct SweepPlan {
 // All views of some times, evenly spread. Evenly spread views when there is one time, or one view
 // of each.
 SweepPlan PlanSweeps(const Scene& scene, size_t most) {
-  std::vector<std::vector<int>> moments = Moments(scene);
+  const std::vector<int> training = scene.TrainingViews();
+  std::map<double, std::vector<int>> by_time;
+  for (const int view : training) by_time[scene.views[view].time_s()].push_back(view);
   SweepPlan plan;
   plan.candidates.resize(scene.views.size());
-  const size_t views = scene.TrainingViews().size();
-  if (moments.size() == 1 || moments.size() == views) {
-    plan.views = EvenlyOf(scene.TrainingViews(), most);
+  if (by_time.size() == 1 || by_time.size() == training.size()) {
+    plan.views = EvenlyOf(training, most);
     for (const int view : plan.views) plan.candidates[view] = plan.views;
     return plan;
   }
-  const size_t few = std::max<size_t>(1, most * moments.size() / std::max<size_t>(1, views));
-  moments = EvenlyOf(std::move(moments), few);
-  for (std::vector<int>& moment : moments) {
-    moment = EvenlyOf(std::move(moment), most);
-    plan.views.insert(plan.views.end(), moment.begin(), moment.end());
+  const size_t few = std::max<size_t>(1, most * by_time.size() / training.size());
+  std::vector<std::vector<int>> groups;
+  for (auto& [time, views] : by_time) groups.push_back(std::move(views));
+  groups = EvenlyOf(std::move(groups), few);
+  for (std::vector<int>& views : groups) {
+    views = EvenlyOf(std::move(views), most);
+    plan.views.insert(plan.views.end(), views.begin(), views.end());
   }
   std::sort(plan.views.begin(), plan.views.end());
-  for (const std::vector<int>& moment : moments) {
-    for (const int view : moment) plan.candidates[view] = moment.size() > 1 ? moment : plan.views;
+  for (const std::vector<int>& views : groups) {
+    for (const int view : views) plan.candidates[view] = views.size() > 1 ? views : plan.views;
   }
   return plan;
 }

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
@@ -20,27 +21,9 @@ namespace {
 constexpr int kWindowRadius = 3;
 constexpr float kLeastConfidence = 0.02f;
 
-Image Identity(int width, int height) {
-  Image place(width, height, 2);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      place.At(0, y, x) = static_cast<float>(x);
-      place.At(1, y, x) = static_cast<float>(y);
-    }
-  }
-  return place;
-}
-
-// Pixels of `flow` moved by it.
-Image Moved(const Image& flow) {
-  Image place = Identity(flow.width, flow.height);
-  for (size_t i = 0; i < place.data.size(); ++i) place.data[i] += flow.data[i];
-  return place;
-}
-
 // Extends the track along the flow to the next frame and back.
 FilmTrack Step(const FilmTrack& track, const Image& there, const Image& back) {
-  FilmTrack further{SampledAt(track.in_key, Moved(back)), track.in_frame};
+  FilmTrack further{SampledAt(track.in_key, MovedPositions(back)), track.in_frame};
   const Image step = SampledAt(there, track.in_frame);
   for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
   return further;
@@ -87,7 +70,7 @@ void Register(const Image& picture,
     float& y = rest.Plane(1)[i];
     if (x * x + y * y > kMostPx * kMostPx) x = y = 0.0f;
   }
-  const Image registered = SampledAt(*place, Moved(rest));
+  const Image registered = SampledAt(*place, MovedPositions(std::move(rest)));
   const Image before = LocalDifference(contrast, SampledAt(other_contrast, *place));
   const Image after = LocalDifference(contrast, SampledAt(other_contrast, registered));
   for (size_t i = 0; i < before.data.size(); ++i) {
@@ -235,7 +218,7 @@ class Walker {
       frame_ = walk.before.frame;
       luminance_ = frames.luminance(frame_);
     } else {
-      const Image start = Identity(key_->width, key_->height);
+      const Image start = MovedPositions(Image(key_->width, key_->height, 2));
       wanted_ = MeanOf(walk.key->color.confidence) - kMuchLost;
       track_ = std::make_shared<const FilmTrack>(FilmTrack{start, start});
     }

@@ -74,41 +74,29 @@ Flow SureFlow(const Image& from, const Image& there, const Image& back) {
 }
 
 // A model of the camera's motion between two frames.
-class CameraModel {
- public:
-  static CameraModel Of(const cv::Matx33d& matrix, CameraMotion motion) { return {matrix, motion}; }
-  static CameraModel Still() { return {cv::Matx33d::eye(), CameraMotion::kStill}; }
+struct CameraModel {
+  cv::Matx33d matrix;
+  CameraMotion motion;
 
-  CameraMotion motion() const { return motion_; }
-  // Distance in px between the pixel's place and the model's: from the homography's place, or
-  // Sampson's distance from the epipolar lines.
-  double Residual(double x, double y, double tx, double ty) const {
+  // Distance in px between the position to which `flow` moves pixel `at` and the model's: the
+  // homography's position, or Sampson's distance from the epipolar lines.
+  double Residual(const Image& flow, int at) const {
+    const double x = at % flow.width, y = at / flow.width;
+    const double tx = x + flow.Plane(0)[at], ty = y + flow.Plane(1)[at];
     const cv::Vec3d p(x, y, 1.0), q(tx, ty, 1.0);
-    const cv::Vec3d l = matrix_ * p;
-    if (motion_ != CameraMotion::kMoved) {
+    const cv::Vec3d l = matrix * p;
+    if (motion != CameraMotion::kMoved) {
       return std::abs(l[2]) < 1e-9 ? 1e3 : std::hypot(l[0] / l[2] - tx, l[1] / l[2] - ty);
     }
-    const cv::Vec3d m = matrix_.t() * q;
+    const cv::Vec3d m = matrix.t() * q;
     const double slope = l[0] * l[0] + l[1] * l[1] + m[0] * m[0] + m[1] * m[1];
     return std::abs(q.dot(l)) / std::sqrt(slope + 1e-18);
   }
-
- private:
-  CameraModel(const cv::Matx33d& matrix, CameraMotion motion) : matrix_(matrix), motion_(motion) {}
-
-  cv::Matx33d matrix_;
-  CameraMotion motion_;
 };
 
-std::vector<double> ResidualsOf(const CameraModel& account, const Flow& flow) {
+std::vector<double> ResidualsOf(const CameraModel& model, const Flow& flow) {
   std::vector<double> residuals;
-  residuals.reserve(flow.sample.size());
-  const int width = flow.there.width;
-  for (const int at : flow.sample) {
-    const double x = at % width, y = at / width;
-    residuals.push_back(
-        account.Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]));
-  }
+  for (const int at : flow.sample) residuals.push_back(model.Residual(flow.there, at));
   return residuals;
 }
 
@@ -133,12 +121,12 @@ std::optional<CameraModel> Explain(const Flow& flow) {
     constexpr double kConfidence = 0.999;
     const cv::Mat h = cv::findHomography(
         from, to, cv::USAC_MAGSAC, kLeastMotionPx, cv::noArray(), kIterations, kConfidence);
-    if (h.rows == 3) turn = CameraModel::Of(cv::Matx33d(h), CameraMotion::kTurn);
+    if (h.rows == 3) turn = {cv::Matx33d(h), CameraMotion::kTurn};
     // Least median of squares takes the matrix that explains the larger half best. A count of
     // inliers could prefer one that explains moving objects, too.
     const cv::Mat f = cv::findFundamentalMat(
         from, to, cv::FM_LMEDS, kLeastMotionPx, kConfidence, kIterations, cv::noArray());
-    if (f.rows == 3) moved = CameraModel::Of(cv::Matx33d(f), CameraMotion::kMoved);
+    if (f.rows == 3) moved = {cv::Matx33d(f), CameraMotion::kMoved};
   } catch (const cv::Exception& e) {
     throw Error(ErrorCode::kInternal, "the motion of the camera failed: {}", e.err);
   }
@@ -168,23 +156,20 @@ PairResidual Compare(const Image& from, const Image& there, const Image& back) {
   const Flow flow = SureFlow(from, there, back);
   if (flow.sample.size() < kLeastSamples) return result;
   result.background_px = MedianLength(flow);
-  const std::optional<CameraModel> account =
-      result.background_px < kStillPx ? CameraModel::Still() : Explain(flow);
-  if (!account) return result;
-  result.motion = account->motion();
-  const double noise_px = kNoiseFactor * Median(ResidualsOf(*account, flow));
+  const std::optional<CameraModel> model =
+      result.background_px < kStillPx ? CameraModel{cv::Matx33d::eye(), CameraMotion::kStill}
+                                      : Explain(flow);
+  if (!model) return result;
+  result.motion = model->motion;
+  const double noise_px = kNoiseFactor * Median(ResidualsOf(*model, flow));
   const double texture = MedianTexture(flow);
-  for (int y = 0; y < from.height; ++y) {
-    for (int x = 0; x < from.width; ++x) {
-      const size_t at = static_cast<size_t>(y) * from.width + x;
-      if (!flow.sure[at]) continue;
-      const double residual =
-          account->Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
-      // The error of flow is inversely proportional to the gradient.
-      const double plain = texture / std::max(flow.texture.data[at], 0.05f * kLeastTexture);
-      result.excess.data[at] =
-          static_cast<float>(residual / std::max(kLeastMotionPx, noise_px * std::max(1.0, plain)));
-    }
+  for (int at = 0; at < static_cast<int>(flow.sure.size()); ++at) {
+    if (!flow.sure[at]) continue;
+    // The error of flow is inversely proportional to the gradient.
+    const double plain = texture / std::max(flow.texture.data[at], 0.05f * kLeastTexture);
+    result.excess.data[at] =
+        static_cast<float>(model->Residual(flow.there, at) /
+                           std::max(kLeastMotionPx, noise_px * std::max(1.0, plain)));
   }
   return result;
 }
@@ -221,11 +206,8 @@ void FillHoles(cv::Mat* regions) {
 // Regions by majority vote, without specks and holes, dilated over the soft edges of the flow.
 Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
   cv::Mat moving(height, width, CV_8U);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const size_t i = static_cast<size_t>(y) * width + x;
-      moving.at<uchar>(y, x) = votes.all[i] >= least_votes && 2 * votes.moving[i] > votes.all[i];
-    }
+  for (size_t i = 0; i < votes.all.size(); ++i) {
+    moving.data[i] = votes.all[i] >= least_votes && 2 * votes.moving[i] > votes.all[i];
   }
   const auto disc = [](int side) {
     return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(side, side));
@@ -236,9 +218,7 @@ Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
   cv::dilate(moving, moving, disc(2 * unit + 1));
   FillHoles(&moving);
   Image image(width, height, 1);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) image.At(0, y, x) = moving.at<uchar>(y, x) ? 1.0f : 0.0f;
-  }
+  moving.convertTo(cv::Mat(height, width, CV_32F, image.data.data()), CV_32F);
   return image;
 }
 

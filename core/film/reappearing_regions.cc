@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/base/error.h"
+#include "core/film/frame_motion.h"
 #include "core/image/feature_matches.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
@@ -93,16 +94,7 @@ Image PlaceOnPlane(const cv::Matx33d& h, const Image& picture) {
 // Places of the pixels of `picture` in `other`: by the homography, refined by flow.
 Image Refined(const cv::Matx33d& h, const Image& picture, const Image& other) {
   const Image place = PlaceOnPlane(h, picture);
-  const Image rest = DenseFlow(picture, SampledAt(other, place));
-  Image out(picture.width, picture.height, 2);
-  for (int y = 0; y < picture.height; ++y) {
-    for (int x = 0; x < picture.width; ++x) {
-      const float u = static_cast<float>(x) + rest.At(0, y, x);
-      const float v = static_cast<float>(y) + rest.At(1, y, x);
-      for (int c = 0; c < 2; ++c) out.At(c, y, x) = SampleBilinear(place, c, u, v);
-    }
-  }
-  return out;
+  return SampledAt(place, MovedPositions(DenseFlow(picture, SampledAt(other, place))));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "core/encoder/weight_digest.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/automatic/ddcolor_decoder.h"
 #include "core/weights/weight_file.h"
 
@@ -22,20 +23,6 @@ namespace color3d {
 namespace {
 
 constexpr int kNetworkSidePx = 512;
-
-void CheckLuminance(const Image& luminance) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument(
-        "the automatic colourizer takes a picture with 1 channel (L), but got {} channels",
-        luminance.channels);
-  }
-  const bool finite = std::all_of(luminance.data.begin(), luminance.data.end(), [](float value) {
-    return std::isfinite(value);
-  });
-  if (!finite) {
-    throw InvalidArgument("the luminance to colour has a value that is not finite");
-  }
-}
 
 }  // namespace
 
@@ -82,7 +69,10 @@ Image Ddcolor::Predict(const Image& gray_rgb) const {
 }
 
 AutomaticColor Ddcolor::Colorize(const Image& luminance) const {
-  CheckLuminance(luminance);
+  RequireLuminance(luminance, "the automatic colourizer");
+  if (!IsFinite(luminance)) {
+    throw InvalidArgument("the luminance to colour has a value that is not finite");
+  }
   const Image coarse = WithTorchErrors("DDColor", [&] {
     at::NoGradGuard no_grad;
     const Image square = Resize(luminance, kNetworkSidePx, kNetworkSidePx);

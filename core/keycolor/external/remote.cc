@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/keycolor/picture_checks.h"
@@ -209,8 +210,7 @@ RemoteSolution KeyColorFromRemote(const Image& luminance,
   solution.answer_height = answer.height;
 
   const Image lab = LabFromSrgb(answer);
-  Image ab(lab.width, lab.height, 2);
-  std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
+  Image ab = ChromaOfLab(lab);
   CheckAnswerLuminance(luminance, lab, options, &solution);
   const ChromaLevel chroma = MeasureChroma(lab);
   if (chroma.IsGray()) {

@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/image/codec.h"
+#include "core/image/crop.h"
 
 namespace color3d {
 namespace {
@@ -53,17 +54,6 @@ std::vector<Window> WindowsOf(const Image& picture, const std::vector<int>& wind
     }
   }
   return windows;
-}
-
-Image Cut(const Image& picture, const Window& window) {
-  Image out(window.width, window.height, picture.channels);
-  for (int c = 0; c < picture.channels; ++c) {
-    for (int y = 0; y < window.height; ++y) {
-      const float* row = picture.Plane(c) + static_cast<size_t>(window.top + y) * picture.width;
-      std::copy_n(row + window.left, window.width, &out.At(c, y, 0));
-    }
-  }
-  return out;
 }
 
 // Cosines of a window's grid of features with every text.
@@ -147,11 +137,9 @@ Image DenseSimilarity(const TextImageModel& model,
     progress.OnProgress(static_cast<int64_t>(i),
                         static_cast<int64_t>(windows.size()),
                         "looking for the prompt's things");
-    Blend(Cosines(model.PatchFeatures(Cut(srgb, windows[i])), texts),
-          windows[i],
-          scale,
-          sum,
-          weights);
+    const Window& window = windows[i];
+    const Image part = Crop(srgb, window.left, window.top, window.width, window.height);
+    Blend(Cosines(model.PatchFeatures(part), texts), window, scale, sum, weights);
   }
   for (int c = 0; c < sum.channels; ++c) {
     for (size_t i = 0; i < sum.PlaneSize(); ++i) sum.Plane(c)[i] /= weights.data[i];

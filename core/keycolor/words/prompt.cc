@@ -11,6 +11,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/words/dense_similarity.h"
 
 namespace color3d {
@@ -26,10 +27,7 @@ constexpr int kPatchGuideRadius = 3;
 constexpr float kPatchGuideVarianceFloor = 30.0f;
 
 void CheckPictures(const Image& luminance, const Image& rest) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
-                          luminance.channels);
-  }
+  RequireLuminance(luminance, "the colouring of the key view");
   const bool fits =
       rest.channels == 2 && rest.width == luminance.width && rest.height == luminance.height;
   if (!rest.Empty() && !fits) {
