@@ -3,8 +3,6 @@
 
 #include <torch/types.h>
 
-#include "core/base/image.h"
-
 namespace color3d {
 
 // STILL.md "Stage 1d": every picture is padded to multiples of 32.
@@ -13,8 +11,5 @@ inline constexpr int kPadMultiple = 32;
 // Extends [1,C,H,W] at its right and bottom to multiples of `multiple` by reflection, or by
 // replication if the picture is too small to reflect.
 torch::Tensor PadToMultiple(const torch::Tensor& x, int multiple);
-
-// Returns the upper left part of a picture, without the padding.
-Image CropTo(const Image& image, int width, int height);
 
 }  // namespace color3d

@@ -44,6 +44,22 @@ std::vector<KnownCells> FurtherCells(const TapEncoder& encoder,
   return found;
 }
 
+NamedTensors TensorsOf(const std::vector<Whitening::Projection>& projections) {
+  NamedTensors tensors;
+  for (size_t i = 0; i < projections.size(); ++i) {
+    tensors.emplace_back(fmt::format("mean.{}", i), projections[i].mean);
+    tensors.emplace_back(fmt::format("matrix.{}", i), projections[i].matrix);
+  }
+  return tensors;
+}
+
+NamedTensors TensorsOf(const CellBank& bank) {
+  return {{"bank", bank.features},
+          {"colors", bank.colors},
+          {"weights", bank.weights},
+          {"positions", bank.positions}};
+}
+
 }  // namespace
 
 FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
@@ -86,20 +102,8 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
       bank_(std::move(bank)) {}
 
 void FeatureNeighbors::PutInto(TensorFile* file) const {
-  NamedTensors projections;
-  for (size_t i = 0; i < whitening_.projections().size(); ++i) {
-    const Whitening::Projection& projection = whitening_.projections()[i];
-    projections.emplace_back(fmt::format("mean.{}", i), projection.mean);
-    projections.emplace_back(fmt::format("matrix.{}", i), projection.matrix);
-  }
-  PutTensors(projections, kPrefix, StoredType::kFloat32, file);
-  PutTensors({{"bank", bank_.features},
-              {"colors", bank_.colors},
-              {"weights", bank_.weights},
-              {"positions", bank_.positions}},
-             kPrefix,
-             StoredType::kFloat16,
-             file);
+  PutTensors(TensorsOf(whitening_.projections()), kPrefix, StoredType::kFloat32, file);
+  PutTensors(TensorsOf(bank_), kPrefix, StoredType::kFloat16, file);
 }
 
 std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& encoder,
@@ -108,15 +112,13 @@ std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& e
                                                              TensorFile* file) {
   // All shapes follow from the encoder but the number of bank entries.
   std::vector<Whitening::Projection> projections;
-  NamedTensors tensors;
   for (int i = 0; i <= encoder.config().StageCount(); ++i) {
     const int64_t in =
         i < encoder.config().StageCount() ? encoder.config().dims[i] : kLuminanceStatistics;
     const int64_t out = std::min<int64_t>(options.whitening.dims_per_block, in);
     projections.push_back({torch::empty({in}), torch::empty({in, out})});
-    tensors.emplace_back(fmt::format("mean.{}", i), projections.back().mean);
-    tensors.emplace_back(fmt::format("matrix.{}", i), projections.back().matrix);
   }
+  TakeTensors(TensorsOf(projections), kPrefix, what, file);
   Whitening whitening(std::move(projections));
   const auto colors = file->arrays.find(std::string(kPrefix) + "colors");
   if (colors == file->arrays.end() || colors->second.shape.empty() || colors->second.shape[0] < 1) {
@@ -127,11 +129,7 @@ std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& e
                 torch::empty({entries, 2}),
                 torch::empty({entries}),
                 torch::empty({entries, 4})};
-  tensors.emplace_back("bank", bank.features);
-  tensors.emplace_back("colors", bank.colors);
-  tensors.emplace_back("weights", bank.weights);
-  tensors.emplace_back("positions", bank.positions);
-  TakeTensors(tensors, kPrefix, what, file);
+  TakeTensors(TensorsOf(bank), kPrefix, what, file);
   return std::unique_ptr<FeatureNeighbors>(
       new FeatureNeighbors(encoder, options, std::move(whitening), std::move(bank)));
 }

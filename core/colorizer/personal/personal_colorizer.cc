@@ -15,8 +15,10 @@
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
+#include "core/image/crop.h"
 #include "core/image/fill_holes.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 #include "core/weights/byte_source.h"
 
 namespace color3d {
@@ -84,14 +86,9 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
 }
 
 void PersonalColorizer::Check(const Image& luminance) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the colorizer takes a picture with 1 channel (L), but got {} channels",
-                          luminance.channels);
-  }
-  for (float value : luminance.data) {
-    if (!std::isfinite(value)) {
-      throw InvalidArgument("the luminance to colour has a value that is not finite");
-    }
+  RequireLuminance(luminance, "the colorizer");
+  if (!IsFinite(luminance)) {
+    throw InvalidArgument("the luminance to colour has a value that is not finite");
   }
 }
 
@@ -123,11 +120,11 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
                               FitTo(facts.position, small.width, small.height));
   const Image fine = UpsampleGuided(ImageFromTensor(answer.ab), ImageFromTensor(padded));
   ColorPrediction prediction;
-  prediction.ab = CropTo(fine, small.width, small.height);
+  prediction.ab = Crop(fine, 0, 0, small.width, small.height);
   if (answer.distance.defined()) {
     const Image coarse = ImageFromTensor(answer.distance.unsqueeze(0));
     prediction.distance =
-        CropTo(Resize(coarse, fine.width, fine.height), small.width, small.height);
+        Crop(Resize(coarse, fine.width, fine.height), 0, 0, small.width, small.height);
   }
   if (small.width == luminance.width && small.height == luminance.height) return prediction;
   prediction.ab = UpsampleGuided(prediction.ab, luminance);

@@ -14,6 +14,7 @@
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
+#include "core/image/crop.h"
 #include "core/image/guided_upsample.h"
 #include "core/image/weighted_resize.h"
 
@@ -70,11 +71,6 @@ torch::Tensor Joined(std::span<const PlaceSample> samples,
     all.insert(all.end(), (sample.*values).begin(), (sample.*values).end());
   }
   return torch::tensor(all).reshape({rows, -1});
-}
-
-std::vector<float> Values(const torch::Tensor& tensor) {
-  const torch::Tensor flat = tensor.contiguous();
-  return {flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel()};
 }
 
 // Expected error of the colour of each place.
@@ -165,9 +161,11 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
                                              .t()
                                              .reshape({3, cells.rows, cells.columns}));
     const int width = picture.luminance.width, height = picture.luminance.height;
-    Image fine = CropTo(UpsampleGuided(coarse, ImageFromTensor(padded)),
-                        small.luminance.width,
-                        small.luminance.height);
+    Image fine = Crop(UpsampleGuided(coarse, ImageFromTensor(padded)),
+                      0,
+                      0,
+                      small.luminance.width,
+                      small.luminance.height);
     if (fine.width != width || fine.height != height) {
       fine = UpsampleGuided(fine, picture.luminance);
     }
@@ -210,8 +208,8 @@ PlaceSample PersonalCorrector::Sample(const FieldPlaces& places,
     sample.places.push_back(
         {x(cell), y(cell), drawn.seen[i].item<float>(), unlike[i].item<float>()});
   }
-  sample.features = Values(drawn.features);
-  sample.positions = Values(drawn.positions);
+  sample.features = ValuesOf(drawn.features);
+  sample.positions = ValuesOf(drawn.positions);
   return sample;
 }
 

@@ -19,6 +19,7 @@
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
+#include "core/image/image_checks.h"
 #include "core/image/weighted_resize.h"
 
 namespace color3d {
@@ -28,44 +29,28 @@ constexpr float kMaxGivenAb = 256.0f;
 // Iterations per turn: enough to make the cost of handing over negligible.
 constexpr int kStepsPerTurn = 5;
 
-std::string SizeOf(const Image& image) { return fmt::format("{}x{}", image.width, image.height); }
-
-void CheckFinite(const Image& map, const std::string& name) {
-  for (float value : map.data) {
-    if (!std::isfinite(value)) throw InvalidArgument("{} has a value that is not finite", name);
-  }
-}
-
 void CheckPicture(const TrainingPicture& picture) {
   const std::string& name = picture.name;
-  if (picture.luminance.channels != 1 || picture.ab.channels != 2 || picture.luminance.Empty()) {
-    throw InvalidArgument("{} needs L with 1 channel and ab with 2, but got {} and {} channels",
-                          name,
-                          picture.luminance.channels,
-                          picture.ab.channels);
-  }
-  const bool weighted = !picture.weight.Empty();
-  for (const Image* map : {&picture.luminance, &picture.ab, &picture.weight}) {
-    if (map == &picture.weight && !weighted) continue;
-    if (SizeOf(*map) != SizeOf(picture.luminance)) {
-      throw InvalidArgument("the L of {} is {} px, its {} {}",
+  const int width = picture.luminance.width, height = picture.luminance.height;
+  const auto check = [&](const Image& map, const char* what, int channels) {
+    if (map.width != width || map.height != height || map.channels != channels) {
+      throw InvalidArgument("the {} of {} is {}x{} px with {} channels, expected {}x{} with {}",
+                            what,
                             name,
-                            SizeOf(picture.luminance),
-                            map == &picture.ab ? "ab" : "weight",
-                            SizeOf(*map));
+                            map.width,
+                            map.height,
+                            map.channels,
+                            width,
+                            height,
+                            channels);
     }
-    CheckFinite(*map, name);
-  }
-  if (!picture.position.Empty()) {
-    if (picture.position.channels != 4 || SizeOf(picture.position) != SizeOf(picture.luminance)) {
-      throw InvalidArgument("the positions of {} are {} px with {} channels, expected {} with 4",
-                            name,
-                            SizeOf(picture.position),
-                            picture.position.channels,
-                            SizeOf(picture.luminance));
-    }
-    CheckFinite(picture.position, name);
-  }
+    if (!IsFinite(map)) throw InvalidArgument("{} has a value that is not finite", name);
+  };
+  if (picture.luminance.Empty()) throw InvalidArgument("{} is empty", name);
+  check(picture.luminance, "L", 1);
+  check(picture.ab, "ab", 2);
+  if (!picture.weight.Empty()) check(picture.weight, "weight", 1);
+  if (!picture.position.Empty()) check(picture.position, "position", 4);
   for (float value : picture.ab.data) {
     // Far beyond any colour. Values stored in half precision would overflow.
     if (std::abs(value) > kMaxGivenAb) {

@@ -37,22 +37,29 @@ T FromName(const Names<T>& names, const char* what, const std::string& text) {
   throw InvalidArgument("the colorizer file has an unknown {}: \"{}\"", what, text);
 }
 
+// Calls `visit` with the name and the value of each number of `options`.
+template <typename Options, typename Visit>
+void ForEachNumber(Options& options, const Visit& visit) {
+  visit("iterations", options.iterations);
+  visit("time_limit_seconds", options.time_limit_seconds);
+  visit("max_side_px", options.max_side_px);
+  visit("crop_px", options.crop_px);
+  visit("learning_rate", options.learning_rate);
+  visit("consistency_weight", options.consistency_weight);
+  visit("average_decay", options.average_decay);
+  visit("min_improvement", options.min_improvement);
+  visit("adapter_stages", options.adapter_stages);
+  visit("decoder_width", options.decoder_width);
+  visit("seed", options.seed);
+}
+
 }  // namespace
 
 nlohmann::json JsonFromOptions(const ColorizerOptions& options) {
-  return {{"recipe", NameOf(kRecipes, options.recipe)},
-          {"precision", NameOf(kPrecisions, options.precision)},
-          {"iterations", options.iterations},
-          {"time_limit_seconds", options.time_limit_seconds},
-          {"max_side_px", options.max_side_px},
-          {"crop_px", options.crop_px},
-          {"learning_rate", options.learning_rate},
-          {"consistency_weight", options.consistency_weight},
-          {"average_decay", options.average_decay},
-          {"min_improvement", options.min_improvement},
-          {"adapter_stages", options.adapter_stages},
-          {"decoder_width", options.decoder_width},
-          {"seed", options.seed}};
+  nlohmann::json json{{"recipe", NameOf(kRecipes, options.recipe)},
+                      {"precision", NameOf(kPrecisions, options.precision)}};
+  ForEachNumber(options, [&](const char* name, const auto& value) { json[name] = value; });
+  return json;
 }
 
 ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
@@ -60,17 +67,7 @@ ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
   options.recipe = FromName(kRecipes, "recipe", json.at("recipe"));
   options.precision = FromName(
       kPrecisions, "precision", json.value("precision", NameOf(kPrecisions, options.precision)));
-  options.iterations = json.at("iterations");
-  options.time_limit_seconds = json.at("time_limit_seconds");
-  options.max_side_px = json.at("max_side_px");
-  options.crop_px = json.at("crop_px");
-  options.learning_rate = json.value("learning_rate", options.learning_rate);
-  options.consistency_weight = json.at("consistency_weight");
-  options.average_decay = json.value("average_decay", options.average_decay);
-  options.min_improvement = json.value("min_improvement", options.min_improvement);
-  options.adapter_stages = json.value("adapter_stages", options.adapter_stages);
-  options.decoder_width = json.value("decoder_width", options.decoder_width);
-  options.seed = json.at("seed");
+  ForEachNumber(options, [&](const char* name, auto& value) { value = json.value(name, value); });
   return options;
 }
 
