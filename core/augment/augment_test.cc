@@ -47,7 +47,7 @@ void ExpectAligned(const AugmentedSample& sample, float tolerance) {
   }
 }
 
-TEST(AugmentTest, IdentityReturnsThePicture) {
+TEST(AugmentTest, ReturnsPictureForIdentity) {
   const Picture picture = MakePicture(64, 64);
   Random random(3);
   const AugmentedSample sample = Augment(picture.luminance, picture.ab, {}, Identity(64), random);
@@ -56,7 +56,7 @@ TEST(AugmentTest, IdentityReturnsThePicture) {
   EXPECT_EQ(*std::min_element(sample.valid.data.begin(), sample.valid.data.end()), 1.0f);
 }
 
-TEST(AugmentTest, ChromaStaysOnItsLuminance) {
+TEST(AugmentTest, KeepsChromaWithItsLuminance) {
   const Picture picture = MakePicture(97, 61);
   AugmentOptions mild;
   mild.crop_px = 48;
@@ -117,7 +117,7 @@ TEST(AugmentTest, ShuffleIsAPermutation) {
   EXPECT_EQ(before, after);
 }
 
-TEST(AugmentTest, QuarterTurnsAndFlipsGiveTheEightSymmetries) {
+TEST(AugmentTest, ProducesAllEightSymmetries) {
   const Picture picture = MakePicture(40, 40);
   AugmentOptions options = Identity(40);
   options.flip_probability = 0.5;
@@ -132,7 +132,7 @@ TEST(AugmentTest, QuarterTurnsAndFlipsGiveTheEightSymmetries) {
   EXPECT_EQ(seen.size(), 8u);
 }
 
-TEST(AugmentTest, IsInvalidOutsideThePicture) {
+TEST(AugmentTest, MarksPixelsOutsideThePictureInvalid) {
   const Picture picture = MakePicture(40, 20);
   Random random(1);
   const AugmentedSample sample = Augment(picture.luminance, picture.ab, {}, Identity(60), random);
@@ -144,7 +144,7 @@ TEST(AugmentTest, IsInvalidOutsideThePicture) {
   ExpectAligned(sample, 1e-3f);
 }
 
-TEST(AugmentTest, SameGeneratorSameSample) {
+TEST(AugmentTest, IsRepeatableForSameGenerator) {
   const Picture picture = MakePicture(50, 50);
   AugmentOptions options = AugmentOptions::Paper();
   options.crop_px = 32;

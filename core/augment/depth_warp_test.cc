@@ -104,7 +104,7 @@ TEST(DepthFilterTest, RemovesNoiseAndKeepsEdges) {
   }
 }
 
-TEST(DepthWarpTest, ExtremeDepthsAndPosesStayFinite) {
+TEST(DepthWarpTest, StaysFiniteForExtremeDepthsAndPoses) {
   DepthView key = Wall(true);
   key.depth.At(0, 3, 3) = 1e-20f;
   key.depth.At(0, 4, 4) = 1e20f;

@@ -27,7 +27,7 @@ Scene ArcScene(const Eigen::Vector3d& target) {
   return scene;
 }
 
-TEST(OrbitTest, CenterIsWhereTheCamerasLook) {
+TEST(OrbitTest, FindsPointThatCamerasFace) {
   const Eigen::Vector3d target(1.0, -0.5, 3.0);
   const Scene scene = ArcScene(target);
   EXPECT_LT((CenterOfAttention(scene, 2, 4.0) - target).norm(), 1e-6);
@@ -45,7 +45,7 @@ TEST(OrbitTest, ParallelCamerasOrbitAtKeyDepth) {
             1e-6);
 }
 
-TEST(OrbitTest, CameraMovesRightAndUpFacingTheCenter) {
+TEST(OrbitTest, MovesRightAndUpFacingCenter) {
   const Eigen::Vector3d target(0.0, 0.0, 5.0);
   const Pose pose = ViewAt({0.0, 0.0, 0.0}, 0.0).cam_from_world;
   const Pose right = OrbitPose(pose, target, 0.2, 0.0);

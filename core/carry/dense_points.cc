@@ -25,7 +25,7 @@ struct SweptView {
   Image depth;               // empty when no other view overlaps
 };
 
-// The mask of a view and its moving objects; empty: nothing is masked.
+// Mask of a view, without its moving objects; empty: nothing is masked.
 Image MaskOf(int view, const ViewImages& images, const StillRegions& still, const Camera& size) {
   Image both;
   for (const auto& mask : {images.Mask(view), still ? still(view) : nullptr}) {
@@ -83,7 +83,7 @@ double RelativeExcess(const SweptView& view, const Eigen::Vector3d& point) {
   return depth > 0.0 ? depth / p.z() - 1.0 : std::nan("");
 }
 
-// Points that no view before `view` has given.
+// Points of `view` that no earlier view has contributed.
 std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
                                   int view,
                                   const DensePointsOptions& options) {

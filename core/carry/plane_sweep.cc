@@ -43,7 +43,7 @@ void ComputeCensus(const Image& picture, Census* census) {
   const int width = picture.width, height = picture.height;
   census->assign(picture.PlaneSize(), 0);
   for (int y = 0; y < height; ++y) {
-    const float* centre = picture.data.data() + static_cast<size_t>(y) * width;
+    const float* center = picture.data.data() + static_cast<size_t>(y) * width;
     uint32_t* out = census->data() + static_cast<size_t>(y) * width;
     for (int bit = 0; bit < kCensusBits; ++bit) {
       const int yy = std::clamp(y + offsets[bit].y, 0, height - 1);
@@ -51,9 +51,9 @@ void ComputeCensus(const Image& picture, Census* census) {
       const int dx = offsets[bit].x;
       const uint32_t mask = 1u << bit;
       const int begin = std::max(0, -dx), end = std::min(width, width - dx);
-      for (int x = begin; x < end; ++x) out[x] |= row[x + dx] < centre[x] ? mask : 0u;
-      for (int x = 0; x < begin; ++x) out[x] |= row[0] < centre[x] ? mask : 0u;
-      for (int x = end; x < width; ++x) out[x] |= row[width - 1] < centre[x] ? mask : 0u;
+      for (int x = begin; x < end; ++x) out[x] |= row[x + dx] < center[x] ? mask : 0u;
+      for (int x = 0; x < begin; ++x) out[x] |= row[0] < center[x] ? mask : 0u;
+      for (int x = end; x < width; ++x) out[x] |= row[width - 1] < center[x] ? mask : 0u;
     }
   }
 }
@@ -102,8 +102,8 @@ Image WholeWindows(const Image* mask) {
   return whole;
 }
 
-// The source seen through the plane at this depth of the reference camera. `valid` is 0 outside and
-// where `source_mask` (may be empty) is.
+// Warps the source through the plane at this depth of the reference camera. `valid` is 0 outside
+// the source and where `source_mask` (may be empty) is 0.
 void WarpThroughPlane(const PosedLuminance& reference,
                       const PosedLuminance& source,
                       const Image& source_mask,
@@ -132,8 +132,8 @@ void WarpThroughPlane(const PosedLuminance& reference,
     float* out = warped->data.data() + static_cast<size_t>(y) * width;
     uint8_t* ok = valid->data() + static_cast<size_t>(y) * width;
     const float py = y + 0.5f;
-    // Places of the pixels of a row; a loop apart from the sampling, so that compilers vectorise
-    // it.
+    // Positions of the pixels of a row, in a loop apart from the sampling, which compilers
+    // vectorise.
     for (int x = 0; x < width; ++x) {
       const float px = x + 0.5f;
       const float w = h(2, 0) * px + h(2, 1) * py + h(2, 2);

@@ -15,18 +15,18 @@ namespace color3d {
 namespace {
 
 constexpr int kFeatures = 3000;
-constexpr double kLeastContrast = 0.02;  // of features; low, so that weak texture counts
-constexpr int kMostPlanes = 3;
-constexpr size_t kLeastOfPlane = 12;  // features
+constexpr double kMinContrast = 0.02;  // of features; low, so that weak texture counts
+constexpr int kMaxPlanes = 3;
+constexpr size_t kMinOfPlane = 12;  // features
 constexpr double kOnPlanePx = 4.0;
 constexpr int kTries = 2000;
 constexpr double kSurely = 0.999;
-constexpr double kMostScale = 5.0;  // change of lengths
+constexpr double kMaxScale = 5.0;  // change of lengths
 
 LocalFeatures FeaturesOf(const Image& luminance) {
   Image gray = luminance;
   for (float& value : gray.data) value *= 0.01f;
-  return DetectLocalFeatures(gray, kFeatures, kLeastContrast);
+  return DetectLocalFeatures(gray, kFeatures, kMinContrast);
 }
 
 struct Matches {
@@ -48,14 +48,14 @@ Matches MatchesOf(const LocalFeatures& key, const LocalFeatures& frame, const Im
 
 bool IsPlausible(const cv::Matx33d& h) {
   const double area = h(0, 0) * h(1, 1) - h(0, 1) * h(1, 0);
-  return area > 1.0 / (kMostScale * kMostScale) && area < kMostScale * kMostScale;
+  return area > 1.0 / (kMaxScale * kMaxScale) && area < kMaxScale * kMaxScale;
 }
 
 // Homographies from the frame to the key frame. Each is fitted to the matches that those before it
 // do not explain.
 std::vector<cv::Matx33d> PlanesOf(Matches matches) {
   std::vector<cv::Matx33d> planes;
-  for (int i = 0; i < kMostPlanes && matches.in_key.size() >= kLeastOfPlane; ++i) {
+  for (int i = 0; i < kMaxPlanes && matches.in_key.size() >= kMinOfPlane; ++i) {
     cv::Mat is_inlier;
     const cv::Mat found = cv::findHomography(
         matches.in_frame, matches.in_key, cv::USAC_MAGSAC, kOnPlanePx, is_inlier, kTries, kSurely);
@@ -70,7 +70,7 @@ std::vector<cv::Matx33d> PlanesOf(Matches matches) {
       rest.in_key.push_back(matches.in_key[k]);
       rest.in_frame.push_back(matches.in_frame[k]);
     }
-    if (inliers < kLeastOfPlane) break;
+    if (inliers < kMinOfPlane) break;
     if (IsPlausible(found)) planes.emplace_back(found);
     matches = std::move(rest);
   }
@@ -110,7 +110,7 @@ std::vector<FilmTrack> ReappearingRegions::TracksTo(const Image& frame,
       tracks.push_back({Refined(h, frame, key_), Refined(h.inv(), key_, frame)});
     }
   } catch (const cv::Exception& e) {
-    throw Error(ErrorCode::kInternal, "features of a film failed: {}", e.err);
+    throw Error(ErrorCode::kInternal, "matching the features of two frames failed: {}", e.err);
   }
   return tracks;
 }

@@ -68,7 +68,7 @@ double MeanLaplacian(const Image& image) {
 }
 
 // 1 - E[(difference of neighbours)^2] / (2 variance).
-double NeighbourCorrelation(const Image& image, double variance) {
+double NeighborCorrelation(const Image& image, double variance) {
   double sum = 0.0;
   double count = 0.0;
   for (int y = 0; y < image.height; ++y) {
@@ -101,8 +101,7 @@ MedianContent Medians(const std::vector<FrameContent>& frames) {
 
 FrameContent MeasureFrameContent(const Image& luminance) {
   if (luminance.Empty() || luminance.channels != 1) {
-    throw InvalidArgument("a frame must be a picture of 1 channel, this one has {}",
-                          luminance.channels);
+    throw InvalidArgument("a frame must have 1 channel, but has {}", luminance.channels);
   }
   Image finite = luminance;
   for (float& value : finite.data) value = std::isfinite(value) ? value : 0.0f;
@@ -110,7 +109,7 @@ FrameContent MeasureFrameContent(const Image& luminance) {
   return {std::sqrt(whole.variance),
           MeanLaplacian(finite),
           StructuredShare(finite),
-          NeighbourCorrelation(finite, whole.variance)};
+          NeighborCorrelation(finite, whole.variance)};
 }
 
 std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames,

@@ -209,12 +209,11 @@ GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
   options.Validate();
   CheckLengths(descriptors);
   if (!groups.empty() && groups.size() != descriptors.size()) {
-    throw InvalidArgument("groups are given for {} views, descriptors are there for {}",
-                          groups.size(),
-                          descriptors.size());
+    throw InvalidArgument(
+        "there are groups for {} views, but descriptors for {}", groups.size(), descriptors.size());
   }
   if (!unfit.empty() && unfit.size() != descriptors.size()) {
-    throw InvalidArgument("frames were examined for {} views, descriptors are there for {}",
+    throw InvalidArgument("there are frame checks for {} views, but descriptors for {}",
                           unfit.size(),
                           descriptors.size());
   }
@@ -255,7 +254,7 @@ std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& des
 KeyViewSelection RankViews(GuardedViews guarded, const std::vector<double>& scores) {
   if (scores.size() != guarded.views.size()) {
     throw InvalidArgument(
-        "there are scores for {} of {} views", scores.size(), guarded.views.size());
+        "there are scores for {} views, but {} views", scores.size(), guarded.views.size());
   }
   std::vector<double> kept_scores;
   for (RankedView& view : guarded.views) {

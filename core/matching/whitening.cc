@@ -65,9 +65,9 @@ Whitening::Projection Fit(const torch::Tensor& samples,
   const torch::Tensor x = samples.to(torch::kFloat64);
   const torch::Tensor mean = x.mean(0);
   const torch::Tensor inverse_deviation = (x.var(0, /*unbiased=*/false) + kVarianceFloor).rsqrt();
-  const torch::Tensor standardised = (x - mean) * inverse_deviation;
+  const torch::Tensor standardized = (x - mean) * inverse_deviation;
   const torch::Tensor covariance =
-      torch::mm(standardised.t(), standardised) / static_cast<double>(x.size(0));
+      torch::mm(standardized.t(), standardized) / static_cast<double>(x.size(0));
   dims = std::min<int64_t>(dims, x.size(1));
   const torch::Tensor directions =
       noise.defined()

@@ -122,7 +122,7 @@ std::string KeyViewHtml(const std::string& title, const ReportKeyView& key) {
   std::string html = ChapterStart(title) + Paragraphs(key.notes);
   html += RowHtml(key.pictures);
   if (!key.color_facts.empty()) {
-    html += "<h3>Its colour</h3><div class=\"box\"><table>";
+    html += "<h3>Colour</h3><div class=\"box\"><table>";
     for (const auto& [name, text] : key.color_facts) {
       html += fmt::format("<tr><td>{}</td><td>{}</td></tr>", EscapeHtml(name), EscapeHtml(text));
     }
@@ -178,11 +178,11 @@ std::string SectionHtml(const ReportSection& section) {
 
 std::string Seconds(double seconds) { return seconds > 0.0 ? Number(seconds) : std::string(); }
 
-// Steps left out come first: no other chapter shows them.
+// Steps left out come first, since no other chapter shows them.
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
   double saved = 0.0;
   for (const PlanStep& step : plan) saved += step.needed ? 0.0 : step.estimated_seconds;
-  std::string html = ChapterStart("What the plan left out");
+  std::string html = ChapterStart("Steps left out");
   if (saved >= 0.05) html += fmt::format("<p>Estimated time saved: {:.1f} s.</p>", saved);
   ReportTable left_out{{"step", "saved, s"}, {}};
   ReportTable done{{"step", "estimate, s", "measured, s"}, {}};
@@ -197,7 +197,8 @@ std::string PlanHtml(const std::vector<PlanStep>& plan) {
   }
   if (!left_out.rows.empty()) html += TableHtml(left_out);
   if (!done.rows.empty()) {
-    html += "<details><summary>What it did, and why</summary>" + TableHtml(done) + "</details>";
+    html += "<details><summary>Steps carried out, with reasons</summary>" + TableHtml(done) +
+            "</details>";
   }
   return html + "</section>";
 }
@@ -238,7 +239,7 @@ std::string FiguresHtml(const std::vector<std::pair<std::string, double>>& metri
 
 std::string RepeatHtml(const ReportData& data) {
   if (data.facts.empty() && data.repeat.empty()) return "";
-  std::string html = ChapterStart("To repeat it");
+  std::string html = ChapterStart("Reproduction");
   html += Paragraphs(data.repeat_notes);
   if (!data.repeat.empty()) {
     html += "<pre>";

@@ -16,7 +16,7 @@ constexpr double kSecondsPerRemapMegapixel = 0.01;
 constexpr double kSecondsPerFeatureMegapixel = 0.5;
 constexpr double kFullyDynamic = 0.5;  // motion energy
 
-constexpr char kNothingReconstructed[] = "nothing is reconstructed of a film";
+constexpr char kNothingReconstructed[] = "films are not reconstructed";
 
 std::string MotionReason(const PlanFacts& f) {
   if (f.is_film) return kNothingReconstructed;
@@ -64,7 +64,7 @@ void Decide(const PlanFacts& f, PlanStep* step) {
   } else if (step->stage == kind::kGenerateAugmentations) {
     if (!f.has_augmentations) leave_out("the colorizer learns from the key views alone");
   } else if (step->stage == kind::kCorrectColors) {
-    if (!f.has_corrections) leave_out("nothing is to be corrected");
+    if (!f.has_corrections) leave_out("no corrections were given");
   } else if (step->stage == kind::kSolveChroma || step->stage == kind::kExport) {
     if (f.is_film) leave_out(kNothingReconstructed);
   } else if (step->stage == kind::kRender) {
@@ -101,7 +101,7 @@ void AddParts(const PlanFacts& f, const std::string& stage, std::vector<PlanStep
   } else if (stage == kind::kSolveChroma) {
     add("view_dependent_chroma",
         false,
-        "chroma hardly depends on the direction: degree 0 suffices unless another is asked for");
+        "chroma hardly depends on the direction: degree 0 suffices unless another is requested");
   }
 }
 

@@ -141,7 +141,7 @@ void PersonalModel::AddAdapters(Random& random) {
   }
 }
 
-torch::Tensor PersonalModel::Normalise(const Norm& norm, const torch::Tensor& x) const {
+torch::Tensor PersonalModel::Normalize(const Norm& norm, const torch::Tensor& x) const {
   const int64_t c = x.size(1);
   if (config_.instance_norm) {
     return torch::instance_norm(
@@ -175,12 +175,12 @@ torch::Tensor PersonalModel::Conv(const torch::Tensor& x,
       x.to(torch::kBFloat16), weight.to(torch::kBFloat16), b, /*stride=*/1, border);
 }
 
-torch::Tensor PersonalModel::NormalisedConv(const torch::Tensor& x,
+torch::Tensor PersonalModel::NormalizedConv(const torch::Tensor& x,
                                             const torch::Tensor& weight,
                                             const torch::Tensor& bias,
                                             const Norm& norm) const {
   if (config_.instance_norm || measuring_statistics_) {
-    return Normalise(norm, Conv(x, weight, bias));
+    return Normalize(norm, Conv(x, weight, bias));
   }
   // Frozen statistics make the norm linear. It is folded into the weights, which are a hundred
   // times smaller than the activations.
@@ -189,7 +189,7 @@ torch::Tensor PersonalModel::NormalisedConv(const torch::Tensor& x,
 }
 
 torch::Tensor PersonalModel::RunBlock(const ResidualBlock& block, const torch::Tensor& x) const {
-  torch::Tensor y = LeakyRelu(NormalisedConv(x, block.conv1, block.bias1, block.norm));
+  torch::Tensor y = LeakyRelu(NormalizedConv(x, block.conv1, block.bias1, block.norm));
   y = LeakyRelu(Conv(y, block.conv2, block.bias2));
   return x + y;
 }
@@ -241,7 +241,7 @@ torch::Tensor PersonalModel::Fuse(const Level& level,
     begin += below.size(1);
   }
   if (luminance.defined()) x = x + luminance * weight.narrow(1, begin, 1).view({1, -1, 1, 1});
-  return frozen ? x : Normalise(level.norm, x);
+  return frozen ? x : Normalize(level.norm, x);
 }
 
 torch::Tensor PersonalModel::Decode(const std::vector<torch::Tensor>& taps,

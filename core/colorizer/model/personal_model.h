@@ -90,14 +90,14 @@ class PersonalModel {
   void AddLevel(const std::string& name, int64_t in, int64_t out, Random& random);
   void AddAdapters(Random& random);
   // `weight` * x + `bias`, normalised; 3x3 with a border of 1, or 1x1.
-  torch::Tensor NormalisedConv(const torch::Tensor& x,
+  torch::Tensor NormalizedConv(const torch::Tensor& x,
                                const torch::Tensor& weight,
                                const torch::Tensor& bias,
                                const Norm& norm) const;
   torch::Tensor Conv(const torch::Tensor& x,
                      const torch::Tensor& weight,
                      const torch::Tensor& bias) const;
-  torch::Tensor Normalise(const Norm& norm, const torch::Tensor& x) const;
+  torch::Tensor Normalize(const Norm& norm, const torch::Tensor& x) const;
   torch::Tensor Fuse(const Level& level,
                      const torch::Tensor& tap,
                      const torch::Tensor& below,

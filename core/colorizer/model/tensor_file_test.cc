@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr TensorFormat kFormat = {"color3d.test", 3, "OLDFILE1", "make it anew"};
+constexpr TensorFormat kFormat = {"color3d.test", 3, "OLDFILE1", "create it again"};
 constexpr char kDigestKey[] = "\"sha256\":\"";
 
 TensorFile MakeFile() {
@@ -51,7 +51,7 @@ std::string Resign(std::string bytes) {
   return bytes.replace(key + 10, 64, Sha256Hex(bytes));
 }
 
-TEST(TensorFileTest, RoundTrip) {
+TEST(TensorFileTest, ReadsWrittenFile) {
   const TensorFile file = MakeFile();
   const std::string bytes = WriteTensorFile(file, kFormat);
   EXPECT_EQ(Resign(bytes), bytes);
@@ -69,7 +69,7 @@ TEST(TensorFileTest, IsReadableAsSafetensors) {
   EXPECT_EQ(weights.at("two").values, MakeFile().arrays.at("two").values);
 }
 
-TEST(TensorFileTest, EveryTruncationIsRefused) {
+TEST(TensorFileTest, RefusesEveryTruncation) {
   const std::string bytes = WriteTensorFile(MakeFile(), kFormat);
   for (size_t length = 0; length < bytes.size(); ++length) {
     EXPECT_THROW(Read(bytes.substr(0, length)), Error) << length;
@@ -77,7 +77,7 @@ TEST(TensorFileTest, EveryTruncationIsRefused) {
   EXPECT_THROW(Read(bytes + "x"), Error);
 }
 
-TEST(TensorFileTest, EveryChangedByteIsRefused) {
+TEST(TensorFileTest, RefusesEveryChangedByte) {
   const std::string bytes = WriteTensorFile(MakeFile(), kFormat);
   for (size_t i = 0; i < bytes.size(); ++i) {
     std::string changed = bytes;
@@ -86,7 +86,7 @@ TEST(TensorFileTest, EveryChangedByteIsRefused) {
   }
 }
 
-TEST(TensorFileTest, HostileBytesWithValidChecksumNeverCrash) {
+TEST(TensorFileTest, SurvivesHostileBytesWithValidChecksum) {
   const std::string bytes = WriteTensorFile(MakeFile(), kFormat);
   Random random(1);
   int refused = 0;
@@ -117,12 +117,12 @@ TEST(TensorFileTest, NamesOtherKindOrVersion) {
   other = kFormat;
   other.version = 4;
   EXPECT_THAT(MessageOf(WriteTensorFile(MakeFile(), other)), HasSubstr("version 4"));
-  EXPECT_THAT(MessageOf(WriteTensorFile(MakeFile(), other)), HasSubstr("make it anew"));
+  EXPECT_THAT(MessageOf(WriteTensorFile(MakeFile(), other)), HasSubstr("create it again"));
 }
 
 TEST(TensorFileTest, RefusesOldFormatWithRemedy) {
   EXPECT_THAT(MessageOf("OLDFILE1 and more"), HasSubstr("earlier version"));
-  EXPECT_THAT(MessageOf("OLDFILE1 and more"), HasSubstr("make it anew"));
+  EXPECT_THAT(MessageOf("OLDFILE1 and more"), HasSubstr("create it again"));
 }
 
 }  // namespace

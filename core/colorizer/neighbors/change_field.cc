@@ -13,7 +13,7 @@ namespace color3d {
 namespace {
 
 constexpr double kUnknownApart = 0.8;  // distance of known positions from unknown ones
-constexpr double kLeastWeight = 0.05;
+constexpr double kMinWeight = 0.05;
 constexpr double kSamePlace = 0.75;  // share of the maximum covariance
 constexpr double kWorthInferring = 1e-5;
 
@@ -31,8 +31,8 @@ FieldPlaces Rows(const FieldPlaces& places, const torch::Tensor& rows) {
 }
 
 // Mean of the wanted colours, weighted by similarity.
-torch::Tensor WeightedTarget(const torch::Tensor& alike, const torch::Tensor& wanted) {
-  const torch::Tensor weights = alike.square();
+torch::Tensor WeightedTarget(const torch::Tensor& similarity, const torch::Tensor& wanted) {
+  const torch::Tensor weights = similarity.square();
   return torch::matmul(weights, wanted) / weights.sum(1, /*keepdim=*/true).clamp_min(1e-12);
 }
 
@@ -61,7 +61,7 @@ ChangeField::ChangeField(FieldPlaces places,
   wanted_ = wanted_.index_select(0, rows);
   covariance = covariance.index_select(0, rows).index_select(1, rows).to(torch::kFloat64);
   const torch::Tensor noise =
-      options_.noise / weights.index_select(0, rows).to(torch::kFloat64).clamp_min(kLeastWeight);
+      options_.noise / weights.index_select(0, rows).to(torch::kFloat64).clamp_min(kMinWeight);
   inverse_ = at::cholesky_inverse(at::linalg_cholesky(covariance + torch::diag(noise)));
   inverse_x_change_ =
       torch::matmul(inverse_, (wanted_ - places_.colors).to(torch::kFloat64)).to(torch::kFloat32);
@@ -69,25 +69,26 @@ ChangeField::ChangeField(FieldPlaces places,
 }
 
 torch::Tensor ChangeField::Covariance(const FieldPlaces& a, const FieldPlaces& b) const {
-  const torch::Tensor looks = SquaredDistances(a.features, b.features);
+  const torch::Tensor apart = SquaredDistances(a.features, b.features);
   const torch::Tensor space =
       SquaredDistances(EmbedPositions(a.positions), EmbedPositions(b.positions)).clamp_min_(0.0);
   const torch::Tensor seen = (a.seen.unsqueeze(1) - b.seen.unsqueeze(0)).abs_();
-  const torch::Tensor wide =
-      (looks / -options_.wide_looks).exp_() / (1.0 + space.sqrt() / options_.wide_space);
-  const torch::Tensor near =
-      (looks / -options_.near_looks - space / (options_.near_space * options_.near_space)).exp_();
+  const torch::Tensor wide = (apart / -options_.wide_feature_reach).exp_() /
+                             (1.0 + space.sqrt() / options_.wide_space_reach);
+  const torch::Tensor near = (apart / -options_.near_feature_reach -
+                              space / (options_.near_space_reach * options_.near_space_reach))
+                                 .exp_();
   return (options_.wide * wide + options_.near * near) * (seen / -options_.seen_reach).exp_();
 }
 
 ChangeField::Answer ChangeField::At(const FieldPlaces& places) const {
   const int64_t count = places.features.size(0);
   if (!inverse_.defined()) return {torch::zeros({count, 2}), torch::zeros({count})};
-  const torch::Tensor alike = Covariance(places, places_);
-  const torch::Tensor told = (torch::matmul(alike, inverse_) * alike).sum(1);
-  return {LimitTo(WeightedTarget(alike, wanted_) - places.colors,
-                  torch::matmul(alike, inverse_x_change_)),
-          (told / (options_.wide + options_.near)).clamp_(0.0, 1.0)};
+  const torch::Tensor similarity = Covariance(places, places_);
+  const torch::Tensor explained = (torch::matmul(similarity, inverse_) * similarity).sum(1);
+  return {LimitTo(WeightedTarget(similarity, wanted_) - places.colors,
+                  torch::matmul(similarity, inverse_x_change_)),
+          (explained / (options_.wide + options_.near)).clamp_(0.0, 1.0)};
 }
 
 std::vector<ChangeField::Proposal> ChangeField::Propose(const FieldPlaces& places,
@@ -97,8 +98,8 @@ std::vector<ChangeField::Proposal> ChangeField::Propose(const FieldPlaces& place
   // Posterior covariance of the places, given the painted ones.
   torch::Tensor covariance = Covariance(places, places);
   if (inverse_.defined()) {
-    const torch::Tensor alike = Covariance(places, places_);
-    covariance -= torch::matmul(torch::matmul(alike, inverse_), alike.t());
+    const torch::Tensor similarity = Covariance(places, places_);
+    covariance -= torch::matmul(torch::matmul(similarity, inverse_), similarity.t());
   }
   covariance *= scale;
   const double total = (options_.wide + options_.near) * deviation.square().sum().item<double>();
@@ -111,9 +112,10 @@ std::vector<ChangeField::Proposal> ChangeField::Propose(const FieldPlaces& place
     const double gain = gains[row].item<double>() / total;
     if (!(gain > kWorthInferring)) break;
     proposals.push_back({row, gain});
-    const torch::Tensor told = covariance[row].clone();
-    const double variance = std::max(told[row].item<double>(), 0.0) + noise[row].item<double>();
-    covariance -= told.unsqueeze(1) * told.unsqueeze(0) / (variance + 1e-12);
+    const torch::Tensor explained = covariance[row].clone();
+    const double variance =
+        std::max(explained[row].item<double>(), 0.0) + noise[row].item<double>();
+    covariance -= explained.unsqueeze(1) * explained.unsqueeze(0) / (variance + 1e-12);
   }
   return proposals;
 }

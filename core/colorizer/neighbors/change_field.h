@@ -22,13 +22,13 @@ struct FieldPlaces {
 // across views.
 struct ChangeFieldOptions {
   double wide = 0.5;
-  double wide_looks = 2.0;  // squared feature distance at which `wide` falls to 1/e
-  double wide_space = 0.2;  // distance at which `wide` halves, in units of the scene's radius
+  double wide_feature_reach = 2.0;  // squared feature distance at which `wide` falls to 1/e
+  double wide_space_reach = 0.2;  // distance at which `wide` halves, in units of the scene's radius
   double near = 0.4;
-  double near_looks = 4.0;
-  double near_space = 0.1;  // distance at which `near` falls to 1/e
-  double seen_reach = 0.5;  // difference of `seen` at which the covariance falls to 1/e
-  double noise = 0.1;       // variance of painted colours relative to that of the errors
+  double near_feature_reach = 4.0;
+  double near_space_reach = 0.1;  // distance at which `near` falls to 1/e
+  double seen_reach = 0.5;        // difference of `seen` at which the covariance falls to 1/e
+  double noise = 0.1;             // variance of painted colours relative to that of the errors
 };
 
 class ChangeField {
@@ -44,7 +44,7 @@ class ChangeField {
 
   struct Answer {
     // [q,2], Lab units. Never moves a colour past the target colour of the most similar places: a
-    // place that has the target colour already does not share the error of the painted ones.
+    // place that already has the target colour does not share the error of the painted ones.
     torch::Tensor change;
     torch::Tensor share;  // [q], 0..1: explained share of the variance of the errors
   };

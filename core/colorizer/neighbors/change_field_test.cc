@@ -41,7 +41,7 @@ double ChangeAt(const ChangeField& field, const FieldPlaces& places, int row = 0
   return field.At(places).change[row][0].item<double>();
 }
 
-TEST(ChangeField, AgreesWithFormulaForOnePlace) {
+TEST(ChangeFieldTest, AgreesWithFormulaForOnePlace) {
   const ChangeField field = OneStroke(Places({0.0}), 20.0);
   // At its own place: variance / (variance + noise).
   EXPECT_NEAR(ChangeAt(field, Places({0.0})), 20.0 * 0.9 / 1.0, 1e-4);
@@ -51,7 +51,7 @@ TEST(ChangeField, AgreesWithFormulaForOnePlace) {
   EXPECT_NEAR(field.At(Places({0.2})).share[0].item<double>(), alike * alike / 0.9, 1e-5);
 }
 
-TEST(ChangeField, ReachesSimilarAndNearUnseenPlaces) {
+TEST(ChangeFieldTest, ReachesSimilarAndNearUnseenPlaces) {
   const ChangeField field = OneStroke(Places({0.0, 0.01, 0.02}), 20.0);
   EXPECT_GT(ChangeAt(field, Places({0.01})), 18.0);
   EXPECT_LT(ChangeAt(field, Places({0.01}, /*look=*/3.0)), 0.1);
@@ -59,7 +59,7 @@ TEST(ChangeField, ReachesSimilarAndNearUnseenPlaces) {
   EXPECT_LT(ChangeAt(field, Places({3.0})), 2.0);
 }
 
-TEST(ChangeField, KeepsPlacesWithTargetColor) {
+TEST(ChangeFieldTest, KeepsPlacesWithTargetColor) {
   const ChangeField field = OneStroke(Places({0.0}), 20.0);
   FieldPlaces right = Places({0.01, 0.01, 0.01});
   right.colors[0].fill_(20.0);  // target colour
@@ -70,14 +70,14 @@ TEST(ChangeField, KeepsPlacesWithTargetColor) {
   EXPECT_NEAR(ChangeAt(field, right, 2), 0.0, 1e-4);
 }
 
-TEST(ChangeField, ChangesNothingWithoutCorrections) {
+TEST(ChangeFieldTest, ChangesNothingWithoutCorrections) {
   const ChangeField field({}, torch::zeros({0, 2}), {}, {});
   const ChangeField::Answer answer = field.At(Places({0.0, 1.0}));
   EXPECT_EQ(answer.change.abs().max().item<double>(), 0.0);
   EXPECT_EQ(answer.share.max().item<double>(), 0.0);
 }
 
-TEST(ChangeField, LaterOfContradictingStrokesCounts) {
+TEST(ChangeFieldTest, LaterOfContradictingStrokesCounts) {
   torch::Tensor changes = torch::zeros({2, 2});
   changes[0][0] = 30.0;
   changes[1][0] = -10.0;
@@ -86,7 +86,7 @@ TEST(ChangeField, LaterOfContradictingStrokesCounts) {
   EXPECT_NEAR(ChangeAt(field, Places({0.0})), -9.0, 1e-4);
 }
 
-TEST(ChangeField, StaysFiniteWithoutPositions) {
+TEST(ChangeFieldTest, StaysFiniteWithoutPositions) {
   const int64_t count = 300;
   const ChangeField field = OneStroke(Unknown(count), 12.0);
   const ChangeField::Answer answer = field.At(Unknown(3));
@@ -96,7 +96,7 @@ TEST(ChangeField, StaysFiniteWithoutPositions) {
   EXPECT_LT(ChangeAt(field, Places({0.0})), 3.0);
 }
 
-TEST(ChangeField, ProposesDistinctPlacesByGain) {
+TEST(ChangeFieldTest, ProposesDistinctPlacesByGain) {
   // Five places close together, a single one, and a certain one.
   FieldPlaces places = Places({0.0, 0.01, 0.02, 0.03, 0.04, 2.0, -2.0});
   const torch::Tensor deviation = torch::tensor({1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.01});

@@ -13,7 +13,7 @@ namespace {
 
 using FeatureNeighborsTest = SmallColorizerTest;
 
-TEST_F(FeatureNeighborsTest, NeighborsOfTheKeyViewHaveItsColors) {
+TEST_F(FeatureNeighborsTest, ReturnsColorsOfKeyView) {
   FeatureNeighborsOptions options;
   options.whitening.tap_shares = {1.0, 1.0, 1.0, 1.0, 1.0};
   const FeatureNeighbors neighbors(encoder_, pictures_, options, Random(1), {});
@@ -26,7 +26,7 @@ TEST_F(FeatureNeighborsTest, NeighborsOfTheKeyViewHaveItsColors) {
   EXPECT_LT(found.distance.mean().item<double>(), 0.1);
 }
 
-TEST_F(FeatureNeighborsTest, NeighborsAgreeWithTheDefinitionInFloat64) {
+TEST_F(FeatureNeighborsTest, AgreesWithDefinitionInFloat64) {
   FeatureNeighborsOptions options;
   options.whitening.tap_shares = {1.0, 1.0, 1.0, 1.0, 1.0};
   options.bank_size = 300;
@@ -50,7 +50,7 @@ TEST_F(FeatureNeighborsTest, NeighborsAgreeWithTheDefinitionInFloat64) {
 }
 
 // A picture with similar halves at distant positions, red and blue.
-TEST_F(FeatureNeighborsTest, PositionsSeparateSimilarPlaces) {
+TEST_F(FeatureNeighborsTest, SeparatesSimilarPlacesByPosition) {
   constexpr int kSide = 64;
   TrainingPicture picture{"the key view", Image(kSide, kSide, 1), Image(kSide, kSide, 2)};
   picture.position = Image(kSide, kSide, 4);

@@ -55,7 +55,7 @@ std::shared_ptr<const Colorizer> Train(const std::shared_ptr<const Encoder>& enc
       encoder, {{"key", key.luminance, key.ab}}, options, {pool, checkpoints, progress, {}});
 }
 
-TEST(PublishedEncoderColorizerTest, LearnsTheKeyViewFromADdcolorEncoder) {
+TEST(PublishedEncoderColorizerTest, LearnsKeyViewWithDdcolorEncoder) {
   const auto encoder = FromWeights(SyntheticDdcolorWeights(SyntheticDdcolor::Mini(), 1));
   const auto colorizer = Train(encoder, ColorizerOptions().recipe, 15);
   const Key key = MakeKey();
@@ -75,7 +75,7 @@ TEST(PublishedEncoderColorizerTest, LearnsTheKeyViewFromADdcolorEncoder) {
   EXPECT_EQ(loaded->Colorize(other).data, colorizer->Colorize(other).data);
 }
 
-TEST(PublishedEncoderColorizerTest, TakesAdaptersInEveryBlock) {
+TEST(PublishedEncoderColorizerTest, TrainsAdaptersInEveryBlock) {
   const auto encoder = FromWeights(SyntheticDdcolorWeights(SyntheticDdcolor::Mini(), 1));
   const auto colorizer = Train(encoder, ColorizerOptions::Recipe::kPaper, 2);
   for (const float value : colorizer->Colorize(Image(40, 70, 1, 60.0f)).data) {
@@ -83,7 +83,7 @@ TEST(PublishedEncoderColorizerTest, TakesAdaptersInEveryBlock) {
   }
 }
 
-TEST(PublishedEncoderColorizerTest, RefusesEncodersItCannotDecode) {
+TEST(PublishedEncoderColorizerTest, RefusesEncodersWithoutTaps) {
   const auto refused = [](const std::shared_ptr<const Encoder>& encoder, const char* reason) {
     try {
       Train(encoder, ColorizerOptions().recipe, 1);

@@ -73,7 +73,7 @@ Errors Measure(const fs::path& folder, int iterations) {
   return errors;
 }
 
-TEST(ColorizerQualityTest, FernIsFarFromGray) {
+TEST(ColorizerQualityTest, ColorsFern) {
   const fs::path folder = fs::path(COLOR3D_SHARED_DATA) / "scenes/fern/images";
   if (!fs::exists(folder)) GTEST_SKIP() << "no shared data";
   const Errors errors = Measure(folder, 0);
@@ -81,7 +81,7 @@ TEST(ColorizerQualityTest, FernIsFarFromGray) {
   EXPECT_LT(errors.predicted, 4.5);
 }
 
-TEST(ColorizerQualityTest, FoxIsFarFromGray) {
+TEST(ColorizerQualityTest, ColorsFox) {
   const fs::path folder = fs::path(COLOR3D_SHARED_DATA) / "scenes/fox/images";
   if (!fs::exists(folder)) GTEST_SKIP() << "no shared data";
   const Errors errors = Measure(folder, 0);

@@ -127,7 +127,7 @@ TEST(ColorizerTest, RefusesNetworkSizeOutOfRange) {
   EXPECT_THROW(options.Validate(), Error);
 }
 
-TEST(ColorizerTest, SameSeedSameColorizer) {
+TEST(ColorizerTest, IsRepeatableForSameSeed) {
   const Key key = MakeKey(96, 80);
   ColorizerOptions options = Quick(5);
   // Without neighbors, since their colours do not depend on the seed.
@@ -167,7 +167,7 @@ TEST(ColorizerTest, RefusesBadPictures) {
   EXPECT_THROW(colorizer->Colorize(broken), Error);
 }
 
-TEST(ColorizerTest, ThreadsShareOneColorizer) {
+TEST(ColorizerTest, GivesSameColorsOnSeveralThreads) {
   const Key key = MakeKey(96, 80);
   const auto colorizer = Train(key, Quick(2));
   const Image expected = colorizer->Colorize(key.luminance);
@@ -184,7 +184,7 @@ TEST(ColorizerTest, ThreadsShareOneColorizer) {
   }
 }
 
-TEST(ColorizerTest, DamagedFilesAreRefused) {
+TEST(ColorizerTest, RefusesDamagedFiles) {
   const std::string bytes = Train(MakeKey(64, 64), Quick(0))->Serialize();
   ExpectRefused("");
   ExpectRefused("C3DCOLR1");
@@ -200,7 +200,7 @@ TEST(ColorizerTest, DamagedFilesAreRefused) {
   }
 }
 
-TEST(ColorizerTest, AnotherEncoderIsRefused) {
+TEST(ColorizerTest, RefusesOtherEncoder) {
   const Key key = MakeKey(64, 64);
   const std::string bytes = Train(key, Quick(0))->Serialize();
   EXPECT_THROW(LoadColorizer(bytes, std::make_shared<OtherEncoder>()), Error);
@@ -216,7 +216,7 @@ TEST(ColorizerTest, AnotherEncoderIsRefused) {
       Error);
 }
 
-TEST(ColorizerTest, BadOptionsAndKeyViewsAreRefused) {
+TEST(ColorizerTest, RefusesBadOptionsAndKeyViews) {
   const Key key = MakeKey(64, 64);
   auto refused = [&](auto change) {
     ColorizerOptions options = Quick(0);
@@ -236,7 +236,7 @@ TEST(ColorizerTest, BadOptionsAndKeyViewsAreRefused) {
   EXPECT_THROW(Train(broken, Quick(0)), Error);
 }
 
-TEST(ColorizerTest, DegenerateKeyViewsTrain) {
+TEST(ColorizerTest, TrainsOnDegenerateKeyViews) {
   for (const auto& [width, height] : {std::pair{1, 1}, {64, 64}, {7, 200}}) {
     const Key flat{Image(width, height, 1, 50.0f), Image(width, height, 2, 20.0f)};
     const Image ab = Train(flat, Quick(2))->Colorize(flat.luminance);

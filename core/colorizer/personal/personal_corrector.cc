@@ -28,10 +28,10 @@ constexpr double kMinPaintedShare = 0.02;   // minimum painted share of a cell
 constexpr double kMinChange = 3.0;          // minimum change of colour, Lab units
 // The expected squared error of a colour grows with the squared distance to the training cells, up
 // to this multiple of its median.
-constexpr double kLeastVariance = 0.1;
-constexpr double kMostUnlike = 4.0;
+constexpr double kMinVariance = 0.1;
+constexpr double kMaxUnlike = 4.0;
 
-PlacedPicture AtSide(const PlacedPicture& picture, int max_side_px) {
+PlacedPicture Reduced(const PlacedPicture& picture, int max_side_px) {
   PlacedPicture small{FitWithin(picture.luminance, max_side_px), {}, {}, {}};
   const auto fit = [&](const Image& map) {
     return map.Empty() ? Image() : Resize(map, small.luminance.width, small.luminance.height);
@@ -78,8 +78,8 @@ torch::Tensor Deviation(const std::vector<float>& unlike) {
   std::vector<float> sorted = unlike;
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
   const double median = std::max(sorted[sorted.size() / 2], 1e-6f);
-  const torch::Tensor apart = (torch::tensor(unlike) / median).clamp_max(kMostUnlike);
-  return (kLeastVariance + apart.square()).sqrt();
+  const torch::Tensor apart = (torch::tensor(unlike) / median).clamp_max(kMaxUnlike);
+  return (kMinVariance + apart.square()).sqrt();
 }
 
 }  // namespace
@@ -101,7 +101,7 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
   const auto count = static_cast<int64_t>(corrections.size());
   for (int64_t number = 0; number < count; ++number) {
     const Correction& correction = corrections[number];
-    const PlacedPicture small = AtSide(correction.picture, max_side_px_);
+    const PlacedPicture small = Reduced(correction.picture, max_side_px_);
     const int width = small.luminance.width, height = small.luminance.height;
     // Current and target colours of painted places.
     const auto cells_of = [&](const Image& ab) {
@@ -147,7 +147,7 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
   return WithTorchErrors("correction", [&] {
     torch::NoGradGuard no_grad;
     SetTorchThreads(threads_);
-    const PlacedPicture small = AtSide(picture, max_side_px_);
+    const PlacedPicture small = Reduced(picture, max_side_px_);
     const torch::Tensor padded = PaddedTensor(small.luminance);
     const CellFeatures cells =
         DescribeCells(encoder_.config(), encoder_.Taps(encoder_.Input(padded)), padded);

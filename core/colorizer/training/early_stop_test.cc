@@ -5,7 +5,7 @@
 namespace color3d {
 namespace {
 
-TEST(EarlyStopTest, ComparesMeansOfThreeOverAWindowOfFour) {
+TEST(EarlyStopTest, StopsWhenCurveIsFlat) {
   EarlyStop falling({.min_improvement = 0.01});
   double error = 10.0;
   for (int i = 0; i < 40; ++i) EXPECT_FALSE(falling.Add(error *= 0.99)) << i;

@@ -160,8 +160,7 @@ void TrainingSession::RollBack(ProgressObserver& progress) {
   if (++course_.rollbacks > kMaxRollbacks) {
     throw Error(
         ErrorCode::kInternal,
-        "personalization diverged {} times in spite of smaller steps; try another key view or "
-        "another seed",
+        "personalization diverged {} times in spite of smaller steps; try another key view or seed",
         course_.rollbacks);
   }
   torch::NoGradGuard no_grad;
@@ -181,8 +180,8 @@ void TrainingSession::RollBack(ProgressObserver& progress) {
   course_.best_running_loss = good_.running_loss;
   course_.learning_rate_scale *= 0.5;
   progress.OnWarning(
-      fmt::format("personalization: the loss exploded at iteration {}; went back to the last good "
-                  "state with {} of the learning rate",
+      fmt::format("personalization: the loss diverged at iteration {}; training continues from the "
+                  "last good state with {} of the learning rate",
                   course_.iteration,
                   course_.learning_rate_scale));
 }

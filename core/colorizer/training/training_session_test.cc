@@ -77,7 +77,7 @@ struct OneCheckpoint : CheckpointStore {
   bool die_after_save = false;
 };
 
-TEST_F(TrainingTest, AdaptersLearnWhileTheEncoderStaysFrozen) {
+TEST_F(TrainingTest, TrainsAdaptersAndKeepsEncoderFrozen) {
   recipe_.model.adapter_stages = 8;
   PersonalModel model = MakeModel();
   const auto before = encoder_.Taps(encoder_.Input(KeyTensor()));
@@ -92,7 +92,7 @@ TEST_F(TrainingTest, AdaptersLearnWhileTheEncoderStaysFrozen) {
   EXPECT_FALSE(torch::equal(adapted[1], after[1]));
 }
 
-TEST_F(TrainingTest, LossFalls) {
+TEST_F(TrainingTest, ReducesLoss) {
   PersonalModel model = MakeModel();
   NoCheckpoints checkpoints;
   Warnings progress;
@@ -143,7 +143,7 @@ TEST_F(TrainingTest, DrawsPicturesByShare) {
   pictures_[1].share = 50.0;
   PersonalModel model = MakeModel();
   Train(model, checkpoints, progress);
-  // Trained on green, so that the error of the held-out views remains.
+  // Training on green leaves the error of the held-out views as it is.
   EXPECT_GT(progress.validation.back(), 0.8 * progress.validation.front());
 }
 
@@ -278,7 +278,7 @@ TEST_F(TrainingTest, RollsBackAfterDivergence) {
   }
 }
 
-TEST_F(TrainingTest, TimeLimitShortensTheSchedule) {
+TEST_F(TrainingTest, ShortensScheduleToTimeLimit) {
   options_.iterations = 100000;
   options_.time_limit_seconds = 0.5;
   PersonalModel model = MakeModel();

@@ -87,10 +87,10 @@ ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string 
 
 torch::Tensor ConvNext::Input(const torch::Tensor& luminance) const {
   at::NoGradGuard no_grad;
-  return NormaliseInput(GrayFromLuminanceTensor(luminance));
+  return NormalizeInput(GrayFromLuminanceTensor(luminance));
 }
 
-torch::Tensor ConvNext::NormaliseInput(const torch::Tensor& rgb) {
+torch::Tensor ConvNext::NormalizeInput(const torch::Tensor& rgb) {
   const torch::Tensor mean =
       torch::tensor({0.485f, 0.456f, 0.406f}).view({1, 3, 1, 1}).to(rgb.device());
   const torch::Tensor deviation =
@@ -150,7 +150,7 @@ std::vector<torch::Tensor> ConvNext::StageOutputs(const torch::Tensor& input,
   return outputs;
 }
 
-std::vector<torch::Tensor> ConvNext::NormaliseTaps(std::vector<torch::Tensor> outputs) const {
+std::vector<torch::Tensor> ConvNext::NormalizeTaps(std::vector<torch::Tensor> outputs) const {
   for (size_t i = 0; i < outputs.size(); ++i) {
     outputs[i] = ChannelNorm(outputs[i], stages_[i].norm);
   }
@@ -159,7 +159,7 @@ std::vector<torch::Tensor> ConvNext::NormaliseTaps(std::vector<torch::Tensor> ou
 
 std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
                                           const BlockAdapter& adapter) const {
-  return NormaliseTaps(StageOutputs(input, config_.StageCount(), adapter));
+  return NormalizeTaps(StageOutputs(input, config_.StageCount(), adapter));
 }
 
 std::vector<torch::Tensor> ConvNext::FastTaps(const torch::Tensor& input) const {
@@ -182,7 +182,7 @@ std::vector<torch::Tensor> ConvNext::FastTaps(const torch::Tensor& input) const 
     }
     outputs.push_back(x);
   }
-  return NormaliseTaps(std::move(outputs));
+  return NormalizeTaps(std::move(outputs));
 }
 
 torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px, int stage) const {

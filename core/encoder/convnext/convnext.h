@@ -37,7 +37,7 @@ class ConvNext : public TapEncoder {
   // sRGB, normalised with ImageNet's statistics.
   torch::Tensor Input(const torch::Tensor& luminance) const override;
   // Normalises RGB in 0..1, [B,3,H,W], with ImageNet's statistics. Channels-last.
-  static torch::Tensor NormaliseInput(const torch::Tensor& rgb);
+  static torch::Tensor NormalizeInput(const torch::Tensor& rgb);
   // Returns norm0 .. norm3: taps [B, dims[i], H / Stride(i), W / Stride(i)], channels-last.
   // Requires: H and W are multiples of the last stride. Gradients flow to the adapter, never to the
   // weights.
@@ -66,7 +66,7 @@ class ConvNext : public TapEncoder {
                          const torch::Tensor& x,
                          const torch::Tensor& adapted) const;
   torch::Tensor Downsample(int stage, const torch::Tensor& x) const;
-  std::vector<torch::Tensor> NormaliseTaps(std::vector<torch::Tensor> outputs) const;
+  std::vector<torch::Tensor> NormalizeTaps(std::vector<torch::Tensor> outputs) const;
   torch::Tensor DeepTap(const Image& luminance, int max_side_px, int stage) const;
 
   ConvNextConfig config_;

@@ -26,7 +26,7 @@ constexpr int kNetworkSidePx = 512;
 
 }  // namespace
 
-bool Ddcolor::Recognises(const WeightMap& weights) {
+bool Ddcolor::Recognizes(const WeightMap& weights) {
   return weights.count("decoder.color_decoder.query_feat.weight") > 0 ||
          weights.count("refine_net.0.0.weight_orig") > 0;
 }
@@ -63,7 +63,7 @@ Image Ddcolor::Predict(const Image& gray_rgb) const {
   }
   return WithTorchErrors("DDColor", [&] {
     at::NoGradGuard no_grad;
-    const torch::Tensor input = ConvNext::NormaliseInput(TensorFromImage(gray_rgb));
+    const torch::Tensor input = ConvNext::NormalizeInput(TensorFromImage(gray_rgb));
     return ImageFromTensor(decoder_->Forward(encoder_->Taps(input), input));
   });
 }
@@ -90,7 +90,7 @@ AutomaticColor Ddcolor::Colorize(const Image& luminance) const {
 std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::FromWeightFile(
     const std::filesystem::path& ddcolor_weights) {
   WeightMap weights = ReadWeightFile(ddcolor_weights);
-  if (!Ddcolor::Recognises(weights)) {
+  if (!Ddcolor::Recognizes(weights)) {
     throw InvalidArgument(
         "{} holds no DDColor (it has {} arrays, none called refine_net.0.0.weight_orig); give a "
         "published DDColor file",

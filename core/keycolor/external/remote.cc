@@ -40,7 +40,7 @@ void RequireCapabilities(const RemoteOptions& options, const RemoteInfo& info) {
   for (const std::string& name : needed) {
     if (info.capabilities.contains(name)) continue;
     Refuse(options,
-           fmt::format("does not claim {} (it claims: {}); leave that input out or use another "
+           fmt::format("does not support {} (it supports: {}); leave that input out or use another "
                        "backend",
                        name,
                        Listing(info.capabilities)));
@@ -158,14 +158,14 @@ void CheckAnswerLuminance(const Image& luminance,
   if (!agreement.SameSubject()) {
     Refuse(options,
            fmt::format("answered with a picture of something else (correlation "
-                       "of luminances {:.3g}, needed > {})",
+                       "of luminances {:.3g}, required > {})",
                        agreement.correlation,
                        LuminanceAgreement::kMinCorrelation));
   }
   if (agreement.mean_difference > kNotableDifference) {
     solution->warnings.push_back(fmt::format(
         "the backend '{}' changed the luminance by {:.3g} L units on average; the photo's "
-        "own was put back",
+        "luminance was restored",
         options.name,
         agreement.mean_difference));
   }
@@ -219,7 +219,7 @@ RemoteSolution KeyColorFromRemote(const Image& luminance,
   }
   if (ab.width != luminance.width || ab.height != luminance.height) {
     solution.warnings.push_back(fmt::format(
-        "the backend '{}' coloured the photo at {} px; its colours were brought to {} px",
+        "the backend '{}' coloured the photo at {} px; its colours were resampled to {} px",
         options.name,
         SizeText(ab),
         SizeText(luminance)));

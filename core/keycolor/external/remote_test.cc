@@ -85,7 +85,7 @@ TEST_F(RemoteTest, ReturnsChromaAndFacts) {
   EXPECT_GT(solution.luminance_correlation, 0.99);
   EXPECT_TRUE(solution.warnings.empty());
   EXPECT_EQ(remote_.request.idempotency_key, "jobs/1/2");
-  EXPECT_EQ(remote_.request.seed, 0u) << "it does not claim to take a seed";
+  EXPECT_EQ(remote_.request.seed, 0u) << "it does not support seeds";
   const Image sent = DecodeImage(remote_.request.image_png, "sent");
   EXPECT_EQ(sent.channels, 1);
   EXPECT_NEAR(LuminanceFromGray(sent.At(0, 3, 50)), luminance_.At(0, 3, 50), 0.01) << "16 bits";
@@ -130,11 +130,11 @@ TEST_F(RemoteTest, SendsOnlyClaimedInputs) {
   options_.prompt = "red";
   EXPECT_THAT(
       Complaint(),
-      AllOf(HasSubstr("'fake'"), HasSubstr("text_prompt"), HasSubstr("it claims: automatic")));
+      AllOf(HasSubstr("'fake'"), HasSubstr("text_prompt"), HasSubstr("it supports: automatic")));
   EXPECT_EQ(code_, ErrorCode::kFailedPrecondition);
   options_.prompt.clear();
   remote_.info.capabilities.clear();
-  EXPECT_THAT(Complaint(), AllOf(HasSubstr("automatic"), HasSubstr("it claims: nothing")));
+  EXPECT_THAT(Complaint(), AllOf(HasSubstr("automatic"), HasSubstr("it supports: nothing")));
   EXPECT_TRUE(remote_.request.image_png.empty()) << "nothing was sent";
 }
 

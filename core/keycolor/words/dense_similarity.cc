@@ -16,7 +16,7 @@ constexpr int kMaxWindowsPerSide = 16;  // bounds the work for elongated picture
 constexpr float kMinWeight =
     0.05f;  // weight at a window's border, above 0 so that borders of the picture count
 
-void Normalise(std::vector<float>& vector) {
+void Normalize(std::vector<float>& vector) {
   double sum = 1e-30;
   for (const float value : vector) sum += static_cast<double>(value) * value;
   for (float& value : vector) value = static_cast<float>(value / std::sqrt(sum));
@@ -110,11 +110,11 @@ std::vector<float> TextFeatureOf(const TextImageModel& model, const std::string&
   std::vector<float> mean;
   for (const char* sentence : kSentences) {
     std::vector<float> feature = model.TextFeatures(sentence + thing);
-    Normalise(feature);
+    Normalize(feature);
     mean.resize(feature.size(), 0.0f);
     for (size_t i = 0; i < feature.size(); ++i) mean[i] += feature[i];
   }
-  Normalise(mean);
+  Normalize(mean);
   return mean;
 }
 

@@ -32,8 +32,7 @@ void CheckPictures(const Image& luminance, const Image& rest) {
       rest.channels == 2 && rest.width == luminance.width && rest.height == luminance.height;
   if (!rest.Empty() && !fits) {
     throw InvalidArgument(
-        "the colours of the rest are {}x{} px with {} channels, the key view has {}x{} px and "
-        "needs 2",
+        "the colours of the rest are {}x{} px with {} channels, but must be {}x{} px with 2",
         rest.width,
         rest.height,
         rest.channels,
