@@ -32,7 +32,7 @@ TEST(OrbitTest, FindsPointThatCamerasFace) {
   const Scene scene = ArcScene(target);
   EXPECT_LT((CenterOfAttention(scene, 2, 4.0) - target).norm(), 1e-6);
   EXPECT_NEAR(OrbitAngle(scene, 2, target), 12.0 * std::numbers::pi / 180.0, 1e-9)
-      << "0.4 rad, kept within what a warp bears";
+      << "0.4 rad, clamped to the plausible range";
 }
 
 TEST(OrbitTest, ParallelCamerasOrbitAtKeyDepth) {

@@ -39,7 +39,7 @@ struct Axis {
   std::vector<int> overlaps;  // overlap of each with the one before, px
 };
 
-// Patches that cover [begin + overlap, end), each `overlap` px or more over what is there.
+// Patches that cover [begin + overlap, end), each with an overlap of `overlap` px or more.
 Axis CoverAxis(int begin, int end, int patch, int overlap, bool filled_before) {
   Axis axis;
   int filled_to = filled_before ? begin + overlap : begin;

@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-// Every pixel has a colour of its own that tells where it comes from.
+// The colour of every pixel encodes its position.
 Image Labeled(int width, int height) {
   Image lab(width, height, 3);
   for (int y = 0; y < height; ++y) {
@@ -42,8 +42,8 @@ TEST(OutpaintTest, MovesQuadrantToOppositeCornerAndExtendsIt) {
     ASSERT_EQ(picture.lab.height, 64);
     int weighed = 0;
     for (const float w : picture.weight.data) weighed += w == 1.0f ? 1 : 0;
-    EXPECT_EQ(weighed, 41 * 32) << "only the quadrant is real where it lies";
-    // The middle of the quadrant, far from the seams with what was added.
+    EXPECT_EQ(weighed, 41 * 32) << "full weight on the quadrant only";
+    // The middle of the quadrant, far from the seams.
     for (int y = 10; y < 22; ++y) {
       for (int x = 14; x < 26; ++x) {
         EXPECT_EQ(picture.weight.At(0, e.canvas_y + y, e.canvas_x + x), 1.0f);

@@ -26,7 +26,10 @@ struct SweptView {
 };
 
 // Mask of a view, without its moving objects; empty: nothing is masked.
-Image MaskOf(int view, const ViewImages& images, const StillRegions& still, const Camera& size) {
+Image CombinedMask(int view,
+                   const ViewImages& images,
+                   const StillRegions& still,
+                   const Camera& size) {
   Image both;
   for (const auto& mask : {images.Mask(view), still ? still(view) : nullptr}) {
     if (mask == nullptr) continue;
@@ -46,7 +49,7 @@ SweptView Reduced(const Scene& scene,
   swept.camera = images.WorkingCamera(view).FitWithin(side_px);
   swept.pose = scene.views[view].cam_from_world;
   swept.luminance = Resize(*images.Luminance(view), swept.camera.width, swept.camera.height);
-  swept.mask = MaskOf(view, images, still, swept.camera);
+  swept.mask = CombinedMask(view, images, still, swept.camera);
   return swept;
 }
 
@@ -84,9 +87,9 @@ double RelativeExcess(const SweptView& view, const Eigen::Vector3d& point) {
 }
 
 // Points of `view` that no earlier view has contributed.
-std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
-                                  int view,
-                                  const DensePointsOptions& options) {
+std::vector<SparsePoint> ConfirmedPoints(const std::vector<SweptView>& swept,
+                                         int view,
+                                         const DensePointsOptions& options) {
   std::vector<SparsePoint> points;
   const SweptView& own = swept[view];
   if (own.depth.data.empty()) return points;
@@ -174,7 +177,7 @@ std::vector<SparsePoint> DensePoints(const Scene& scene,
     Sweep(scene, view, plan.candidates[view], tracked[view], options, run.cancel, swept);
   });
   std::vector<std::vector<SparsePoint>> by_view(scene.views.size());
-  for_each_view([&](int view) { by_view[view] = PointsOf(swept, view, options); });
+  for_each_view([&](int view) { by_view[view] = ConfirmedPoints(swept, view, options); });
   std::vector<SparsePoint> all;
   for (std::vector<SparsePoint>& points : by_view) {
     std::move(points.begin(), points.end(), std::back_inserter(all));

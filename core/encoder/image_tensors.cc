@@ -23,7 +23,7 @@ Image ImageFromTensor(const torch::Tensor& tensor) {
   return image;
 }
 
-std::vector<float> ValuesOf(const torch::Tensor& tensor) {
+std::vector<float> TensorValues(const torch::Tensor& tensor) {
   const torch::Tensor flat = tensor.contiguous();
   return {flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel()};
 }

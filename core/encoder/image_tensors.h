@@ -15,7 +15,7 @@ torch::Tensor TensorFromImage(const Image& image);
 Image ImageFromTensor(const torch::Tensor& tensor);
 
 // Returns the values of a float32 tensor in row-major order.
-std::vector<float> ValuesOf(const torch::Tensor& tensor);
+std::vector<float> TensorValues(const torch::Tensor& tensor);
 
 // Extends [1,C,H,W] at its right and bottom to multiples of `multiple`, by repeating the border.
 torch::Tensor PadByReplication(const torch::Tensor& x, int multiple);

@@ -132,7 +132,7 @@ void ReplaceLessConfident(const Correspondences& found, Correspondences* followe
 constexpr double kMaxLoss = 0.1;
 constexpr double kWellTracked = 0.9;  // mean confidence from which features are not matched
 
-double MeanOf(const Image& image) {
+double MeanValue(const Image& image) {
   const double sum = std::accumulate(image.data.begin(), image.data.end(), 0.0);
   return sum / static_cast<double>(image.data.size());
 }
@@ -154,7 +154,7 @@ void UseReappearingTracks(const ReappearingRegions& regions,
                            TrackConfidence(t.in_frame, t.in_key, key_contrast, contrast, options)};
   };
   Correspondences of_frame = in_key(*track);
-  if (MeanOf(of_frame.confidence) > kWellTracked) return;
+  if (MeanValue(of_frame.confidence) > kWellTracked) return;
   Correspondences of_key = in_frame(*track);
   for (const FilmTrack& other : regions.TracksTo(frame, cancel)) {
     cancel.ThrowIfCancelled();
@@ -164,11 +164,11 @@ void UseReappearingTracks(const ReappearingRegions& regions,
   *track = {std::move(of_frame.place), std::move(of_key.place)};
 }
 
-CarriedColor ColorOf(const FilmKey& key,
-                     const Image& key_contrast,
-                     const Image& contrast,
-                     const FilmTrack& track,
-                     const FilmCarryOptions& options) {
+CarriedColor SampleKeyColor(const FilmKey& key,
+                            const Image& key_contrast,
+                            const Image& contrast,
+                            const FilmTrack& track,
+                            const FilmCarryOptions& options) {
   CarriedColor color{SampledAt(key.color.ab, track.in_key),
                      SampledAt(key.color.confidence, track.in_key)};
   const Image followed =
@@ -221,7 +221,7 @@ class Walker {
       luminance_ = frames.luminance(frame_);
     } else {
       const Image start = MovedPositions(Image(key_->width, key_->height, 2));
-      wanted_ = MeanOf(walk.key->color.confidence) - kMaxLoss;
+      wanted_ = MeanValue(walk.key->color.confidence) - kMaxLoss;
       track_ = std::make_shared<const FilmTrack>(FilmTrack{start, start});
     }
   }
@@ -235,19 +235,19 @@ class Walker {
     FilmTrack track =
         forward ? Step(*track_, flow->forth, flow->back) : Step(*track_, flow->back, flow->forth);
     const auto color = [&] {
-      return ColorOf(*walk_.key, key_contrast_, contrast, track, options_);
+      return SampleKeyColor(*walk_.key, key_contrast_, contrast, track, options_);
     };
     CarriedColor carried = color();
     if (regions_) {
       moved_ += MotionOf(flow->back);
       const bool in_turn = moved_ >= options_.correct_after;
-      if (in_turn || MeanOf(carried.confidence) < wanted_) {
+      if (in_turn || MeanValue(carried.confidence) < wanted_) {
         Correct(*next, contrast, &track);
         carried = color();
       }
       if (in_turn) {
         moved_ = 0.0;
-        wanted_ = MeanOf(carried.confidence) - kMaxLoss;
+        wanted_ = MeanValue(carried.confidence) - kMaxLoss;
       }
     }
     frame_ = frame;
@@ -371,7 +371,7 @@ CarriedColor CarryIntoReappearing(const FilmKey& key,
   const Image outside(frame.width, frame.height, 2, kOutside);
   FilmTrack track{outside, outside};
   UseReappearingTracks(regions, frame, contrast, key_contrast, options, cancel, &track);
-  return ColorOf(key, key_contrast, contrast, track, options);
+  return SampleKeyColor(key, key_contrast, contrast, track, options);
 }
 
 void FilmCarryOptions::Validate() const {

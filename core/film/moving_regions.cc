@@ -94,7 +94,7 @@ struct CameraModel {
   }
 };
 
-std::vector<double> ResidualsOf(const CameraModel& model, const Flow& flow) {
+std::vector<double> SampleResiduals(const CameraModel& model, const Flow& flow) {
   std::vector<double> residuals;
   for (const int at : flow.sample) residuals.push_back(model.Residual(flow.there, at));
   return residuals;
@@ -131,8 +131,8 @@ std::optional<CameraModel> Explain(const Flow& flow) {
     throw Error(ErrorCode::kInternal, "estimating the motion of the camera failed: {}", e.err);
   }
   if (!turn || !moved) return moved ? moved : turn;
-  const double by_turn = ShareBelow(ResidualsOf(*turn, flow), kMinMotionPx);
-  const double by_move = ShareBelow(ResidualsOf(*moved, flow), kMinMotionPx);
+  const double by_turn = ShareBelow(SampleResiduals(*turn, flow), kMinMotionPx);
+  const double by_move = ShareBelow(SampleResiduals(*moved, flow), kMinMotionPx);
   return by_turn >= kTurnShare * by_move ? turn : moved;
 }
 
@@ -161,7 +161,7 @@ PairResidual Compare(const Image& from, const Image& there, const Image& back) {
                                       : Explain(flow);
   if (!model) return result;
   result.motion = model->motion;
-  const double noise_px = kNoiseFactor * Median(ResidualsOf(*model, flow));
+  const double noise_px = kNoiseFactor * Median(SampleResiduals(*model, flow));
   const double texture = MedianTexture(flow);
   for (int at = 0; at < static_cast<int>(flow.reliable.size()); ++at) {
     if (!flow.reliable[at]) continue;
@@ -203,7 +203,7 @@ void FillHoles(cv::Mat* regions) {
 }
 
 // Regions by majority vote, without specks and holes, dilated over the soft edges of the flow.
-Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
+Image VotedRegions(const Votes& votes, int least_votes, int width, int height) {
   cv::Mat moving(height, width, CV_8U);
   for (size_t i = 0; i < votes.all.size(); ++i) {
     moving.data[i] = votes.all[i] >= least_votes && 2 * votes.moving[i] > votes.all[i];
@@ -230,7 +230,7 @@ int NeighborCount(int frame, int count) {
 }
 
 // Pairs of the frames from `begin` to `end` with the neighbours after them.
-std::vector<std::pair<int, int>> PairsFrom(int begin, int end, int count) {
+std::vector<std::pair<int, int>> NeighborPairs(int begin, int end, int count) {
   std::vector<std::pair<int, int>> pairs;
   for (int frame = begin; frame < end; ++frame) {
     for (const int distance : kDistances) {
@@ -292,7 +292,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
   std::vector<double> share(frames.count, 0.0);
   for (int begin = 0; begin < frames.count; begin += kAtOnce) {
     const int end = std::min(begin + kAtOnce, frames.count);
-    const std::vector<std::pair<int, int>> pairs = PairsFrom(begin, end, frames.count);
+    const std::vector<std::pair<int, int>> pairs = NeighborPairs(begin, end, frames.count);
     // One pair of flows gives votes for both frames.
     pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
       cancel.ThrowIfCancelled();
@@ -313,7 +313,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
       frame_votes.moving.resize(picture->PlaneSize());
       frame_votes.all.resize(picture->PlaneSize());
       const int least = std::clamp(NeighborCount(frame, frames.count), 1, 2);
-      const Image moving = RegionsOf(frame_votes, least, picture->width, picture->height);
+      const Image moving = VotedRegions(frame_votes, least, picture->width, picture->height);
       double sum = 0.0;
       for (const float v : moving.data) sum += v;
       share[frame] = sum / static_cast<double>(moving.data.size());

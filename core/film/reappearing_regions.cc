@@ -23,7 +23,7 @@ constexpr int kTries = 2000;
 constexpr double kSurely = 0.999;
 constexpr double kMaxScale = 5.0;  // change of lengths
 
-LocalFeatures FeaturesOf(const Image& luminance) {
+LocalFeatures DetectFeatures(const Image& luminance) {
   Image gray = luminance;
   for (float& value : gray.data) value *= 0.01f;
   return DetectLocalFeatures(gray, kFeatures, kMinContrast);
@@ -33,7 +33,7 @@ struct Matches {
   std::vector<cv::Point2f> in_key, in_frame;
 };
 
-Matches MatchesOf(const LocalFeatures& key, const LocalFeatures& frame, const Image& picture) {
+Matches MatchFeatures(const LocalFeatures& key, const LocalFeatures& frame, const Image& picture) {
   const auto place = [&](const LocalFeatures& features, int i) {
     return cv::Point2f(features.positions[2 * i] + 0.5f * picture.width - 0.5f,
                        features.positions[2 * i + 1] + 0.5f * picture.height - 0.5f);
@@ -53,7 +53,7 @@ bool IsPlausible(const cv::Matx33d& h) {
 
 // Homographies from the frame to the key frame. Each is fitted to the matches that those before it
 // do not explain.
-std::vector<cv::Matx33d> PlanesOf(Matches matches) {
+std::vector<cv::Matx33d> FitPlanes(Matches matches) {
   std::vector<cv::Matx33d> planes;
   for (int i = 0; i < kMaxPlanes && matches.in_key.size() >= kMinOfPlane; ++i) {
     cv::Mat is_inlier;
@@ -99,13 +99,14 @@ Image Refined(const cv::Matx33d& h, const Image& picture, const Image& other) {
 
 }  // namespace
 
-ReappearingRegions::ReappearingRegions(const Image& key) : key_(key), features_(FeaturesOf(key)) {}
+ReappearingRegions::ReappearingRegions(const Image& key)
+    : key_(key), features_(DetectFeatures(key)) {}
 
 std::vector<FilmTrack> ReappearingRegions::TracksTo(const Image& frame,
                                                     const CancellationToken& cancel) const {
   std::vector<FilmTrack> tracks;
   try {
-    for (const cv::Matx33d& h : PlanesOf(MatchesOf(features_, FeaturesOf(frame), key_))) {
+    for (const cv::Matx33d& h : FitPlanes(MatchFeatures(features_, DetectFeatures(frame), key_))) {
       cancel.ThrowIfCancelled();
       tracks.push_back({Refined(h, frame, key_), Refined(h.inv(), key_, frame)});
     }

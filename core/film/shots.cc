@@ -40,7 +40,7 @@ double Difference(const Image& one, const Image& other, int dx, int dy) {
 }
 
 // Unlikeness of two normalised pictures.
-double UnlikenessOf(const Image& one, const Image& other) {
+double UnlikenessOfNormalized(const Image& one, const Image& other) {
   double best = 1e9;
   const int limit_x = std::min(kMaxShiftPx, one.width / 4),
             limit_y = std::min(kMaxShiftPx, one.height / 4);
@@ -70,7 +70,7 @@ double Unlikeness(const Image& one, const Image& other) {
       one.height != other.height || one.Empty()) {
     throw InvalidArgument("the frames of a film must have one channel and equal sizes");
   }
-  return UnlikenessOf(Normalized(one), Normalized(other));
+  return UnlikenessOfNormalized(Normalized(one), Normalized(other));
 }
 
 FilmShots FindShots(const std::vector<Image>& thumbnails) {
@@ -95,7 +95,7 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   }
   std::vector<double> steps;  // between kept frames k and k + 1
   for (size_t k = 0; k + 1 < kept.size(); ++k) {
-    steps.push_back(UnlikenessOf(normalized[k], normalized[k + 1]));
+    steps.push_back(UnlikenessOfNormalized(normalized[k], normalized[k + 1]));
   }
   const auto is_cut = [&](int k) {
     return steps[k] > kCutUnlikeness && steps[k] > kCutOverUsual * Usual(steps, k);
@@ -107,7 +107,8 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   for (int k = 0; k < count_of_steps; ++k) {
     for (int aliens = 1; cut[k] && aliens <= kMaxAlien && k + aliens < count_of_steps; ++aliens) {
       if (!cut[k + aliens]) continue;
-      if (UnlikenessOf(normalized[k], normalized[k + aliens + 1]) > kCutUnlikeness) continue;
+      if (UnlikenessOfNormalized(normalized[k], normalized[k + aliens + 1]) > kCutUnlikeness)
+        continue;
       for (int i = 1; i <= aliens; ++i) result.fault[kept[k + i]] = FrameFault::kAlien;
       std::fill_n(cut.begin() + k, aliens + 1, false);
     }

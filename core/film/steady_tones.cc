@@ -152,7 +152,7 @@ double LineAtZero(const std::vector<double>& offsets, const std::vector<double>&
 }
 
 // Curve of the frame at `at` of a shot. steps[k] leads from its frame k to k + 1.
-ToneCurve CurveOf(const std::vector<std::optional<ToneStep>>& steps, int at) {
+ToneCurve FitCurve(const std::vector<std::optional<ToneStep>>& steps, int at) {
   const int count = static_cast<int>(steps.size()) + 1;
   const int first = std::max(0, at - kReach), last = std::min(count - 1, at + kReach);
   std::vector<double> offsets;
@@ -218,7 +218,7 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
     if (Jumps(steps) >= kSteadyL) {
       pool.ForEach(count, [&](int64_t k, int) {
         cancel.ThrowIfCancelled();
-        result.curves[frames[k]] = CurveOf(steps, static_cast<int>(k));
+        result.curves[frames[k]] = FitCurve(steps, static_cast<int>(k));
       });
     }
     for (int64_t k = 0; k + 1 < count; ++k) {

@@ -35,7 +35,7 @@ TEST(ChooseKeyViewsTest, SpreadsOverRingOfCameras) {
   EXPECT_EQ(three.views[0], 1) << "as given";
   std::vector<int> sorted = three.views;
   std::sort(sorted.begin(), sorted.end());
-  EXPECT_THAT(sorted, ElementsAre(1, 3, 5)) << "every view is shown";
+  EXPECT_THAT(sorted, ElementsAre(1, 3, 5)) << "all samples of every view are visible";
   EXPECT_NEAR(three.error[2], kErrorSeen, 1e-9);
 }
 
@@ -88,7 +88,7 @@ TEST(NextKeyViewTest, ReturnsBestOtherView) {
   EXPECT_THAT(next->view, testing::AnyOf(2, 3, 4)) << "not a neighbour";
   EXPECT_NEAR(next->error_now, ExpectedError(Ring(), {}, {0}), 1e-9);
   EXPECT_NEAR(next->error_with, ExpectedError(Ring(), {}, {0, next->view}), 1e-9);
-  EXPECT_FALSE(NextKeyView(Ring(), {}, {0, 2, 4}).has_value()) << "all is shown";
+  EXPECT_FALSE(NextKeyView(Ring(), {}, {0, 2, 4}).has_value()) << "all samples are visible";
   EXPECT_FALSE(NextKeyView(SeenSamples(1, 0), {}, {0}).has_value());
 }
 

@@ -103,7 +103,8 @@ TEST(UnfitFramesTest, ComparesFramesWithinShot) {
   EXPECT_EQ(unfit[12], "blurred");
   EXPECT_EQ(unfit[13], "much of it is empty");
   EXPECT_EQ(unfit[15], "blank");
-  EXPECT_EQ(UnfitFrames(frames)[9], "much of it is empty") << "beside the others of one shot";
+  EXPECT_EQ(UnfitFrames(frames)[9], "much of it is empty")
+      << "compared with all frames as one shot";
 }
 
 TEST(UnfitFramesTest, KeepsAllFramesWhenAllAreUnfit) {

@@ -60,7 +60,7 @@ Matrix UnitRows(const std::vector<std::vector<double>>& descriptors,
   return rows;
 }
 
-std::vector<int> IndicesOf(const std::vector<bool>& kept) {
+std::vector<int> KeptIndices(const std::vector<bool>& kept) {
   std::vector<int> indices;
   for (size_t i = 0; i < kept.size(); ++i) {
     if (kept[i]) indices.push_back(static_cast<int>(i));
@@ -242,7 +242,7 @@ std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& des
                                      ThreadPool& pool) {
   options.Validate();
   CheckLengths(descriptors);
-  const std::vector<int> indices = IndicesOf(kept);
+  const std::vector<int> indices = KeptIndices(kept);
   const Matrix cosines = Cosines(UnitRows(descriptors, indices), pool);
   std::vector<double> entropies(descriptors.size(), 0.0);
   pool.ForEach(static_cast<int64_t>(indices.size()), [&](int64_t i, int) {

@@ -161,7 +161,7 @@ Matrix ChainWithOutlier(int views, int outlier) {
   for (double& value : common) value = random.NextNormal();
   for (int i = 0; i < views; ++i) {
     for (int d = 0; d < dims; ++d) {
-      // A bump that moves along the chain on top of what all views share.
+      // A bump that moves along the chain, added to features that all views share.
       const double position = (i + 0.5) / views * dims;
       const double bump = 4.0 * std::exp(-std::pow((d - position) / 60.0, 2));
       features[i][d] = i == outlier ? random.NextNormal() : common[d] + bump;

@@ -36,7 +36,7 @@ TEST(ReportPageTest, ShowsPartsOfSections) {
   EXPECT_NE(html.find("61 % seen &amp; verified."), std::string::npos);
   EXPECT_NE(html.find("<tr><td>a&lt;b.jpg</td><td class=\"v\">0.61</td></tr>"), std::string::npos);
   EXPECT_NE(html.find("personalize: heldout_l1"), std::string::npos);
-  EXPECT_EQ(PlotsSvg({{"evaluate", 1.0, 0, "delta_e00", 2.0}}), "") << "one point is no curve";
+  EXPECT_EQ(PlotsSvg({{"evaluate", 1.0, 0, "delta_e00", 2.0}}), "") << "single points are left out";
   EXPECT_NE(html.find("data:image/png"), std::string::npos);
   EXPECT_TRUE(html.find("<h2>Empty one</h2></section></main></body>") != std::string::npos) << html;
 }

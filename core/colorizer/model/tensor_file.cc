@@ -30,7 +30,7 @@ std::optional<size_t> FindDigest(std::string_view bytes) {
   return kLengthBytes + digits;
 }
 
-std::string DigestOf(std::string_view bytes, size_t digits) {
+std::string ComputeDigest(std::string_view bytes, size_t digits) {
   Sha256 hash;
   hash.Update(bytes.substr(0, digits));
   hash.Update(std::string(kDigestDigits, '0'));
@@ -61,7 +61,7 @@ TensorFile ReadTensorFile(std::string_view bytes,
   }
   const std::optional<size_t> digits = FindDigest(bytes);
   if (!digits) throw InvalidArgument("{} is truncated or a file of another kind", what);
-  if (DigestOf(bytes, *digits) != bytes.substr(*digits, kDigestDigits)) {
+  if (ComputeDigest(bytes, *digits) != bytes.substr(*digits, kDigestDigits)) {
     throw InvalidArgument("{} is damaged or truncated (its checksum does not match)", what);
   }
   TensorFile file;

@@ -44,7 +44,7 @@ std::vector<KnownCells> FurtherCells(const TapEncoder& encoder,
   return found;
 }
 
-NamedTensors TensorsOf(const std::vector<Whitening::Projection>& projections) {
+NamedTensors ListTensors(const std::vector<Whitening::Projection>& projections) {
   NamedTensors tensors;
   for (size_t i = 0; i < projections.size(); ++i) {
     tensors.emplace_back(fmt::format("mean.{}", i), projections[i].mean);
@@ -53,7 +53,7 @@ NamedTensors TensorsOf(const std::vector<Whitening::Projection>& projections) {
   return tensors;
 }
 
-NamedTensors TensorsOf(const CellBank& bank) {
+NamedTensors ListTensors(const CellBank& bank) {
   return {{"bank", bank.features},
           {"colors", bank.colors},
           {"weights", bank.weights},
@@ -102,8 +102,8 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
       bank_(std::move(bank)) {}
 
 void FeatureNeighbors::PutInto(TensorFile* file) const {
-  PutTensors(TensorsOf(whitening_.projections()), kPrefix, StoredType::kFloat32, file);
-  PutTensors(TensorsOf(bank_), kPrefix, StoredType::kFloat16, file);
+  PutTensors(ListTensors(whitening_.projections()), kPrefix, StoredType::kFloat32, file);
+  PutTensors(ListTensors(bank_), kPrefix, StoredType::kFloat16, file);
 }
 
 std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& encoder,
@@ -118,7 +118,7 @@ std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& e
     const int64_t out = std::min<int64_t>(options.whitening.dims_per_block, in);
     projections.push_back({torch::empty({in}), torch::empty({in, out})});
   }
-  TakeTensors(TensorsOf(projections), kPrefix, what, file);
+  TakeTensors(ListTensors(projections), kPrefix, what, file);
   Whitening whitening(std::move(projections));
   const auto colors = file->arrays.find(std::string(kPrefix) + "colors");
   if (colors == file->arrays.end() || colors->second.shape.empty() || colors->second.shape[0] < 1) {
@@ -129,7 +129,7 @@ std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& e
                 torch::empty({entries, 2}),
                 torch::empty({entries}),
                 torch::empty({entries, 4})};
-  TakeTensors(TensorsOf(bank), kPrefix, what, file);
+  TakeTensors(ListTensors(bank), kPrefix, what, file);
   return std::unique_ptr<FeatureNeighbors>(
       new FeatureNeighbors(encoder, options, std::move(whitening), std::move(bank)));
 }

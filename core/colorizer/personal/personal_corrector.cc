@@ -208,8 +208,8 @@ PlaceSample PersonalCorrector::Sample(const FieldPlaces& places,
     sample.places.push_back(
         {x(cell), y(cell), drawn.seen[i].item<float>(), unlike[i].item<float>()});
   }
-  sample.features = ValuesOf(drawn.features);
-  sample.positions = ValuesOf(drawn.positions);
+  sample.features = TensorValues(drawn.features);
+  sample.positions = TensorValues(drawn.positions);
   return sample;
 }
 

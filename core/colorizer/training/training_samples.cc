@@ -21,7 +21,7 @@ int CropFor(const Image& picture, int wanted) {
 
 constexpr uint64_t kSeedStep = 0x9e3779b97f4a7c15ULL;  // increment of SplitMix64
 
-std::string_view BytesOf(const Image& image) {
+std::string_view ImageBytes(const Image& image) {
   return {reinterpret_cast<const char*>(image.data.data()), image.data.size() * sizeof(float)};
 }
 
@@ -83,7 +83,7 @@ std::string TrainingSamples::Digest() const {
     hash.Update(
         nlohmann::json{picture.luminance.width, picture.luminance.height, picture.share}.dump());
     for (const Image* map : {&picture.luminance, &picture.ab, &picture.weight}) {
-      hash.Update(BytesOf(*map));
+      hash.Update(ImageBytes(*map));
     }
   }
   return hash.FinishHex();

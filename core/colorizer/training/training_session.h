@@ -40,7 +40,7 @@ class TrainingSession {
   // Runs one iteration. `helpers`: null, or a pool whose second thread prepares the next sample
   // meanwhile, without effect on the result.
   void Step(ProgressObserver& progress, ThreadPool* helpers);
-  // Whether Checkpoint() may be called.
+  // Returns whether Checkpoint() may be called.
   bool AtCheckpoint() const {
     return course_.iteration > 0 && course_.iteration % kGoodStateInterval == 0;
   }

@@ -64,7 +64,7 @@ double Norm(const std::vector<float>& values) {
 }
 
 // Reads config.json (Hugging Face) or open_clip_config.json beside the weights.
-bool QuickGeluOf(const std::filesystem::path& weights) {
+bool UsesQuickGelu(const std::filesystem::path& weights) {
   for (const char* name : {"open_clip_config.json", "config.json"}) {
     const std::filesystem::path path = weights.parent_path() / name;
     if (!std::filesystem::is_regular_file(path)) continue;
@@ -114,7 +114,7 @@ std::shared_ptr<const ClipModel> ClipModel::FromWeightFile(const std::filesystem
         path.string(),
         weights.size());
   }
-  const auto model = std::make_shared<ClipModel>(std::move(weights), QuickGeluOf(path));
+  const auto model = std::make_shared<ClipModel>(std::move(weights), UsesQuickGelu(path));
   if (!model->network_->HasText()) return model;
   for (const char* name : kVocabularyNames) {
     const std::filesystem::path vocabulary = path.parent_path() / name;
@@ -141,7 +141,7 @@ std::vector<float> ClipModel::ImageFeatures(const Image& srgb) const {
   const torch::Tensor rgb = RgbTensor(srgb);
   return WithTorchErrors("CLIP", [&] {
     at::NoGradGuard no_grad;
-    return ValuesOf(network_->EncodeImages(CenterSquare(rgb, network_->input_side_px())));
+    return TensorValues(network_->EncodeImages(CenterSquare(rgb, network_->input_side_px())));
   });
 }
 
@@ -183,7 +183,7 @@ std::vector<float> ClipModel::TextFeaturesOfTokens(const std::vector<int64_t>& t
   }
   return WithTorchErrors("CLIP", [&] {
     at::NoGradGuard no_grad;
-    return ValuesOf(network_->EncodeTokens(torch::tensor(tokens, torch::kInt64).unsqueeze(0)));
+    return TensorValues(network_->EncodeTokens(torch::tensor(tokens, torch::kInt64).unsqueeze(0)));
   });
 }
 

@@ -17,7 +17,7 @@ namespace {
 constexpr int64_t kHeadChannels = 64;
 constexpr int64_t kHeadsOfNarrowTower = 2;
 
-int64_t HeadsOf(int64_t width) {
+int64_t HeadCount(int64_t width) {
   const int64_t heads = width >= kHeadChannels ? width / kHeadChannels : kHeadsOfNarrowTower;
   if (width < 1 || width % heads != 0) {
     throw InvalidArgument(
@@ -32,7 +32,7 @@ int64_t HeadsOf(int64_t width) {
 ClipNetwork::Tower ClipNetwork::TakeTower(WeightReader& reader,
                                           const std::string& prefix,
                                           int64_t width) {
-  Tower tower{width, HeadsOf(width), {}};
+  Tower tower{width, HeadCount(width), {}};
   for (int i = 0;; ++i) {
     const std::string name = fmt::format("{}{}.", prefix, i);
     if (i > 0 && !reader.Has(name + "ln_1.weight")) return tower;

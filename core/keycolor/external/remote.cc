@@ -68,7 +68,7 @@ Image PictureToSend(const Image& luminance, const RemoteOptions& options, const 
   return gray;
 }
 
-std::string HexOf(const ColorHint& hint, double l) {
+std::string HexColor(const ColorHint& hint, double l) {
   const RgbColor rgb = SrgbFromLab(LabColor{l, hint.a, hint.b});
   const auto byte = [](double value) { return static_cast<unsigned>(std::lround(value * 255.0)); };
   char text[8];
@@ -96,7 +96,7 @@ std::vector<RemotePoint> PointsToSend(const Image& luminance,
                             SizeText(luminance));
     }
     const double l = luminance.At(0, static_cast<int>(hint.y_px), static_cast<int>(hint.x_px));
-    points.push_back({hint.x_px * scale_x, hint.y_px * scale_y, HexOf(hint, l)});
+    points.push_back({hint.x_px * scale_x, hint.y_px * scale_y, HexColor(hint, l)});
   }
   return points;
 }

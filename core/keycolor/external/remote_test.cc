@@ -116,7 +116,7 @@ TEST_F(RemoteTest, ScalesLargePhotoWithItsPointsAndMask) {
   EXPECT_EQ(solution.sent_width, 83);
   EXPECT_EQ(solution.sent_height, 55);
   EXPECT_EQ(solution.ab.width, kWidth);
-  EXPECT_EQ(solution.ab.At(0, 5, 5), 0.0f) << "outside the mask nothing is coloured";
+  EXPECT_EQ(solution.ab.At(0, 5, 5), 0.0f) << "no colour outside the mask";
   EXPECT_NEAR(solution.ab.At(0, 20, 20), 10.0f, 1.5f);
   ASSERT_EQ(remote_.request.points.size(), 1u);
   EXPECT_NEAR(remote_.request.points[0].x_px, 48.0 * 83 / 96, 1e-9);

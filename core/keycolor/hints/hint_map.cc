@@ -244,7 +244,7 @@ HintMap DrawHints(const std::vector<ColorHint>& hints,
   return drawer.Take();
 }
 
-HintMap HintsOfStrokes(const Image& strokes) {
+HintMap HintsFromStrokes(const Image& strokes) {
   Image rgb(strokes.width, strokes.height, 3);
   std::copy_n(strokes.data.begin(), rgb.data.size(), rgb.data.begin());
   for (float& value : rgb.data) value = std::isfinite(value) ? value : 0.0f;

@@ -130,7 +130,7 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
     throw InvalidArgument("the strokes picture has {} channels, but must have 3 (RGB) or 4 (RGBA)",
                           strokes.channels);
   }
-  HintMap hints = HintsOfStrokes(strokes);
+  HintMap hints = HintsFromStrokes(strokes);
   if (std::find(hints.hinted.begin(), hints.hinted.end(), 1) == hints.hinted.end()) {
     throw InvalidArgument(
         strokes.channels == 4

@@ -61,7 +61,7 @@ void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
   }
 }
 
-int LevelOf(float l) {
+int HistogramBin(float l) {
   return std::clamp(static_cast<int>(l * (kLevels / 100.0f)), 0, kLevels - 1);
 }
 
@@ -70,7 +70,8 @@ int LevelOf(float l) {
 Image MatchHistogram(const Image& luminance, const Image& key) {
   const auto cumulate = [](const Image& picture) {
     std::vector<double> sums(kLevels, 0.0);
-    for (float l : picture.data) sums[LevelOf(l)] += 1.0 / static_cast<double>(picture.data.size());
+    for (float l : picture.data)
+      sums[HistogramBin(l)] += 1.0 / static_cast<double>(picture.data.size());
     std::partial_sum(sums.begin(), sums.end(), sums.begin());
     return sums;
   };
@@ -83,7 +84,7 @@ Image MatchHistogram(const Image& luminance, const Image& key) {
         (static_cast<float>(std::min<std::ptrdiff_t>(at, kLevels - 1)) + 0.5f) * (100.0f / kLevels);
   }
   Image matched = luminance;
-  for (float& l : matched.data) l = map[LevelOf(l)];
+  for (float& l : matched.data) l = map[HistogramBin(l)];
   return matched;
 }
 

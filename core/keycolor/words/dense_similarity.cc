@@ -39,7 +39,8 @@ std::vector<int> Starts(int length, int side) {
   return starts;
 }
 
-std::vector<Window> WindowsOf(const Image& picture, const std::vector<int>& windows_per_side) {
+std::vector<Window> CoverWithWindows(const Image& picture,
+                                     const std::vector<int>& windows_per_side) {
   std::vector<Window> windows;
   const int shorter = std::min(picture.width, picture.height);
   const int longer = std::max(picture.width, picture.height);
@@ -106,7 +107,7 @@ void Blend(const Image& cosines, const Window& window, double scale, Image& sum,
 
 }  // namespace
 
-std::vector<float> TextFeatureOf(const TextImageModel& model, const std::string& thing) {
+std::vector<float> MeanTextFeature(const TextImageModel& model, const std::string& thing) {
   std::vector<float> mean;
   for (const char* sentence : kSentences) {
     std::vector<float> feature = model.TextFeatures(sentence + thing);
@@ -131,7 +132,7 @@ Image DenseSimilarity(const TextImageModel& model,
             std::max(1, static_cast<int>(std::lround(scale * srgb.height))),
             static_cast<int>(texts.size()));
   Image weights(sum.width, sum.height, 1, 1e-12f);
-  const std::vector<Window> windows = WindowsOf(srgb, windows_per_side);
+  const std::vector<Window> windows = CoverWithWindows(srgb, windows_per_side);
   for (size_t i = 0; i < windows.size(); ++i) {
     cancel.ThrowIfCancelled();
     progress.OnProgress(static_cast<int64_t>(i),

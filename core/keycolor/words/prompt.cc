@@ -66,8 +66,8 @@ Image Probabilities(const Image& luminance,
                     ProgressObserver& progress,
                     const CancellationToken& cancel) {
   std::vector<std::vector<float>> texts;
-  for (const ColorPhrase& phrase : phrases) texts.push_back(TextFeatureOf(model, phrase.thing));
-  for (const char* background : kBackgrounds) texts.push_back(TextFeatureOf(model, background));
+  for (const ColorPhrase& phrase : phrases) texts.push_back(MeanTextFeature(model, phrase.thing));
+  for (const char* background : kBackgrounds) texts.push_back(MeanTextFeature(model, background));
   const Image picture = SrgbFromLab(FitWithin(luminance, kLargestPictureSidePx));
   Image planes = DenseSimilarity(
       model, picture, texts, options.windows_per_side, options.map_side_px, progress, cancel);
@@ -115,9 +115,9 @@ Leader LeaderAt(const Image& probabilities, size_t i, const std::vector<bool>& a
   return leader;
 }
 
-std::vector<PromptRegion> RegionsOf(const std::vector<ColorPhrase>& phrases,
-                                    const Image& probabilities,
-                                    double min_share) {
+std::vector<PromptRegion> FindRegions(const std::vector<ColorPhrase>& phrases,
+                                      const Image& probabilities,
+                                      double min_share) {
   std::vector<PromptRegion> regions;
   const std::vector<bool> all(probabilities.channels, true);
   std::vector<size_t> pixels(probabilities.channels, 0);
@@ -253,7 +253,7 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
   solution.notes = std::move(parsed.notes);
   const Image probabilities =
       Probabilities(luminance, parsed.phrases, model, options, control.progress, control.cancel);
-  solution.regions = RegionsOf(parsed.phrases, probabilities, options.min_share);
+  solution.regions = FindRegions(parsed.phrases, probabilities, options.min_share);
   bool any = false;
   for (const PromptRegion& region : solution.regions) {
     any = any || region.found;
