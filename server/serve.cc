@@ -39,8 +39,8 @@
 #include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/sqlite_job_store.h"
-#include "server/worker/supervisor.h"
-#include "server/worker/worker_settings.h"
+#include "server/worker/supervision/supervisor.h"
+#include "server/worker/supervision/worker_settings.h"
 
 namespace color3d {
 namespace fs = std::filesystem;

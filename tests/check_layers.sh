@@ -3,6 +3,7 @@
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
 #           <- {keyview, augment, carry <- film, splat, metrics, report, video, view, matching <- {keycolor, colorizer}}
 #           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- {recolor, report} <- stages
+#   colorizer: colorizer <- model <- neighbors <- training <- personal
 #   scene:  scene <- {masks, formats} <- sfm <- import
 #   server: base <- store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers never below the server, SQL there only for
@@ -71,7 +72,12 @@ for source in references words automatic external; do
     "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/hints)?|keycolor/$source)"
 done
 allow core/carry 'core/(base|grid|color|image|scene|carry)'
-allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer)'
+colorizer='base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer'
+allow_own core/colorizer "core/($colorizer)"
+for part in model neighbors training personal; do
+  colorizer="$colorizer|colorizer/$part"
+  allow "core/colorizer/$part" "core/($colorizer)"
+done
 lower=
 for part in model motion raster training geometry chroma export import; do
   lower="$lower${lower:+|}$part"
@@ -112,6 +118,9 @@ for folder in blobs jobs live scenes; do
     "core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|$folder))"
 done
 allow server/rpc/calls 'core/(base|catalogue)|server/(base|access|net|store|planning|storage|ops|rpc/calls)'
+allow server/worker/supervision 'core/base|server/(store|ops|worker/supervision)'
+allow server/worker/live \
+  'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/live)'
 allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
@@ -137,12 +146,12 @@ public() {
 
 public core/augment augment outpaint surrogates
 public core/carry carry carry_views confidence dense_points plane_sweep view_color
-public core/colorizer colorizer corrector scene_batch scene_colorizers
+public core/colorizer colorizer corrector scene_batch personal/scene_colorizers personal/train_colorizer
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
   embedded/embedded_weights
 public core/grid edge_weights grid_solver
-public core/image box_mean codec decode_budget draw fill_holes feature_matches flow_agreement guided_upsample local_features optical_flow plane_sampling reduced weighted_resize \
+public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling reduced weighted_resize \
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
@@ -169,7 +178,7 @@ public server/planning asked_formats job_spec key_view_jobs plan_scenes planner 
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store chore_store client_store job job_store project_store worker_store sqlite_job_store store_file user_models
-public server/worker supervisor worker_settings
+public server/worker supervision/supervisor supervision/worker_settings
 
 # Branches on the kind of a capture belong to its tables (core/catalogue/captures) and to import, which
 # determines the kind. Other sources read a property of it on at most this many lines each; lower a

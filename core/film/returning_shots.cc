@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-constexpr double kLeastFound = 0.15;  // share of the frame
+constexpr double kMinFound = 0.15;  // share of the frame
 
 }  // namespace
 
@@ -53,7 +53,7 @@ std::optional<FilmKey> ReturningShots::KeyAt(int frame) const {
     colors[i] = CarryIntoReappearing(keys_[i], *regions_[i], *luminance, options_, cancel_);
   });
   std::optional<FilmKey> found;
-  double most = kLeastFound;
+  double most = kMinFound;
   for (CarriedColor& color : colors) {
     const double share = Coverage(color, kDecisiveConfidence);
     if (share <= most) continue;

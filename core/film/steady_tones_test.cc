@@ -78,7 +78,7 @@ double FlickerOf(const std::vector<Exposure>& exposures, const std::vector<ToneC
   return sum / count;
 }
 
-TEST(SteadyTones, ReducesFlickerToAFifth) {
+TEST(SteadyTonesTest, ReducesFlickerToAFifth) {
   constexpr int kFrames = 40;
   for (const double pan_px : {0.0, 1.5}) {
     const std::vector<Exposure> exposures = Flicker(kFrames);
@@ -101,7 +101,7 @@ TEST(SteadyTones, ReducesFlickerToAFifth) {
   }
 }
 
-TEST(SteadyTones, KeepsSteadyFilms) {
+TEST(SteadyTonesTest, KeepsSteadyFilms) {
   for (const double pan_px : {0.0, 1.5, 4.0}) {
     std::vector<Image> pictures;
     for (int i = 0; i < 30; ++i) pictures.push_back(Scenery(i, pan_px));
@@ -118,7 +118,7 @@ TEST(SteadyTones, KeepsSteadyFilms) {
   }
 }
 
-TEST(SteadyTones, KeepsSlowFades) {
+TEST(SteadyTonesTest, KeepsSlowFades) {
   std::vector<Image> pictures;
   for (int i = 0; i < 30; ++i) {
     pictures.push_back(Exposed(Scenery(i, 0.5), {0.6 + 0.4 * i / 29.0, 0.0}));
@@ -129,7 +129,7 @@ TEST(SteadyTones, KeepsSlowFades) {
   }
 }
 
-TEST(SteadyTones, TreatsShotsApartAndKeepsFewFrames) {
+TEST(SteadyTonesTest, TreatsShotsSeparately) {
   std::vector<Image> pictures;
   std::vector<int> shots;
   for (int i = 0; i < 20; ++i) {
@@ -149,7 +149,7 @@ TEST(SteadyTones, TreatsShotsApartAndKeepsFewFrames) {
   EXPECT_THROW(Find({Image(8, 8, 1), Image(8, 9, 1)}), Error);
 }
 
-TEST(SteadyTones, RealFilms) {
+TEST(SteadyTonesTest, HalvesFlickerOfRealFilms) {
   const std::filesystem::path historic = std::filesystem::path(COLOR3D_SHARED_DATA) / "historic";
   if (!std::filesystem::exists(historic)) GTEST_SKIP() << "no films";
   for (const char* film : {"film_001", "film_002", "film_003"}) {
@@ -170,7 +170,7 @@ TEST(SteadyTones, RealFilms) {
   }
 }
 
-TEST(SteadyTones, GivesFiniteCurvesForFlatFrames) {
+TEST(SteadyTonesTest, GivesFiniteCurvesForFlatFrames) {
   std::vector<Image> pictures;
   for (int i = 0; i < 8; ++i) pictures.push_back(Image(kWidth, kHeight, 1, i % 2 ? 100.0f : 0.0f));
   const SteadyTones tones = Find(pictures);

@@ -84,7 +84,7 @@ void Decide(const PlanFacts& f, PlanStep* step) {
   } else if (step->stage == kind::kGenerateAugmentations) {
     if (!f.has_augmentations) leave_out("the colorizer learns from the key views alone");
   } else if (step->stage == kind::kCorrectColors) {
-    if (!f.has_corrections) leave_out("nothing is to be corrected");
+    if (!f.has_corrections) leave_out("no corrections were given");
   } else if (step->stage == kind::kEvaluate) {
     step->reason = f.has_truth
                        ? "true colours of held-out views were given"
@@ -128,7 +128,7 @@ void AddParts(const PlanFacts& f, const std::string& stage, std::vector<PlanStep
   } else if (stage == kind::kSolveChroma) {
     add("view_dependent_chroma",
         false,
-        "chroma hardly depends on the direction: degree 0 suffices unless another is asked for");
+        "chroma hardly depends on the direction: degree 0 suffices unless another is requested");
   }
 }
 

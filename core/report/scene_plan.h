@@ -52,7 +52,7 @@ struct PlanFacts {
 // that are graphs of others.
 std::vector<PlanStep> PlanScene(const PlanFacts& facts);
 
-// Leaves out the step of a stage that the planner skipped.
+// Marks the step of a stage as left out, because the planner skipped the stage.
 void SkipStep(const std::string& stage, const std::string& reason, std::vector<PlanStep>* plan);
 
 std::string PlanToJson(const std::vector<PlanStep>& steps);

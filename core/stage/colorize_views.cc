@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
 #include "core/stage/film/color_frames.h"

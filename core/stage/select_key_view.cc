@@ -155,7 +155,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   if (strategy == KeyViewStrategy::kTracks) {
     const auto tracks = TracksOf(scene, candidates, context);
     const std::string reason = tracks.empty() ? "the scene has no points from structure-from-motion"
-                                              : TracksProblem(tracks, kept);
+                                              : UnusableTracksReason(tracks, kept);
     if (reason.empty()) {
       scores = TrackCoverage(tracks, kept);
     } else {

@@ -203,7 +203,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     if (kind == kind::kCarryColor) skip_reason = NoCarryReason(given, scene);
     if (kind == kind::kCorrectColors && !given.has_correct_colors() &&
         scene.correct_colors().corrections().empty()) {
-      skip_reason = "nothing is to be corrected";
+      skip_reason = "no corrections were given";
     }
     if (kind == kind::kGenerateAugmentations) skip_reason = NoAugmentationsReason(scene, facts);
     if (skip_reason.empty()) skip_reason = IdleReason(kind, facts, scene);

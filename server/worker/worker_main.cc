@@ -18,9 +18,9 @@
 #include "server/ops/stop_signals.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
-#include "server/worker/inference_worker.h"
+#include "server/worker/live/inference_worker.h"
+#include "server/worker/supervision/worker_settings.h"
 #include "server/worker/worker_loop.h"
-#include "server/worker/worker_settings.h"
 
 namespace color3d {
 namespace {
