@@ -156,9 +156,7 @@ FoundMetric FindMetric(std::string_view key) {
 }
 
 std::vector<std::string> InMetricOrder(std::vector<std::string> keys) {
-  std::sort(keys.begin(), keys.end(), [](const std::string& a, const std::string& b) {
-    return Rank(a) < Rank(b);
-  });
+  std::ranges::sort(keys, {}, Rank);
   return keys;
 }
 

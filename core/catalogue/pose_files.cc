@@ -94,8 +94,7 @@ std::vector<ColmapPlace> ColmapPlaces(const std::vector<std::string>& files) {
   const auto key = [](const std::pair<int, ColmapPlace>& place) {
     return std::pair(place.first, place.second.folder + "/\x7f");
   };
-  std::sort(
-      first.begin(), first.end(), [&](const auto& x, const auto& y) { return key(x) < key(y); });
+  std::ranges::sort(first, {}, key);
   for (auto& [rank, place] : first) places.push_back(std::move(place));
   return places;
 }
@@ -103,8 +102,7 @@ std::vector<ColmapPlace> ColmapPlaces(const std::vector<std::string>& files) {
 bool IsTransformsFile(std::string_view path) {
   const std::string_view name = path.substr(path.rfind('/') + 1);
   return name == kTransformsFile ||
-         std::find(std::begin(kBlenderFiles), std::end(kBlenderFiles), name) !=
-             std::end(kBlenderFiles);
+         std::ranges::find(kBlenderFiles, name) != std::end(kBlenderFiles);
 }
 
 }  // namespace color3d

@@ -40,8 +40,7 @@ inline constexpr std::string_view kFilmEndings[] = {".mp4",
 // True for extensions of supported films, any case.
 inline bool HasFilmExtension(std::string_view path) {
   const std::string ending = LowerCase(path.substr(std::min(path.size(), path.find_last_of('.'))));
-  return std::find(std::begin(kFilmEndings), std::end(kFilmEndings), ending) !=
-         std::end(kFilmEndings);
+  return std::ranges::find(kFilmEndings, ending) != std::end(kFilmEndings);
 }
 
 // Colour pictures from the user for training the colorizer: no photos of the scene.

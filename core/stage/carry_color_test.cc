@@ -76,7 +76,7 @@ class CarryStageTest : public StageTest {
     return nlohmann::json::parse(ReadFile(scratch_.path() / "out" / artifact::kCarryFacts));
   }
   AbMap Carried(int view) {
-    const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view], ".png");
+    const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view]);
     return DecodeAbPng(ReadFile(scratch_.path() / "out" / name), name);
   }
   std::string Complaint() {
@@ -228,7 +228,7 @@ TEST_F(CarryStageTest, ResumesWithTheSameResult) {
   const nlohmann::json facts = Run();
   std::vector<std::string> files;
   const auto file = [&](int i) {
-    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[i], ".png");
+    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[i]);
   };
   for (int i = 0; i < 5; ++i) {
     files.push_back(ReadFile(file(i)));

@@ -77,8 +77,7 @@ class CarryFilmTest : public StageTest {
   std::vector<std::string> Carried() {
     std::vector<std::string> files;
     for (const View& view : scene_.views) {
-      files.push_back(
-          ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kCarried, view, ".png")));
+      files.push_back(ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kCarried, view)));
     }
     return files;
   }
@@ -159,7 +158,7 @@ class ReturningShotTest : public StageTest {
     return ReadFile(scratch_.path() / "out" / artifact::kCarryFacts);
   }
   std::filesystem::path Carried(int frame) {
-    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[frame], ".png");
+    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[frame]);
   }
   Scene scene_;
 };

@@ -61,7 +61,7 @@ std::map<Kind, int> Deal(const AugmentationOptions& options) {
 
 // Coloured key view at working size.
 Image KeyLab(const Scene& scene, int key, int max_side_px, const StageContext& context) {
-  const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
+  const AbMap color = ReadAbMap(context, artifact::kKeyColor);
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
   const auto l = images.Luminance(key);
   return JoinLab(*l, Resize(color.ab, l->width, l->height));
@@ -102,7 +102,7 @@ void TakeFromBackend(const AugmentationOptions& options,
                                                               key_srgb,
                                                               options.max_side_px,
                                                               context);
-    std::move(made.begin(), made.end(), std::back_inserter(outcome->made));
+    std::ranges::move(made, std::back_inserter(outcome->made));
     it = counts->erase(it);
   }
   if (asked || counts->empty()) return;
@@ -135,7 +135,7 @@ void MakeSurrogates(const std::map<Kind, int>& counts,
     const std::string obstacle = surrogates.Obstacle(kind);
     int poor = 0;
     for (int i = 0; obstacle.empty() && i < count; ++i) {
-      context.cancel().ThrowIfCancelled();
+      context.ThrowIfCancelled();
       std::optional<GeneratedPicture> made = surrogates.Make(kind, i);
       if (made) {
         outcome->made.push_back(
@@ -143,7 +143,7 @@ void MakeSurrogates(const std::map<Kind, int>& counts,
       } else {
         ++poor;
       }
-      context.progress().OnProgress(++done, total, "generating augmentations");
+      context.ReportProgress(++done, total, "generating augmentations");
     }
     if (!obstacle.empty()) outcome->LeaveOut(name, obstacle);
     if (poor > 0) {

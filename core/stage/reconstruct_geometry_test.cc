@@ -58,8 +58,7 @@ TEST_F(StageTest, WhatWasSeenToMoveReachesTheTraining) {
   const std::string without = trained();
   EXPECT_EQ(trained(), without);
   for (const View& view : scene.views) {
-    AddInput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
-             EncodePng8(Image(12, 8, 1, 1.0f)));
+    AddInput(ViewArtifact(artifact::kMovingRegions, view), EncodePng8(Image(12, 8, 1, 1.0f)));
   }
   EXPECT_NE(trained(), without);
 }

@@ -61,8 +61,8 @@ std::vector<ViewPagePhoto> PhotosOf(const Scene& scene,
     if (count <= kMaxPictures || next > evenly || photos[i].view == key_view) pictured.push_back(i);
   }
   const ViewImages images(scene, context.scene_folder(), kPhotoPx, 0);
-  context.pool().ForEach(static_cast<int64_t>(pictured.size()), [&](int64_t i, int) {
-    context.cancel().ThrowIfCancelled();
+  context.pool().ForEach(std::ssize(pictured), [&](int64_t i, int) {
+    context.ThrowIfCancelled();
     ViewPagePhoto& photo = photos[pictured[i]];
     photo.jpeg = EncodeJpeg(images.Srgb(photo.view), kPhotoQuality);
   });
@@ -79,9 +79,9 @@ bool WriteViewPage(const Scene& scene,
                    StageContext& context) {
   if (file.name.empty()) return false;
   if (!HasViewer()) {
-    context.progress().OnWarning(fmt::format(
+    context.Warn(
         "this build has no viewer, so {} is not written; build it where npm reaches its registry",
-        artifact::kViewPage));
+        artifact::kViewPage);
     return false;
   }
   const View& key = scene.views.at(key_view);

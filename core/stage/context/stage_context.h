@@ -3,12 +3,15 @@
 // cancellation come from the context.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/base/run_control.h"
@@ -68,6 +71,17 @@ class StageContext {
   CheckpointStore& checkpoints() { return checkpoints_; }
   ProgressObserver& progress() { return progress_; }
   const CancellationToken& cancel() const { return cancel_; }
+  void ThrowIfCancelled() const { cancel_.ThrowIfCancelled(); }
+  void ReportProgress(int64_t step, int64_t total, const std::string& message) {
+    progress_.OnProgress(step, total, message);
+  }
+  // Shows the user a warning, which the report repeats.
+  void Warn(const std::string& message) { progress_.OnWarning(message); }
+  // Formats the warning with fmt.
+  template <typename First, typename... Rest>
+  void Warn(fmt::format_string<First, Rest...> message, First&& first, Rest&&... rest) {
+    Warn(fmt::format(message, std::forward<First>(first), std::forward<Rest>(rest)...));
+  }
 
   bool HasInput(const std::string& name) const { return setup_.inputs.contains(name); }
   // File of an input artifact. Throws Error{kFailedPrecondition} naming the artifact and the stage

@@ -186,7 +186,7 @@ TEST_F(ColorFramesTest, DoesNotAverageKeyFrames) {
   AddFrames(Panned);
   key_views_ = {kFirst, kSecond};
   for (int i = 0; i < kFrames; ++i) {
-    AddInput(ViewArtifact(artifact::kCarried, scene_.views[i], ".png"),
+    AddInput(ViewArtifact(artifact::kCarried, scene_.views[i]),
              EncodeAbPng(Image(kWidth, kHeight, 2, i < kSwitch ? -30.0f : 30.0f)));
   }
   for (const auto& [view, color] : Run(2)) {

@@ -39,7 +39,7 @@ Image MedianPicture(const ViewImages& images, const std::vector<int>& views) {
   std::vector<float> values(count);
   for (size_t p = 0; p < median.data.size(); ++p) {
     for (size_t i = 0; i < count; ++i) values[i] = frames[i]->data[p];
-    std::nth_element(values.begin(), values.begin() + count / 2, values.end());
+    std::ranges::nth_element(values, values.begin() + count / 2);
     median.data[p] = values[count / 2];
   }
   return median;
@@ -128,8 +128,8 @@ void RequireTwo(const std::vector<FramesOfCamera>& cameras,
         stay.empty() ? "the others" : stay);
   }
   if (go.empty()) return;
-  context.progress().OnWarning(fmt::format(
-      "left out, since too few of their frames found a place among those of {}: {}", stay, go));
+  context.Warn(
+      "left out, since too few of their frames found a place among those of {}: {}", stay, go);
 }
 
 // The frames of the cameras that stay, with their poses, and the points that they see.
@@ -157,9 +157,8 @@ Scene SceneOf(const Scene& placed,
       }
     }
   }
-  std::sort(views.begin(), views.end(), [](const auto& x, const auto& y) {
-    return x.first.name < y.first.name;
-  });
+  std::ranges::sort(
+      views, {}, [](const auto& view) -> const std::string& { return view.first.name; });
   Scene scene;
   std::map<int, std::vector<int>> views_of;  // by picture
   for (auto& [view, picture] : views) {
@@ -177,7 +176,7 @@ Scene SceneOf(const Scene& placed,
       kept.views.insert(kept.views.end(), found->second.begin(), found->second.end());
     }
     if (pictures < 2) continue;
-    std::sort(kept.views.begin(), kept.views.end());
+    std::ranges::sort(kept.views);
     scene.points.push_back(std::move(kept));
   }
   return scene;

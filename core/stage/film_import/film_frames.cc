@@ -54,7 +54,7 @@ std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
   for (const std::string& file : ListFiles(folder)) {
     if (HasImageExtension(file)) files.push_back(file);
   }
-  std::sort(files.begin(), files.end(), ComesBefore);
+  std::ranges::sort(files, ComesBefore);
   return files;
 }
 
@@ -62,7 +62,7 @@ std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
                                     const FilmOptions& options,
                                     StageContext& context) {
   const FrameNumbers numbers = FramePositions(files);
-  if (!numbers.note.empty()) context.progress().OnWarning(numbers.note);
+  if (!numbers.note.empty()) context.Warn(numbers.note);
   std::vector<double> times;
   for (const int64_t place : numbers.places) {
     times.push_back(static_cast<double>(place) /
@@ -103,10 +103,10 @@ void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext&
   add(options.deflicker != usual.deflicker, "film_deflicker");
   add(!cameras && options.poses != usual.poses, "film_poses");
   if (unused.empty()) return;
-  context.progress().OnWarning(fmt::format("{} {} left aside: {}",
-                                           fmt::join(unused, ", "),
-                                           unused.size() == 1 ? "is" : "are",
-                                           WhyUnused(scene)));
+  context.Warn("{} {} left aside: {}",
+               fmt::join(unused, ", "),
+               unused.size() == 1 ? "is" : "are",
+               WhyUnused(scene));
 }
 
 void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {
@@ -157,11 +157,11 @@ std::string NamesOfFrames(const std::vector<std::string>& names) {
 
 void WarnOfFrames(const std::vector<std::string>& names, const char* what, StageContext& context) {
   if (names.empty()) return;
-  context.progress().OnWarning(fmt::format("{} {} {}: {}",
-                                           names.size(),
-                                           names.size() == 1 ? "frame" : "frames",
-                                           what,
-                                           NamesOfFrames(names)));
+  context.Warn("{} {} {}: {}",
+               names.size(),
+               names.size() == 1 ? "frame" : "frames",
+               what,
+               NamesOfFrames(names));
 }
 
 void WarnOfFramesWithoutPlace(const Scene& film,

@@ -32,11 +32,8 @@ std::vector<int> LongestShot(const Scene& scene) {
   for (size_t i = 0; i < scene.views.size(); ++i) {
     shots[scene.views[i].moment->shot].push_back(static_cast<int>(i));
   }
-  const auto longest =
-      std::max_element(shots.begin(), shots.end(), [](const auto& a, const auto& b) {
-        return a.second.size() < b.second.size();
-      });
-  return longest->second;
+  return std::ranges::max_element(shots, {}, [](const auto& shot) { return shot.second.size(); })
+      ->second;
 }
 
 // Throws what PlaceSequence and FinishPosedScene throw.
@@ -112,10 +109,10 @@ double Unevenness(const Scene& scene) {
 void WarnOfUnevenPath(double unevenness, StageContext& context) {
   constexpr double kUneven = 0.4;
   if (unevenness < kUneven) return;
-  context.progress().OnWarning(fmt::format(
+  context.Warn(
       "the camera's path is uneven (its steps change by {:.0f} % from frame to frame): what was "
       "taken for the place may move itself; look at the poses, or leave them out (film_poses: off)",
-      100.0 * unevenness));
+      100.0 * unevenness);
 }
 
 // Whether a film may go on without poses after it.
@@ -133,7 +130,7 @@ void FindFilmPoses(const fs::path& frames_root,
                    Scene* scene,
                    ImportFacts* facts) {
   const auto stays = [&](const std::string& why) {
-    context.progress().OnWarning("the film stays without poses: " + why);
+    context.Warn("the film stays without poses: " + why);
   };
   facts->film.emplace();
   std::vector<int> all(scene->views.size());
@@ -151,12 +148,12 @@ void FindFilmPoses(const fs::path& frames_root,
   facts->film->background_px = motion.background_px;
   facts->film->camera_stands_still = motion.camera_stands_still;
   if (motion.camera_stands_still) {
-    context.progress().OnWarning(fmt::format(
+    context.Warn(
         "the camera stands still (what does not move of its own shifts by {:.2f} px at {} px), "
         "which tells no depth: the scene is a relief (2.5D), its depth is assumed. Ground in front "
         "of an upright backdrop, and what moves stands on it; good for a look from nearby only",
         motion.background_px,
-        kMotionSidePx));
+        kMotionSidePx);
     Scene relief = ReliefScene(*scene, shot, files);
     facts->film->poses_found = true;
     facts->photos_registered = static_cast<int>(relief.views.size());
@@ -189,7 +186,7 @@ void FindFilmPoses(const fs::path& frames_root,
                     scene->views.size(),
                     100.0 * motion.moving_share));
   }
-  for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
+  for (const std::string& warning : result.warnings) context.Warn(warning);
   facts->film->poses_found = true;
   facts->undistorted = result.undistorted;
   facts->random_points = result.random_points;

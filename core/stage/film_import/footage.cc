@@ -60,21 +60,21 @@ void AlignBySound(const IndexedFilms& films, std::vector<Footage>* all, StageCon
     }
     const std::optional<double> offset_s = SoundOffset(heard, levels);
     if (!offset_s) {
-      context.progress().OnWarning(fmt::format(
+      context.Warn(
           "{} and {} share no sound that tells when they began: taken to have begun together; else "
           "give time_offset in transforms.json",
           first->film.file,
-          footage.film.file));
+          footage.film.file);
       continue;
     }
     const double interval_s = footage.times.size() < 2 ? 0.0 : footage.times[1] - footage.times[0];
     if (std::abs(*offset_s) < 0.5 * interval_s) continue;
     for (double& time_s : footage.times) time_s += *offset_s;
-    context.progress().OnWarning(fmt::format("by their sound, {} began {:.2f} s {} {}",
-                                             footage.film.file,
-                                             std::abs(*offset_s),
-                                             *offset_s > 0.0 ? "after" : "before",
-                                             first->film.file));
+    context.Warn("by their sound, {} began {:.2f} s {} {}",
+                 footage.film.file,
+                 std::abs(*offset_s),
+                 *offset_s > 0.0 ? "after" : "before",
+                 first->film.file);
   }
 }
 
@@ -82,7 +82,7 @@ void AlignBySound(const IndexedFilms& films, std::vector<Footage>* all, StageCon
 std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& context) {
   IndexedFilms films;
   const auto size_of = [&](const std::string& file) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     const FilmReader reader(context.scene_folder() / file, &context.cancel());
     const FilmFacts& facts = reader.facts();
     CheckMovieSize(file, facts.width, facts.height);
@@ -153,7 +153,7 @@ bool ShareMoments(const FilmOptions& options, std::vector<Footage>* all, StageCo
   }
   const FrameMoments moments = MomentsOf(frames);
   if (moments.cameras.empty()) return true;  // none, or all of one time
-  if (!moments.note.empty()) context.progress().OnWarning(moments.note);
+  if (!moments.note.empty()) context.Warn(moments.note);
   double begin_s = std::numeric_limits<double>::infinity();
   for (const FrameTime& frame : frames) begin_s = std::min(begin_s, *frame.time);
   for (size_t i = 0; i < times.size(); ++i) *times[i] = begin_s + moments.moments[i]->time_s;

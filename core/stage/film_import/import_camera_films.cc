@@ -31,11 +31,11 @@ void WarnOfOddTimes(const std::vector<View>& views, size_t longest, StageContext
   std::set<double> times;
   for (const View& view : views) times.insert(view.time_s());
   if (2 * times.size() <= 3 * longest) return;
-  context.progress().OnWarning(fmt::format(
+  context.Warn(
       "the cameras' frames were not taken at the same times ({} times, {} frames of one camera): "
       "are their rates the same?",
       times.size(),
-      longest));
+      longest);
 }
 
 // The frames of all cameras as views, and where they are kept.
@@ -54,9 +54,7 @@ class CameraFilmsImport {
       throw InvalidArgument("none of the {} frames can be decoded", count_);
     ImportResult result;
     if (all_[0].film.has_pose) {
-      std::sort(frames_.views.begin(), frames_.views.end(), [](const View& x, const View& y) {
-        return x.name < y.name;
-      });
+      std::ranges::sort(frames_.views, {}, &View::name);
       result.scene = std::move(frames_);
       result.layout = CaptureLayout::kPosedFilms;
     } else {
@@ -81,17 +79,16 @@ class CameraFilmsImport {
   void ReadFilm(const Footage& footage) {
     FootageReader reader(footage, context_);
     if (reader.interlaced()) {
-      context_.progress().OnWarning(footage.film.file +
-                                    " is interlaced: one field of each frame is taken");
+      context_.Warn(footage.film.file + " is interlaced: one field of each frame is taken");
     }
     for (const std::string& note : reader.notes()) {
-      context_.progress().OnWarning(footage.film.file + " " + note);
+      context_.Warn(footage.film.file + " " + note);
     }
     FramesOfCamera camera{footage.film.file, {}};
     std::vector<Image> thumbnails;
     for (const int frame : footage.frames) {
-      context_.cancel().ThrowIfCancelled();
-      context_.progress().OnProgress(done_++, count_, "reading frames");
+      context_.ThrowIfCancelled();
+      context_.ReportProgress(done_++, count_, "reading frames");
       const std::string name = footage.film.camera + "/" + reader.NameOf(frame);
       Image luminance;
       try {

@@ -61,12 +61,12 @@ void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
   WarnOfFrames(blank, "of one grey all over", context);
   WarnOfFrames(alien, "unlike those around (torn?), coloured on their own", context);
   if (cuts.empty()) return;
-  context.progress().OnWarning(fmt::format(
+  context.Warn(
       "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
       "by likeness. Colour a frame of each (additional key views; the selection of several names "
       "one a shot)",
       NamesOfFrames(cuts),
-      cuts.size() + 1));
+      cuts.size() + 1);
 }
 
 // The frames that can be decoded, and small pictures of them.
@@ -102,8 +102,8 @@ ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& cont
   std::vector<View>& views = frames.scene.views;
   std::vector<std::string> damaged;
   for (int i = 0; i < stream.count; ++i) {
-    context.cancel().ThrowIfCancelled();
-    context.progress().OnProgress(i, stream.count, "reading frames");
+    context.ThrowIfCancelled();
+    context.ReportProgress(i, stream.count, "reading frames");
     Image luminance;
     try {
       luminance = LuminanceFromSrgb(stream.read(i));
@@ -146,24 +146,24 @@ void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageConte
   const SteadyTones tones = FindSteadyTones(frames.tones, shot, context.pool(), context.cancel());
   const auto count = static_cast<int>(frames.index.size());
   for (int i = 0; i < count; ++i) {
-    context.cancel().ThrowIfCancelled();
-    context.progress().OnProgress(i, count, "steadying exposure");
+    context.ThrowIfCancelled();
+    context.ReportProgress(i, count, "steadying exposure");
     KeepAside(frames.scene.views[i],
               Toned(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
               context);
   }
   constexpr double kNothingL = 1e-6;
   if (std::abs(tones.flicker_before - tones.flicker_after) < kNothingL) {
-    return context.progress().OnWarning(
-        fmt::format("exposure is steady: from a frame to the next it changes by {:.2f} L in the "
-                    "mean; it is left as it is",
-                    tones.flicker_before));
+    return context.Warn(
+        "exposure is steady: from a frame to the next it changes by {:.2f} L in the "
+        "mean; it is left as it is",
+        tones.flicker_before);
   }
-  context.progress().OnWarning(
-      fmt::format("exposure is steadied: from a frame to the next it changed by {:.2f} L in the "
-                  "mean, now by {:.2f}; the coloured film has the steady luminance",
-                  tones.flicker_before,
-                  tones.flicker_after));
+  context.Warn(
+      "exposure is steadied: from a frame to the next it changed by {:.2f} L in the "
+      "mean, now by {:.2f}; the coloured film has the steady luminance",
+      tones.flicker_before,
+      tones.flicker_after);
 }
 
 void ImportFrames(const FrameStream& stream,
@@ -194,7 +194,7 @@ void ImportFrames(const FrameStream& stream,
   std::vector<std::string> warnings;
   if (import.hold_out_every_eighth) HoldOutEveryEighth(&scene, &warnings);
   if (import.hold_out_block > 0.0) HoldOutBlock(import.hold_out_block, &scene);
-  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
+  for (const std::string& warning : warnings) context.Warn(warning);
   context.WriteOutput(artifact::kScene, SceneToJson(scene));
   context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
 }
@@ -211,10 +211,10 @@ void ImportVideo(const std::string& file,
   FilmReader film(context.scene_folder() / file, &context.cancel());
   const std::vector<int> wanted = Wanted(film.times(), options);
   if (film.facts().interlaced) {
-    context.progress().OnWarning("the film is interlaced: one field of each frame is taken");
+    context.Warn("the film is interlaced: one field of each frame is taken");
   }
   for (const std::string& note : film.facts().notes) {
-    context.progress().OnWarning("the film " + note);
+    context.Warn("the film " + note);
   }
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());

@@ -32,7 +32,7 @@ void MovingRegionFiles::Write(int view, const Image& moving) const {
   Image still = moving;
   for (float& v : still.data) v = 1.0f - v;
   // A mask that leaves nothing is none: such a frame finds its place by what moves, or not at all.
-  if (std::all_of(still.data.begin(), still.data.end(), [](float v) { return v == 0.0f; })) return;
+  if (std::ranges::all_of(still.data, [](float v) { return v == 0.0f; })) return;
   const Camera& camera = scene_.views[view].captured_camera;
   WriteFileAtomic(folder_ / "still" / Name(view),
                   EncodePng8(ResizeMask(still, camera.width, camera.height)));
@@ -47,7 +47,7 @@ fs::path MovingRegionFiles::StillFile(int view) const {
 
 void MovingRegionFiles::Leave(const Scene& placed, StageContext& context) const {
   for (const View& view : placed.views) {
-    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
+    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view),
                        MovingFile(scene_.FindView(view.name)));
   }
 }
@@ -65,7 +65,7 @@ ShotMotion WriteMovingRegions(const fs::path& frames_root,
                            context.cancel(),
                            [&](int frame, const Image& moving) {
                              files.Write(shot[frame], moving);
-                             context.progress().OnProgress(
+                             context.ReportProgress(
                                  ++done, count, "looking for what moves on its own");
                            });
 }

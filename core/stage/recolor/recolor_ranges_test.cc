@@ -176,7 +176,7 @@ TEST_F(RecolorRangesTest, PicturesToPaintOnHaveCorrectedColors) {
   ASSERT_FALSE(places.empty());
   for (const auto& place : places) {
     const int index = scene_.FindView(place.at("view").get<std::string>());
-    const std::string name = ViewArtifact(artifact::kPaint, scene_.views[index], ".png");
+    const std::string name = ViewArtifact(artifact::kPaint, scene_.views[index]);
     const Image painted = LabFromSrgb(DecodeImage(context.ReadInput(name), name));
     double error = 0.0;
     for (size_t i = 0; i < after[index].data.size(); ++i) {
