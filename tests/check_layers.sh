@@ -175,27 +175,22 @@ public server/worker supervisor worker_settings
 # determines the kind. Other sources read a property of it on at most this many lines each; lower a
 # number when it falls, and do not raise it: a new kind is a row, not a new branch.
 kind_branches='
-core/stage/carry_color.cc 2
-core/stage/colorize_scene.cc 5
-core/stage/colorize_views.cc 2
+client/commands/colorize.cc 1
+core/stage/carry_color.cc 1
+core/stage/colorize_scene.cc 3
 core/stage/evaluate.cc 1
-core/stage/film/temporal_scores.cc 1
 core/stage/movie/film_clock.cc 1
-core/stage/movie/movie.cc 7
-core/stage/recolor/time_ranges.cc 3
-core/stage/reconstruct_geometry.cc 1
-core/stage/render.cc 2
+core/stage/recolor/time_ranges.cc 1
+core/stage/render.cc 1
 core/stage/report/next_key_view.cc 1
-core/stage/report/report_views.cc 1
-core/stage/select_key_view.cc 4
-core/stage/sources/chroma_budget.h 1
-server/planning/colorize_scene_graph.cc 5
-server/planning/time_budget.cc 9
-server/rpc/jobs/job_service.cc 2
+core/stage/select_key_view.cc 1
+server/planning/colorize_scene_graph.cc 1
+server/planning/scene_facts.h 3
+server/planning/time_budget.cc 5
 server/rpc/scenes/scene_validation.cc 2
 server/worker/stage_runner.cc 1
 '
-pattern='capture\(\)|ColoredAs\(|([!=]=|case) Capture(Kind|Layout)::|\<facts(\.|->)is_(film|splat|dynamic)\>'
+pattern='capture\(\)|ColoredAs\(|\<(is_reconstructed|is_dynamic)\>|([!=]=|case) (Capture(Kind|Layout)|ViewSource|PoseSource)::'
 branches=$(grep -rnE "$pattern" core server client --include='*.h' --include='*.cc' |
   grep -vE '^[^:]*_test\.cc:|^core/(catalogue/captures|scene/(scene|scene_json|import/[a-z_]+)|stage/(film_import/[a-z_]+|import_scene|formats/artifact_io))\.(h|cc):' || true)
 for file in $(cut -d: -f1 <<<"$branches" | sort -u); do

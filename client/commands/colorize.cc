@@ -40,18 +40,19 @@ class Colorize {
     folder_ = CollectPhotos(options_.photos, options_.film);
     if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
     if (options_.film) TakeAsFrames(&folder_);
-    if (options_.poses && !options_.film && !folder_.film && folder_.camera_films.empty()) {
+    const CaptureLayoutInfo& layout = InfoOf(folder_.Layout());
+    if (options_.poses && layout.views != ViewSource::kFrames && folder_.camera_films.empty()) {
       throw InvalidArgument(
           "--poses is for films, and {} is not a film; poses of photos are always found (for "
-          "frames "
-          "as pictures add --film)",
+          "frames as pictures add --film)",
           options_.photos);
     }
+    const bool has_time_ranges = std::string_view(InfoOf(layout.kind).why_no_time_range).empty();
     if (!options_.key_view.empty()) RequirePhoto(folder_, options_.key_view);
     for (const std::string& text : options_.additional_key_views) {
       const AdditionalKeyView key = ParseAdditionalKeyView(text);
       RequirePhoto(folder_, key.view);
-      if (key.HasRange() && ((!options_.film && !folder_.film) || options_.poses)) {
+      if (key.HasRange() && (!has_time_ranges || options_.poses)) {
         throw InvalidArgument(
             "--add-key-view {}: a range of time is for films without poses; leave {} out",
             key.view,

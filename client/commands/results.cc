@@ -144,7 +144,7 @@ std::string Summary(const fs::path& out) {
   }
   for (const std::string& key : InMetricOrder(std::move(keys))) {
     const auto [metric, variant] = FindMetric(key);
-    if (metric == nullptr || !metric->in_summary) continue;
+    if (metric == nullptr || !metric->Is(Metric::kInSummary)) continue;
     if (variant != nullptr && !variant->in_summary) continue;
     const std::string label =
         variant == nullptr ? metric->label : std::string("  ") + variant->label;

@@ -87,16 +87,16 @@ TEST(ScenePlan, TellsOfTime) {
     return PlanStep{};
   };
   EXPECT_FALSE(told({}).needed);
-  const PlanStep step = told({.is_dynamic = true, .time_steps = 25, .cameras = 4});
+  const PlanStep step = told({.time_steps = 25, .cameras = 4});
   EXPECT_TRUE(step.needed);
   EXPECT_EQ(step.reason, "the views show 25 time steps, seen by 4 cameras");
-  EXPECT_FALSE(told({.is_film = true, .is_dynamic = true}).needed);
+  EXPECT_FALSE(told({.kind = CaptureKind::kFilm, .time_steps = 25}).needed);
 }
 
 TEST(ScenePlan, TellsTheMotionThatGeometryFound) {
   const auto told = [](const SceneMotion& motion) {
-    for (auto& step : nlohmann::json::parse(PlanToJson(
-             PlanScene({.is_dynamic = true, .time_steps = 9, .cameras = 1, .motion = motion})))) {
+    for (auto& step : nlohmann::json::parse(
+             PlanToJson(PlanScene({.time_steps = 9, .cameras = 1, .motion = motion})))) {
       if (step.at("step") == "deformation_over_time") return step;
     }
     return nlohmann::json();

@@ -17,12 +17,6 @@ std::string_view Stem(std::string_view name) {
   return name.substr(0, dot);
 }
 
-bool HasMoments(const std::vector<View>& views) {
-  return !views.empty() && std::all_of(views.begin(), views.end(), [](const View& view) {
-    return view.moment.has_value();
-  });
-}
-
 // Returns true unless all views have the same position and direction.
 bool HasPoses(const std::vector<View>& views) {
   return std::any_of(views.begin(), views.end(), [&](const View& view) {
@@ -70,8 +64,14 @@ int Scene::FindView(std::string_view name) const {
                                  : "; it has " + known + (views.size() > 3 ? ", ..." : "")));
 }
 
+bool Scene::HasTimes() const {
+  return !views.empty() && std::all_of(views.begin(), views.end(), [](const View& view) {
+    return view.moment.has_value();
+  });
+}
+
 CaptureKind Scene::kind() const {
-  if (!HasMoments(views)) return CaptureKind::kStatic;
+  if (!HasTimes()) return CaptureKind::kStatic;
   if (relief) return CaptureKind::kRelief;
   return HasPoses(views) ? CaptureKind::kDynamic : CaptureKind::kFilm;
 }

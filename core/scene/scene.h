@@ -67,6 +67,8 @@ struct Scene {
   // Kind of the scene: kFilm, kDynamic and kRelief if each view has a moment. Films have one pose
   // for all views, which means none. kStatic without views.
   CaptureKind kind() const;
+  // True if each view has a moment, and there are views.
+  bool HasTimes() const;
   const CaptureKindInfo& capture() const { return InfoOf(kind()); }
   // Indices of all views in order of time; views of equal time, or without one, keep their order.
   std::vector<int> ViewsInOrderOfTime() const;

@@ -236,6 +236,12 @@ std::vector<LocalFile> PhotoFolder::AllFiles() const {
   return all;
 }
 
+CaptureLayout PhotoFolder::Layout() const {
+  std::vector<std::string> paths;
+  for (LocalFile& file : AllFiles()) paths.push_back(std::move(file.path));
+  return DetectCapture(paths);
+}
+
 std::string PhotoFolder::Name() const {
   return fs::absolute(splat ? splat->file : film ? film->file : root).filename().string();
 }

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/catalogue/captures.h"
+
 namespace color3d::client {
 
 struct LocalFile {
@@ -26,6 +28,8 @@ struct PhotoFolder {
   std::vector<std::string> notes;        // what the user may want to know, one line each
 
   std::vector<LocalFile> AllFiles() const;
+  // Layout of all files, as the server and import will detect it.
+  CaptureLayout Layout() const;
   // For messages: the last part of the given path.
   std::string Name() const;
 };

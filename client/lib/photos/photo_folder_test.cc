@@ -75,6 +75,7 @@ TEST_F(PhotoFolderTest, TakesSplatInsteadOfPhotos) {
     const PhotoFolder folder = CollectPhotos(path);
     ASSERT_TRUE(folder.splat.has_value());
     EXPECT_EQ(folder.Name(), "bust.ply");
+    EXPECT_EQ(folder.Layout(), CaptureLayout::kSplat);
     EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("bust.ply"));
     EXPECT_EQ(PhotoOfSameStem(folder, "x/view_07.png"), "view_07.png");
     EXPECT_EQ(PhotoOfSameStem(folder, "x/coloured.png"), "");
@@ -94,6 +95,7 @@ TEST_F(PhotoFolderTest, TakesFilmOrPhotosAsFrames) {
     PhotoFolder folder = CollectPhotos(path);
     ASSERT_TRUE(folder.film.has_value());
     EXPECT_EQ(folder.Name(), "walk.MOV");
+    EXPECT_EQ(folder.Layout(), CaptureLayout::kFilm);
     EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("walk.MOV"));
     EXPECT_EQ(PhotoOfSameStem(folder, "x/f000012.png"), "f000012.png");
     EXPECT_EQ(PhotoOfSameStem(folder, "x/fox.png"), "");
@@ -104,12 +106,15 @@ TEST_F(PhotoFolderTest, TakesFilmOrPhotosAsFrames) {
   Write("second.mp4", "y");
   PhotoFolder cameras = CollectPhotos(root());
   EXPECT_THAT(Paths(cameras.AllFiles()), ElementsAre("second.mp4", "walk.MOV"));
+  EXPECT_EQ(cameras.Layout(), CaptureLayout::kFilms);
   EXPECT_FALSE(cameras.film.has_value());
   EXPECT_THROW(TakeAsFrames(&cameras), Error);
   for (const char* name : {"images/b.jpg", "images/a.jpg"}) Write(name);
   PhotoFolder folder = CollectPhotos(root());
   EXPECT_FALSE(folder.film.has_value());
+  EXPECT_EQ(folder.Layout(), CaptureLayout::kPhotos);
   TakeAsFrames(&folder);
+  EXPECT_EQ(folder.Layout(), CaptureLayout::kFilm);
   EXPECT_THAT(Paths(folder.photos), ElementsAre("frames/a.jpg", "frames/b.jpg"));
   EXPECT_EQ(PhotoOfSameStem(folder, "b.png"), "b.jpg");
   for (const char* name : {"images/c10.jpg", "images/c2.jpg"}) Write(name);
@@ -188,6 +193,7 @@ TEST_F(PhotoFolderTest, FoldersOfFramesAreCameras) {
   TakeAsFrames(&folder);
   EXPECT_THAT(Paths(folder.AllFiles()),
               ElementsAre("frames/left/9.png", "frames/right/9.png", "frames/right/10.png"));
+  EXPECT_EQ(folder.Layout(), CaptureLayout::kFilms);
   EXPECT_NO_THROW(RequirePhoto(folder, "right/10.png"));
   fs::remove_all(root() / "left");
   EXPECT_THAT(ErrorOf(root(), /*as_frames=*/true), HasSubstr("did you mean"));
@@ -197,6 +203,7 @@ TEST_F(PhotoFolderTest, TakesPosedFilmsInsteadOfPhotos) {
   for (const char* name : {"cam01.mp4", "cam00.mp4", "poses_bounds.npy", "notes.txt"}) Write(name);
   PhotoFolder folder = CollectPhotos(root());
   EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("cam00.mp4", "cam01.mp4", "poses_bounds.npy"));
+  EXPECT_EQ(folder.Layout(), CaptureLayout::kPosesBounds);
   EXPECT_FALSE(folder.film.has_value());
   EXPECT_NO_THROW(RequirePhoto(folder, "cam00/f000003.png"));
   Write("films/cam02.mp4");
