@@ -21,30 +21,30 @@ TEST(StageCatalogueTest, EarlierStagesWriteEveryInput) {
         EXPECT_TRUE(made.contains(name) || of_an_earlier_job) << stage.kind << " reads " << name;
       }
     }
-    made.insert(stage.leaves.begin(), stage.leaves.end());
+    made.insert(stage.outputs.begin(), stage.outputs.end());
   }
 }
 
 TEST(StageCatalogueTest, EveryArtifactHasOneWriter) {
   std::set<std::string_view> made;
   for (const Stage& stage : StageCatalogue()) {
-    for (const char* name : stage.leaves) EXPECT_TRUE(made.insert(name).second) << name;
+    for (const char* name : stage.outputs) EXPECT_TRUE(made.insert(name).second) << name;
   }
 }
 
 TEST(StageCatalogueTest, ResultsAreOutputsOfTheirStage) {
   for (const Stage& stage : StageCatalogue()) {
-    const std::set<std::string_view> made(stage.leaves.begin(), stage.leaves.end());
+    const std::set<std::string_view> made(stage.outputs.begin(), stage.outputs.end());
     for (const char* name : stage.results) EXPECT_TRUE(made.contains(name)) << name;
   }
 }
 
 TEST(StageCatalogueTest, FindsWriterByNameAndFolder) {
-  EXPECT_STREQ(StageThatLeaves(artifact::kModel)->kind, kind::kSolveChroma);
-  EXPECT_STREQ(StageThatLeaves(std::string(artifact::kViewsAb) + "0001.png")->kind,
+  EXPECT_STREQ(StageThatWrites(artifact::kModel)->kind, kind::kSolveChroma);
+  EXPECT_STREQ(StageThatWrites(std::string(artifact::kViewsAb) + "0001.png")->kind,
                kind::kColorizeViews);
-  EXPECT_STREQ(StageThatLeaves(artifact::kKeyViewColored)->kind, kind::kColorizeKeyView);
-  EXPECT_EQ(StageThatLeaves("nothing.txt"), nullptr);
+  EXPECT_STREQ(StageThatWrites(artifact::kKeyViewColored)->kind, kind::kColorizeKeyView);
+  EXPECT_EQ(StageThatWrites("nothing.txt"), nullptr);
 }
 
 TEST(StageCatalogueTest, FindsOrRefusesKinds) {

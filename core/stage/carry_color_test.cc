@@ -210,7 +210,7 @@ TEST_F(CarryStageTest, GivesTheSameBytesAgain) {
   EXPECT_EQ(first, ReadFile(scratch_.path() / "out" / "carried/p2.png"));
 }
 
-// Keeps every state that is saved, and loses the lease at the third.
+// Keeps every saved state, and loses the lease at the third.
 class Dying : public CheckpointStore {
  public:
   std::optional<std::string> Load() override {

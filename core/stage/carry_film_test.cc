@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kWidth = 96, kHeight = 64, kFrames = 12, kKey = 5;
 
-// Cancels the work at one of the frames.
+// Counts the frames, and cancels the work at one of them.
 class FrameCounter : public NullObserver {
  public:
   void OnProgress(int64_t step, int64_t total, const std::string&) override {
@@ -124,7 +124,7 @@ TEST_F(CarryFilmTest, StopsBeforeNextFrameWhenCancelled) {
   frames_.cancel_at = 3;
   try {
     Run();
-    FAIL() << "it went on";
+    FAIL() << "it continued";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kCancelled);
   }

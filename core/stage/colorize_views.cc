@@ -36,7 +36,7 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
   const ViewPositions positions(scene, context);
-  const bool are_frames = scene.HasTimes() && !positions.NothingMoves();
+  const bool are_frames = scene.HasTimes() && !positions.IsStatic();
   const ViewImages images(
       scene, context.scene_folder(), max_side_px, are_frames ? kColoredFramesCacheBytes : 0);
   const auto total = std::ssize(scene.views);

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-// Three views of a ramp, into each of which other colours were carried.
+// Three views of a ramp with different carried colours.
 class ColorizeViewsTest : public StageTest {
  protected:
   ColorizeViewsTest() : scene_(RampScene(scratch_.path(), kWidth, kHeight)) {

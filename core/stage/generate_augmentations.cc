@@ -47,7 +47,7 @@ struct Outcome {
 };
 
 // Number of pictures of each kind. Turns of disabled kinds are dropped.
-std::map<Kind, int> Deal(const AugmentationOptions& options) {
+std::map<Kind, int> CountByKind(const AugmentationOptions& options) {
   std::map<Kind, int> counts;
   for (int i = 0; i < options.samples; ++i) {
     const Kind kind = kOrder[static_cast<size_t>(i) % std::size(kOrder)];
@@ -80,11 +80,11 @@ KeyPicture ReadKeyPicture(const Scene& scene,
 }
 
 // Requests pictures of the kinds that the backend supports. Other kinds stay in `counts`.
-void TakeFromBackend(const AugmentationOptions& options,
-                     const Image& key_srgb,
-                     StageContext& context,
-                     std::map<Kind, int>* counts,
-                     Outcome* outcome) {
+void GenerateWithBackend(const AugmentationOptions& options,
+                         const Image& key_srgb,
+                         StageContext& context,
+                         std::map<Kind, int>* counts,
+                         Outcome* outcome) {
   const auto remote = context.Remote(options.backend);
   const RemoteInfo info = remote->GetInfo(context.progress(), context.cancel());
   bool asked = false;
@@ -152,10 +152,10 @@ void MakeSurrogates(const std::map<Kind, int>& counts,
   }
 }
 
-void LeaveOutNeedless(const AugmentationOptions& options,
-                      const StageContext& context,
-                      std::map<Kind, int>* counts,
-                      Outcome* outcome) {
+void SkipNeedless(const AugmentationOptions& options,
+                  const StageContext& context,
+                  std::map<Kind, int>* counts,
+                  Outcome* outcome) {
   if (options.samples > 0) {
     const std::pair<Kind, bool> switches[] = {{Kind::kOutpaint, options.outpaint},
                                               {Kind::kAnimate, options.animate},
@@ -175,7 +175,7 @@ void LeaveOutNeedless(const AugmentationOptions& options,
 }
 
 // Masked pixels must not be learnt, and their places in generated pictures are unknown.
-void LeaveOutMasked(std::map<Kind, int>* counts, Outcome* outcome) {
+void SkipMasked(std::map<Kind, int>* counts, Outcome* outcome) {
   for (const auto& [kind, count] : *counts) {
     outcome->LeaveOut(AugmentationKindName(kind), "parts of the key view are masked out");
   }
@@ -246,13 +246,13 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
     }
   }
   const KeyPicture key = ReadKeyPicture(scene, key_index, options.max_side_px, context);
-  std::map<Kind, int> counts = Deal(options);
-  LeaveOutNeedless(options, context, &counts, &outcome);
-  if (!scene.views[key_index].mask_file.empty()) LeaveOutMasked(&counts, &outcome);
+  std::map<Kind, int> counts = CountByKind(options);
+  SkipNeedless(options, context, &counts, &outcome);
+  if (!scene.views[key_index].mask_file.empty()) SkipMasked(&counts, &outcome);
   if (!options.backend.empty() && !counts.empty()) {
     const int side = std::max(options.max_side_px, kRemoteSidePx);
     const Image key_srgb = SrgbFromLab(KeyLab(scene, key_index, side, context));
-    TakeFromBackend(options, key_srgb, context, &counts, &outcome);
+    GenerateWithBackend(options, key_srgb, context, &counts, &outcome);
   }
   if (!counts.empty()) {
     const Surrogates surrogates(key,

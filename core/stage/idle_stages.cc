@@ -26,7 +26,7 @@ void WriteEmptyArtifacts(std::string_view stage, StageContext& context) {
 
 }  // namespace
 
-std::string_view LeaveOutIdleStage(std::string_view stage, StageContext& context) {
+std::string_view SkipIdleStage(std::string_view stage, StageContext& context) {
   const auto is_idle = [&](const CaptureKindInfo& info) {
     return !WhyNothingToDo(info.kind, stage).empty();
   };

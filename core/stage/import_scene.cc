@@ -84,14 +84,15 @@ void RunImportScene(const ImportOptions& options,
   if (layout == CaptureLayout::kFilm)
     return ImportFilm(FindFilm(files), film_options, options, context);
   if (layout == CaptureLayout::kSplat) {
-    WarnOfUnusedOptions(film_options, NoFilm::kPhotos, context);
+    WarnOfUnusedOptions(film_options, ImportedAs::kPhotos, context);
     return ImportSplatScene(FindSplat(files), options, splat_views, context);
   }
   ImportOptions within = options;
   within.memory_bytes = context.MemoryBytes();
   const ImportResult result =
       ImportScene(context.scene_folder(), context.scratch_folder(), within, context.control());
-  const NoFilm what = result.scene.capture().is_dynamic ? NoFilm::kTimedPictures : NoFilm::kPhotos;
+  const ImportedAs what =
+      result.scene.capture().is_dynamic ? ImportedAs::kTimedPictures : ImportedAs::kPhotos;
   WarnOfUnusedOptions(film_options, what, context);
   WriteImported(result, context);
 }

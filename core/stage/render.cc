@@ -33,7 +33,7 @@ bool HasColors(const StageContext& context, const Scene& scene) {
 }
 
 // Films without poses cannot be rendered along a camera path: they have no geometry.
-void RefusePathThroughFilm(const RenderOptions& options) {
+void CheckPathOfFilm(const RenderOptions& options) {
   if (options.path == RenderOptions::Path::kViews && !options.time_s) return;
   throw InvalidArgument(
       "this film has no poses, so no camera can move through it; its coloured frames are {} of the "
@@ -66,7 +66,7 @@ void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   if (!ColoredAs(context, scene).is_reconstructed) {
-    RefusePathThroughFilm(options);
+    CheckPathOfFilm(options);
     return RenderFilm(options, scene, ViewsToRender(options, scene), context);
   }
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));

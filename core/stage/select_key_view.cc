@@ -171,7 +171,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   }
   ranking->strategy = StrategyName(strategy);
   ranking->selection = RankViews(std::move(guarded), scores);
-  if (is_film && TakeFromLongestShot(scene, candidates, &ranking->selection)) {
+  if (is_film && PreferLongestShot(scene, candidates, &ranking->selection)) {
     ranking->among = "the film's longest shot";
   }
   if (options.count > 1) {

@@ -14,7 +14,7 @@ namespace color3d {
 namespace {
 
 std::string ProviderOf(const std::string& artifact) {
-  const Stage* stage = StageThatLeaves(artifact);
+  const Stage* stage = StageThatWrites(artifact);
   if (stage == nullptr) throw Error(ErrorCode::kInternal, "no stage leaves '{}'", artifact);
   return stage->kind;
 }

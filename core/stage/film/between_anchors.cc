@@ -104,7 +104,7 @@ size_t FillOpen(const CarriedColor& others, CarriedColor* color) {
   return filled;
 }
 
-void TakeNeighborsColor(const CarriedColor& answer, CarriedColor* color) {
+void FillFromNeighbor(const CarriedColor& answer, CarriedColor* color) {
   CarriedColor followed = answer;
   for (float& confidence : followed.confidence.data) {
     if (confidence > kAnswerFollowed) confidence = std::max(confidence, kJustFollowed);

@@ -24,7 +24,7 @@ double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors
 size_t FillOpen(const CarriedColor& others, CarriedColor* color);
 // Takes the colours inferred for a neighbouring frame where `color` is not sure. They are
 // propagated with less confidence than seen colours, since inferring them anew would be no surer.
-void TakeNeighborsColor(const CarriedColor& answer, CarriedColor* color);
+void FillFromNeighbor(const CarriedColor& answer, CarriedColor* color);
 
 // Fuses the colour of a frame: carried colours; those of the anchors, where they are propagated
 // surely, in place of inferred ones; and inferred ones where neither is sure, if that is more than

@@ -254,7 +254,7 @@ class ShotColorer {
                 [&](int frame, const CarriedColor& color) {
                   const auto i = std::ranges::find(frames, frame) - frames.begin();
                   if (open[i] == 0.0) return;
-                  TakeNeighborsColor(color, &(*of_anchors)[gap.begin + i]);
+                  FillFromNeighbor(color, &(*of_anchors)[gap.begin + i]);
                   measure(i);
                 });
     }

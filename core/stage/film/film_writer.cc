@@ -62,15 +62,15 @@ std::string FileNameOf(const std::string& camera, std::set<std::string>* taken) 
 }
 
 // Publishes the file of the scratch folder under each of the names.
-void LeaveAs(const std::vector<std::string>& artifacts,
-             const fs::path& file,
-             StageContext& context) {
+void PublishAs(const std::vector<std::string>& artifacts,
+               const fs::path& file,
+               StageContext& context) {
   for (size_t i = 1; i < artifacts.size(); ++i) {
     const fs::path copy = file.string() + ".copy";
     fs::copy_file(file, copy);
-    context.TakeOutput(artifacts[i], copy);
+    context.MoveOutput(artifacts[i], copy);
   }
-  context.TakeOutput(artifacts[0], file);
+  context.MoveOutput(artifacts[0], file);
 }
 
 }  // namespace
@@ -132,7 +132,7 @@ void WriteColoredFilm(const Scene& scene,
     context.ReportProgress(begin + size, count, "writing frames of " + film.artifacts[0]);
   }
   movie.Finish();
-  LeaveAs(film.artifacts, file, context);
+  PublishAs(film.artifacts, file, context);
 }
 
 void WriteFilmsOfCameras(const Scene& scene, bool pictures, StageContext& context) {

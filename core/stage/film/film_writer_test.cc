@@ -216,7 +216,7 @@ TEST_F(FilmWriterTest, WritesFilmOfEachCamera) {
   EXPECT_NE(ReadFile(out / "film.mp4"), ReadFile(out / "films/in_the_left.mp4"));
   EXPECT_EQ(HearFilm(out / "films/in_the_left.mp4").codec, "");
   EXPECT_EQ(HearFilm(out / "film.mp4").codec, "aac");
-  EXPECT_EQ(HearFilm(out / "scene.mp4").codec, "aac") << "as that camera saw it";
+  EXPECT_EQ(HearFilm(out / "scene.mp4").codec, "aac") << "sound of the camera of the key view";
   for (const View& view : scene_.views) {
     EXPECT_EQ(ReadImage(out / ("film_frames/" + view.name)).width, kWidth) << view.name;
   }

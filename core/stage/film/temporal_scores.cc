@@ -9,10 +9,10 @@
 #include "core/image/codec.h"
 #include "core/metrics/scene_consistency.h"
 #include "core/metrics/temporal_consistency.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/film/film_writer.h"
 #include "core/stage/film/frames_of_views.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {

@@ -106,7 +106,7 @@ nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& 
 }
 
 Error DamagedArtifact(std::string_view name, const nlohmann::json::exception& error) {
-  const Stage* writer = StageThatLeaves(name);
+  const Stage* writer = StageThatWrites(name);
   return InvalidArgument("{} is damaged: {}; run {} again",
                          name,
                          error.what(),

@@ -190,11 +190,11 @@ std::vector<PathCamera> SmoothFrames(const RenderOptions& options,
   return frames;
 }
 
-std::vector<PathCamera> Turning(const RenderOptions& options,
-                                const Scene& scene,
-                                int home,
-                                const Eigen::Vector3d& focus,
-                                const Camera& picture) {
+std::vector<PathCamera> OrbitFrames(const RenderOptions& options,
+                                    const Scene& scene,
+                                    int home,
+                                    const Eigen::Vector3d& focus,
+                                    const Camera& picture) {
   const std::vector<double> shares =
       FrameShares(options.frames.value_or(kDefaultMovieFrames), options.bounce, true);
   std::vector<PathCamera> frames = TurnFrames(scene, home, focus, shares);
@@ -225,7 +225,7 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
     const Eigen::Vector3d focus = FocusOfView(view, model, context.pool());
     const double unit = (focus - view.cam_from_world.Center()).norm();
     frames = options.path == RenderOptions::Path::kOrbit
-                 ? Turning(options, scene, home, focus, picture)
+                 ? OrbitFrames(options, scene, home, focus, picture)
                  : SmoothFrames(options, stations, unit, file_tells);
   }
   const bool told = file_tells || (one_by_one && stations.have_times);
@@ -324,7 +324,7 @@ void RenderMovie(const RenderOptions& options,
   }
   if (!movie) return;
   movie->Finish();
-  context.TakeOutput(artifact::kMovie, file);
+  context.MoveOutput(artifact::kMovie, file);
 }
 
 }  // namespace color3d

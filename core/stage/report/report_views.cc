@@ -9,8 +9,8 @@
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/splat/raster/render.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {

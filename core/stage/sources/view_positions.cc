@@ -6,8 +6,8 @@
 
 #include "core/base/median.h"
 #include "core/scene/photo_masks.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {
