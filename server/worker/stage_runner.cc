@@ -173,7 +173,7 @@ class CoreStageRunner : public StageRunner {
     setup.batch = Batch(run.threads);
     setup.project = run.project;
     StageContext context(std::move(setup), recorder, recorder, cancel);
-    if (LeaveOutIdleStage(kind, context).empty()) RunStage(run, blobs, context);
+    if (SkipIdleStage(kind, context).empty()) RunStage(run, blobs, context);
     const auto points = recorder.points();
     if (!points.empty() && kind != kind::kColorizeScene) {
       context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(points));

@@ -102,12 +102,12 @@ TEST_F(RigTest, ReportsFilmOptionsThatDoNotApply) {
   WriteFilms();
   const ProcessResult films = Colorize("rig", {"--deflicker"});
   EXPECT_EQ(films.exit_code, 0) << films.err;
-  EXPECT_THAT(films.err, HasSubstr("film_deflicker is left aside: films whose poses are given"));
+  EXPECT_THAT(films.err, HasSubstr("film_deflicker is ignored: films with poses"));
   const ProcessResult pictures =
       Colorize("pictures", {"--set", "import_scene.film_frames_per_second=16"});
   EXPECT_EQ(pictures.exit_code, 0) << pictures.err;
   EXPECT_THAT(pictures.err,
-              HasSubstr("film_frames_per_second is left aside: pictures whose times and poses"));
+              HasSubstr("film_frames_per_second is ignored: pictures with times and poses"));
 }
 
 TEST_F(RigTest, ScoresAreGroupedByHeldOutKind) {

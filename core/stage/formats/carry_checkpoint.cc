@@ -100,7 +100,7 @@ void CarryCheckpoint::Restore(const json& record) {
 }
 
 void CarryCheckpoint::Keep(size_t view, double coverage, const std::string& png) {
-  const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view], ".png");
+  const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view]);
   if (is_done_[view] != 0) {
     context_.RewriteOutput(name, png);
   } else {
@@ -118,19 +118,18 @@ void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
   const std::lock_guard lock(mutex_);
   const auto index = static_cast<size_t>(view);
   Keep(index, coverage, png);
-  context_.progress().OnProgress(done_,
-                                 static_cast<int64_t>(scene_.views.size()),
-                                 "carrying colour into " + scene_.views[index].name);
+  context_.ReportProgress(
+      done_, std::ssize(scene_.views), "carrying colour into " + scene_.views[index].name);
   SaveWhenDue();
 }
 
 void CarryCheckpoint::ReportProgress(const std::string& message) const {
   const std::lock_guard lock(mutex_);
-  context_.progress().OnProgress(done_, static_cast<int64_t>(scene_.views.size()), message);
+  context_.ReportProgress(done_, std::ssize(scene_.views), message);
 }
 
 std::string CarryCheckpoint::Png(int view) const {
-  return context_.ReadOutput(ViewArtifact(artifact::kCarried, scene_.views[view], ".png"));
+  return context_.ReadOutput(ViewArtifact(artifact::kCarried, scene_.views[view]));
 }
 
 void CarryCheckpoint::Replace(int view, double coverage, const std::string& png) {

@@ -53,14 +53,13 @@ void ViewsCheckpoint::Add(int view, const FusedColor& color) {
   const std::string provenance = EncodePng8(color.provenance);
   const std::lock_guard lock(mutex_);
   Keep(view, ab, provenance);
-  context_.progress().OnProgress(
-      done_, static_cast<int64_t>(scene_.views.size()), "colouring " + scene_.views[view].name);
+  context_.ReportProgress(done_, std::ssize(scene_.views), "colouring " + scene_.views[view].name);
   records_.SaveWhenDue();
 }
 
 void ViewsCheckpoint::Keep(int view, const std::string& ab, const std::string& provenance) {
-  context_.WriteOutput(ViewArtifact(artifact::kViewsAb, scene_.views[view], ".png"), ab);
-  context_.WriteOutput(ViewArtifact(artifact::kProvenance, scene_.views[view], ".png"), provenance);
+  context_.WriteOutput(ViewArtifact(artifact::kViewsAb, scene_.views[view]), ab);
+  context_.WriteOutput(ViewArtifact(artifact::kProvenance, scene_.views[view]), provenance);
   ++done_;
   records_.Append(
       {{"view", scene_.views[view].name}, {"ab", Binary(ab)}, {"provenance", Binary(provenance)}});

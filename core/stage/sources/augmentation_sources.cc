@@ -61,7 +61,7 @@ std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageCon
   std::vector<Augmentation> pictures;
   for (const std::string& file : ListFiles(context.scene_folder())) {
     if (!file.starts_with(kFolder)) continue;
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     if (!HasImageExtension(file)) {
       throw InvalidArgument(
           "{} is no picture ({}); remove it from {}", file, ReadableImageFormats(), kFolder);
@@ -105,8 +105,8 @@ std::vector<Augmentation> AugmentationsFromBackend(const std::string& backend,
   const std::vector<std::string> answers =
       remote.Generate(request, context.progress(), context.cancel());
   if (answers.size() < static_cast<size_t>(count)) {
-    context.progress().OnWarning(fmt::format(
-        "the backend '{}' made {} of {} {} pictures", backend, answers.size(), count, name));
+    context.Warn(
+        "the backend '{}' made {} of {} {} pictures", backend, answers.size(), count, name);
   }
   std::vector<Augmentation> made;
   for (const std::string& bytes : answers) {
