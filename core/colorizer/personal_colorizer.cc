@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/base/byte_source.h"
 #include "core/base/error.h"
 #include "core/colorizer/named_tensors.h"
 #include "core/colorizer/options_json.h"
@@ -17,7 +18,6 @@
 #include "core/image/codec.h"
 #include "core/image/fill_holes.h"
 #include "core/image/guided_upsample.h"
-#include "core/weights/byte_source.h"
 
 namespace color3d {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/splat/import/read_support.h"
-#include "core/splat/import/unzip.h"
+#include "core/zip/zip.h"
 
 namespace color3d {
 namespace {
@@ -31,8 +31,8 @@ struct Pixels {
 class SogReader {
  public:
   SogReader(std::string_view bytes, const SplatSource& source)
-      : source_(source), zip_(bytes, source.name) {
-    if (!zip_.Has("meta.json")) {
+      : source_(source), archive_(bytes, source.name), zip_(archive_) {
+    if (!zip_.Find("meta.json")) {
       throw InvalidArgument("{} is a zip without meta.json, so no SOG; give a .sog or a 3DGS .ply",
                             source.name);
     }
@@ -206,6 +206,7 @@ class SogReader {
   }
 
   const SplatSource& source_;
+  MemorySource archive_;
   ZipReader zip_;
   json meta_;
 };

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <cmath>
 #include <filesystem>
@@ -11,9 +10,9 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/splat/export/sog/sog.h"
-#include "core/splat/export/sog/zip.h"
 #include "core/splat/export/spz/spz.h"
-#include "core/splat/import/unzip.h"
+#include "core/zip/gzip.h"
+#include "core/zip/zip.h"
 #include "tests/support/scenes/splat_files.h"
 
 namespace color3d {
@@ -42,20 +41,6 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
 
 std::string Header(const std::string& elements) {
   return "ply\nformat binary_little_endian 1.0\n" + elements + "end_header\n";
-}
-
-std::string Gzip(const std::string& plain) {
-  z_stream stream = {};
-  deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
-  std::string packed(plain.size() + 1024, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(plain.data()));
-  stream.avail_in = static_cast<uInt>(plain.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  return packed;
 }
 
 TEST(SplatFileTest, ReadsPlyExactly) {
@@ -187,7 +172,7 @@ TEST(SplatFileTest, DoesNotReadFilesOutsideArchive) {
                              files + R"(},"scales":{"codebook":[0],"files":)" + files +
                              R"(},"quats":{"files":)" + files +
                              R"(},"sh0":{"codebook":[0],"files":)" + files + "}}";
-    EXPECT_THAT(Refusal(StoredZip({{"meta.json", meta}})), HasSubstr("not a plain relative path"));
+    EXPECT_THAT(Refusal(StoredZip({{"meta.json", meta}})), HasSubstr("there is no record"));
   }
 }
 
@@ -222,43 +207,6 @@ TEST(SplatFileTest, NamesFileThatIsNoSplat) {
   EXPECT_THAT(Refusal("\x89PNG...."), HasSubstr("PNG picture"));
   EXPECT_THAT(Refusal("glTF...."), HasSubstr("glTF"));
   EXPECT_THAT(Refusal("some text"), HasSubstr("not a splat"));
-}
-
-TEST(SplatFileTest, RejectsUnsafeZipNamesAndBombs) {
-  const auto refusal = [](const std::string& zip) -> std::string {
-    try {
-      const ZipReader reader(zip, "z");
-      return "";
-    } catch (const Error& e) {
-      EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
-      return e.what();
-    }
-  };
-  for (const char* name : {"../a", "/etc/a", "a\nb", "a\x1b[2J", "a//b", "a\\b"}) {
-    const std::string text = refusal(StoredZip({{name, "content"}}));
-    EXPECT_THAT(text, HasSubstr("not a plain relative path")) << name;
-    EXPECT_EQ(text.find(name), std::string::npos) << "hostile bytes in a message";
-  }
-  EXPECT_THAT(refusal(StoredZip({{"a", "content"}, {"a", "other"}})), HasSubstr("twice"));
-  EXPECT_EQ(refusal(StoredZip({{"folder/a", "content"}, {"b", ""}})), "");
-  // The size of the content, in the directory's entry.
-  std::string bomb = StoredZip({{"a", "content"}});
-  const size_t entry = bomb.find("PK\x01\x02");
-  bomb.replace(entry + 24, 4, std::string("\xff\xff\xff\x7f", 4));
-  EXPECT_THAT(refusal(bomb), HasSubstr("which is impossible"));
-  // The directory says "a" where the entry itself says "b".
-  std::string moved = StoredZip({{"a", "content"}});
-  moved[30] = 'b';
-  EXPECT_THROW(ZipReader(moved, "z").Read("a", 7), Error);
-  EXPECT_THROW(ZipReader(StoredZip({{"a", "x"}}), "z").Read("../a", 7), Error);
-}
-
-TEST(SplatFileTest, ChecksZipEntries) {
-  const std::string zip = StoredZip({{"a", "content"}});
-  EXPECT_EQ(ZipReader(zip, "z").Read("a", 7), "content");
-  EXPECT_THROW(ZipReader(zip, "z").Read("a", 6), Error);
-  EXPECT_THROW(ZipReader(zip, "z").Read("b", 7), Error);
-  EXPECT_THROW(ZipReader(Replaced(zip, "content", "contest"), "z").Read("a", 7), Error);
 }
 
 }  // namespace

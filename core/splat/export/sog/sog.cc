@@ -11,8 +11,8 @@
 #include "core/splat/export/morton.h"
 #include "core/splat/export/sog/codebook.h"
 #include "core/splat/export/sog/lossless_webp.h"
-#include "core/splat/export/sog/zip.h"
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/zip/zip.h"
 
 namespace color3d {
 namespace {

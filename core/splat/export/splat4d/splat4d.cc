@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/little_endian.h"
 #include "core/splat/export/bytes.h"
-#include "core/splat/export/little_endian.h"
 #include "core/splat/export/morton.h"
 #include "core/splat/export/splat4d/held_track.h"
 #include "core/splat/export/splat4d/mover_frames.h"

@@ -1,18 +1,17 @@
 #include "core/splat/export/spz/spz.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/little_endian.h"
 #include "core/splat/export/bytes.h"
-#include "core/splat/export/little_endian.h"
 #include "core/splat/export/morton.h"
 #include "core/splat/export/zstd.h"
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/zip/gzip.h"
 
 namespace color3d {
 namespace {
@@ -158,26 +157,6 @@ std::string Harmonics(const ViewerGaussians& g) {
     }
   }
   return bytes;
-}
-
-std::string Gzip(const std::string& plain) {
-  z_stream stream = {};
-  constexpr int kWindowOfGzip = 15 + 16;
-  if (deflateInit2(
-          &stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, kWindowOfGzip, 8, Z_DEFAULT_STRATEGY) !=
-      Z_OK) {
-    throw Error(ErrorCode::kInternal, "zlib cannot be started");
-  }
-  std::string packed(deflateBound(&stream, plain.size()), '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(plain.data()));
-  stream.avail_in = static_cast<uInt>(plain.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  const int code = deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  if (code != Z_STREAM_END) throw Error(ErrorCode::kInternal, "zlib ended with {}", code);
-  return packed;
 }
 
 // Spatial neighbours are similar and compress better together.
