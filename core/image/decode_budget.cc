@@ -55,20 +55,20 @@ int64_t DecodeBudget::Granted() const {
 }
 
 void DecodeBudget::Acquire(const PictureNeed& need) {
-  std::unique_lock lock(mutex_);
+  const MutexLock lock(mutex_);
   // What others were promised they may have taken already: then less is available, too, and this
   // waits longer than it must, but never takes too much.
-  while (promised_ > 0 && need.bytes > Granted() - promised_) freed_.wait(lock);
+  while (promised_ > 0 && need.bytes > Granted() - promised_) freed_.Wait(mutex_);
   if (promised_ == 0) RequirePictureMemory(need, Granted(), "while it is decoded");
   promised_ += need.bytes;
 }
 
 void DecodeBudget::Release(int64_t bytes) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     promised_ -= bytes;
   }
-  freed_.notify_all();
+  freed_.NotifyAll();
 }
 
 PictureTurn::PictureTurn(const PictureNeed& need, DecodeBudget& budget)
