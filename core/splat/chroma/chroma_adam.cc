@@ -126,7 +126,7 @@ class ChromaTrainer {
     const ColorSpec& color = parameters_.color;
     ThreadPool& pool = run_.pool;
     const ParameterBlock& now = in_time_.At(state_.parameters, view.time_s);
-    pipeline_.Forward(now, color, camera, background, false, pool);
+    pipeline_.Forward({now, color, camera}, background, false, pool);
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
@@ -134,7 +134,8 @@ class ChromaTrainer {
     const LossValue loss =
         loss_.Evaluate(pipeline_.color(), target_ab_, &target->weight, weights, pool, d_color_);
     if (!std::isfinite(loss.total)) return false;
-    pipeline_.Backward(now, color, camera, d_color_, GradientScope::kColorOnly, pool, gradient_);
+    pipeline_.Backward(
+        {now, color, camera}, d_color_, pool, {GradientScope::kColorOnly, gradient_});
     if (!AdamStep(gradient_,
                   LearningRates(),
                   state_.iteration + 1,

@@ -79,7 +79,7 @@ void ChromaSystem::ResetSums(Sums& sums) const {
 }
 
 void ChromaSystem::BinView(const RasterCamera& camera) {
-  ProjectSplats(*at_, color_, false, camera, pool_, splats_);
+  ProjectSplats({*at_, color_, camera}, false, pool_, splats_);
   binner_.Bin(splats_, camera.width, camera.height, pool_, lists_);
 }
 

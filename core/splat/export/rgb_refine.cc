@@ -88,7 +88,7 @@ class Refiner {
     loss.worst_view = 0;
     for (size_t v = 0; v < views_.size(); ++v) {
       run_.cancel.ThrowIfCancelled();
-      pipeline_.Forward(parameters_, color_, cameras_[v], kBlack, false, run_.pool);
+      pipeline_.Forward({parameters_, color_, cameras_[v]}, kBlack, false, run_.pool);
       const double psnr = Psnr(Residual(v));
       loss.mean_psnr_db += psnr / static_cast<double>(views_.size());
       if (psnr < loss.worst_psnr_db) {
@@ -116,15 +116,12 @@ class Refiner {
       }
       for (const size_t v : order) {
         run_.cancel.ThrowIfCancelled();
-        pipeline_.Forward(parameters_, color_, cameras_[v], kBlack, false, run_.pool);
+        pipeline_.Forward({parameters_, color_, cameras_[v]}, kBlack, false, run_.pool);
         if (!std::isfinite(Residual(v))) return false;
-        pipeline_.Backward(parameters_,
-                           color_,
-                           cameras_[v],
+        pipeline_.Backward({parameters_, color_, cameras_[v]},
                            residual_,
-                           GradientScope::kColorOnly,
                            run_.pool,
-                           gradient_);
+                           {GradientScope::kColorOnly, gradient_});
         const double done = static_cast<double>(step) / static_cast<double>(total);
         if (!AdamStep(gradient_, Rates(done), ++step, run_.pool, parameters_, moments))
           return false;

@@ -167,7 +167,7 @@ class GeometryTrainer {
     const RasterCamera camera = CameraAt(view, level);
     const ColorSpec color = Colors();
     const ParameterBlock& now = At(view, schedule_.HiddenTime(state_.iteration, times_.Interval()));
-    pipeline_.Forward(now, color, camera, kBackground, false, run_.pool, DroppingNow());
+    pipeline_.Forward({now, color, camera}, kBackground, false, run_.pool, DroppingNow());
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
@@ -187,14 +187,10 @@ class GeometryTrainer {
                   state_.exposures[drawn]);
       Recenter(state_.exposures);
     }
-    pipeline_.Backward(now,
-                       color,
-                       camera,
+    pipeline_.Backward({now, color, camera},
                        d_color_,
-                       GradientScope::kAll,
                        run_.pool,
-                       gradient_,
-                       &state_.statistics);
+                       {GradientScope::kAll, gradient_, &state_.statistics});
     if (!Update(view)) return false;
     state_.mean_error += (state_.mean_error == 0.0 ? 1.0 : 0.02) * (loss.l1 - state_.mean_error);
     return true;
@@ -376,7 +372,7 @@ class GeometryTrainer {
     const double each = 1.0 / static_cast<double>(views.size());
     for (const PosedCamera& view : views) {
       const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, 0);
-      pipeline_.Forward(At(view), Colors(), CameraAt(view, 0), kBackground, false, run_.pool);
+      pipeline_.Forward({At(view), Colors(), CameraAt(view, 0)}, kBackground, false, run_.pool);
       PlaneBuffer drawn = pipeline_.color();
       const PictureQuality quality =
           CompareClamped(*target, MaskOf(view, 0).get(), loss_, run_.pool, drawn);

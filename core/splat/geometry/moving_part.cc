@@ -57,9 +57,7 @@ std::vector<SurveyedView> SurveyedViews(const GeometryProblem& problem,
     SurveyedView view;
     view.posed = posed;
     view.posed.camera = posed.camera.Scaled(picture->width, picture->height);
-    pipeline.Forward(still,
-                     color,
-                     MakeRasterCamera(view.posed.camera, posed.cam_from_world),
+    pipeline.Forward({still, color, MakeRasterCamera(view.posed.camera, posed.cam_from_world)},
                      kBackground,
                      true,
                      pool);
@@ -180,7 +178,7 @@ void ComposeAt(const ParameterBlock& still,
       std::copy_n(moving.parameters.Row(row), moving.parameters.count(), at.Row(row) + first);
     }
   });
-  ApplyMotion(moving.parameters, still.rows(), t, first, pool, at, hidden);
+  ApplyMotion({moving.parameters, still.rows(), t, first}, pool, at, hidden);
 }
 
 void DecomposeGradient(const ParameterBlock& still,
@@ -191,7 +189,7 @@ void DecomposeGradient(const ParameterBlock& still,
                        ParameterBlock& gradient,
                        ParameterBlock& moving_gradient) {
   ApplyMotionBackward(
-      moving.parameters, still.rows(), t, still.count(), at, gradient, pool, moving_gradient);
+      {moving.parameters, still.rows(), t, still.count()}, at, gradient, pool, moving_gradient);
   gradient.Resize(still.count());
 }
 

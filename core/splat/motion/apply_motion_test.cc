@@ -60,7 +60,7 @@ class ApplyMotionTest : public InstructionSetTest<int> {  // of thread counts
     for (int r = 0; r < kRows; ++r) {
       for (int64_t i = 0; i < kMoving; ++i) at.Row(r)[kStill + i] = moving_.Row(r)[i];
     }
-    ApplyMotion(moving_, kRows, t, kStill, pool_, at);
+    ApplyMotion({moving_, kRows, t, kStill}, pool_, at);
     return at;
   }
 
@@ -83,7 +83,7 @@ TEST_P(ApplyMotionTest, GradientAgreesWithFloat64Reference) {
   const ParameterBlock d_at = RandomRows(kRows, kStill + kMoving, 7);
   for (const float t : {-0.7f, 0.4f}) {
     ParameterBlock gradient;
-    ApplyMotionBackward(moving_, kRows, t, kStill, At(t), d_at, pool_, gradient);
+    ApplyMotionBackward({moving_, kRows, t, kStill}, At(t), d_at, pool_, gradient);
     for (int64_t i = 0; i < kMoving; ++i) {
       const std::vector<double> d = Column(d_at, kStill + i), parameters = Column(moving_, i);
       const auto value = [&](const std::vector<double>& p) {
@@ -112,7 +112,7 @@ TEST_P(ApplyMotionTest, IsInvisibleFarFromItsTime) {
   }
   const ParameterBlock at = At(1.0f);
   ParameterBlock d_at(kRows, kStill + kMoving), gradient;
-  ApplyMotionBackward(moving_, kRows, 1.0f, kStill, at, d_at, pool_, gradient);
+  ApplyMotionBackward({moving_, kRows, 1.0f, kStill}, at, d_at, pool_, gradient);
   for (int64_t i = 0; i < kMoving; ++i) {
     EXPECT_LT(at.Row(kOpacityRow)[kStill + i], -9.0f);
     for (int r = 0; r < gradient.rows(); ++r) EXPECT_EQ(gradient.Row(r)[i], 0.0f);
@@ -122,7 +122,7 @@ TEST_P(ApplyMotionTest, IsInvisibleFarFromItsTime) {
 TEST_P(ApplyMotionTest, HidesGaussiansOfOneTime) {
   constexpr float kMoment = 0.2f, kHidden = 0.4f;
   ParameterBlock at = RandomRows(kRows, kStill + kMoving, 3);
-  ApplyMotion(moving_, kRows, kMoment, kStill, pool_, at, kHidden);
+  ApplyMotion({moving_, kRows, kMoment, kStill}, pool_, at, kHidden);
   int hidden = 0;
   for (int64_t i = 0; i < kMoving; ++i) {
     const bool near = std::abs(kMoment - moving_.Row(kRows + kCenterRow)[i]) < kHidden;

@@ -56,7 +56,7 @@ ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPoo
   ParameterBlock at = ParametersFromModel(model);
   if (model.motion.size() > 0) {
     const auto still = static_cast<int64_t>(model.size() - model.motion.size());
-    ApplyMotion(MotionFromModel(model), 0, model.motion.UnitTime(time_s), still, pool, at);
+    ApplyMotion({MotionFromModel(model), 0, model.motion.UnitTime(time_s), still}, pool, at);
   }
   return at;
 }
