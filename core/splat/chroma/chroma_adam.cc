@@ -59,7 +59,7 @@ class ChromaTrainer {
       Report();
       if (run_.checkpoints.WantsSave()) {
         CheckpointWriter writer(Fingerprint());
-        WriteState(state_, writer);
+        VisitState(writer, state_);
         run_.checkpoints.Save(std::move(writer).Finish());
       }
     }
@@ -84,7 +84,7 @@ class ChromaTrainer {
     if (!saved) return;
     CheckpointReader reader(*saved, Fingerprint());
     TrainingState read;
-    if (reader.ok()) ReadState(reader, read);
+    if (reader.ok()) VisitState(reader, read);
     if (reader.ok()) {
       state_ = std::move(read);
     } else {

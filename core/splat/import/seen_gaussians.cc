@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
+#include "core/base/evenly.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/raster/raster_constants.h"
@@ -55,10 +57,7 @@ std::vector<size_t> SpreadSample(const GaussianModel& model, size_t count) {
   for (size_t i = 0; i < model.size(); ++i) {
     if (model.opacity_logit[i] > kLeastLogit) drawn.push_back(i);
   }
-  if (drawn.size() <= count) return drawn;
-  std::vector<size_t> sample(count);
-  for (size_t i = 0; i < count; ++i) sample[i] = drawn[i * drawn.size() / count];
-  return sample;
+  return EvenlyOf(std::move(drawn), count);
 }
 
 SeenGaussians::SeenGaussians(const GaussianModel& model, const Camera& picture, ThreadPool& pool)
