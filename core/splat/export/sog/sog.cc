@@ -134,7 +134,7 @@ class SogWriter {
     meta_["sh0"] = {{"codebook", ShortNumbers(codebook)}, {"files", {"sh0.webp"}}};
     AddTexture("sh0.webp", [&](size_t i, uint8_t* out) {
       for (int c = 0; c < 3; ++c) out[c] = codebook.Nearest(Sh(i)[c]);
-      out[3] = OpacityByte(g_.opacity_logit[i]);
+      out[3] = Byte(255.0f * (1.0f / (1.0f + std::exp(-g_.opacity_logit[i]))));
     });
   }
 
