@@ -17,7 +17,7 @@ namespace {
 constexpr size_t kMaxHeaderBytes = 1 << 16;
 
 template <class Number>
-float Read(const char* from) {
+float ReadNumber(const char* from) {
   Number number;
   std::memcpy(&number, from, sizeof(number));
   return static_cast<float>(number);
@@ -29,7 +29,7 @@ struct Type {
 };
 
 template <class Number>
-constexpr Type kType{sizeof(Number), Read<Number>};
+constexpr Type kType{sizeof(Number), ReadNumber<Number>};
 
 // Returns nullptr for an unknown type.
 const Type* FindType(const std::string& name) {
@@ -199,7 +199,7 @@ class PlyReader {
   bool Has(const std::string& name) const { return header_.properties.contains(name); }
   bool HasBytesOfColor() const {
     const auto red = header_.properties.find("red");
-    return red != header_.properties.end() && red->second.type->read == Read<uint8_t> &&
+    return red != header_.properties.end() && red->second.type->read == ReadNumber<uint8_t> &&
            Has("green") && Has("blue");
   }
 
