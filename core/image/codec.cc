@@ -307,7 +307,7 @@ bool IsGray(const Image& srgb, float tolerance) {
 
 namespace {
 
-// Behind the header, which is a PNG's first chunk and 33 bytes long with the signature.
+// Inserts the chunk after the header, the first chunk, which ends at byte 33.
 std::string WithSrgbChunk(const std::string& png) {
   constexpr size_t kHeaderEnd = 33;
   // Length 1, type, relative to white as photographs are, checksum.
@@ -315,7 +315,7 @@ std::string WithSrgbChunk(const std::string& png) {
   return std::string(png).insert(kHeaderEnd, chunk);
 }
 
-// Behind the JFIF segment, which has to be the first.
+// Inserts the profile after the JFIF segment, which must be the first.
 std::string WithProfile(const std::string& jpeg, const std::string& profile) {
   const size_t first =
       4 + static_cast<unsigned char>(jpeg[4]) * 256u + static_cast<unsigned char>(jpeg[5]);

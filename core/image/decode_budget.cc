@@ -11,9 +11,9 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kMiB = int64_t{1} << 20;
-// Pictures up to this take so little that asking would cost more.
+// Smaller pictures are not counted: measuring the available memory would cost more.
 constexpr int64_t kUncountedBytes = 16 * kMiB;
-// Of what is available; the rest is for what grows meanwhile.
+// Share of the available memory; the rest is for other growth.
 constexpr double kShare = 0.9;
 
 // Codecs give grey with alpha as four channels.
@@ -56,8 +56,8 @@ int64_t DecodeBudget::Granted() const {
 
 void DecodeBudget::Acquire(const PictureNeed& need) {
   const MutexLock lock(mutex_);
-  // What others were promised they may have taken already: then less is available, too, and this
-  // waits longer than it must, but never takes too much.
+  // Promised memory that is already in use is subtracted twice: this may wait too long but never
+  // takes too much.
   while (promised_ > 0 && need.bytes > Granted() - promised_) freed_.Wait(mutex_);
   if (promised_ == 0) RequirePictureMemory(need, Granted(), "while it is decoded");
   promised_ += need.bytes;

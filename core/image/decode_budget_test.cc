@@ -82,7 +82,6 @@ TEST(DecodingBytes, CountsCodecMemory) {
   EXPECT_EQ(DecodingBytes(info, false), 24'000'000);
 }
 
-// What Resize makes of the whole picture.
 TEST(AreaReducer, AveragesLikeResize) {
   Random random(3);
   for (const auto& [width, height] : {std::pair{31, 17}, {20, 40}, {64, 64}, {65, 3}}) {

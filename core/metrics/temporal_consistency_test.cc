@@ -31,7 +31,7 @@ Image Luminance(int frame, double step_px) {
   return image;
 }
 
-// Colours that go with it, or stay where they are.
+// Colours that move by `color_step_px` per frame.
 Image Lab(int frame, double step_px, double color_step_px, double flicker) {
   Image ab(kWidth, kHeight, 2);
   for (int y = 0; y < kHeight; ++y) {

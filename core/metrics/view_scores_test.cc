@@ -51,7 +51,7 @@ TEST(ScoreView, ReducesLargePicturesToTheCommonSize) {
   EXPECT_GT(small.at("delta_e00_chroma"), 1.0);
 }
 
-// The scores of a half are those of the cropped pictures, whatever the other half shows.
+// The scores of a masked picture equal those of its cropped half.
 TEST(ScoreView, CountsUnmaskedPixelsOnly) {
   const Image truth = Stripes(96, 0.0f), drawn = LabFromSrgb(Stripes(96, 0.1f));
   Image mask(96, 72, 1), spoilt = drawn;

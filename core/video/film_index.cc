@@ -221,7 +221,7 @@ void NumberFrames(FilmIndex* index) {
                                     stamps.begin());
     if (packet.is_key) {
       index->keys.push_back(static_cast<int>(i));
-      latest = -1;  // what comes before it says nothing of what is behind it
+      latest = -1;  // earlier packets do not affect later ones
     }
     packet.is_leading =
         !index->keys.empty() && packet.stamp < index->packets[index->keys.back()].stamp;

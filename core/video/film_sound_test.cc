@@ -26,7 +26,7 @@ double Beeps(double time_s) {
   return 0.6 * std::sin(2.0 * M_PI * (400.0 + 200.0 * second) * time_s);
 }
 
-// Where it grows loud after silence, s.
+// Times at which sound follows silence, s.
 std::vector<double> Onsets(const HeardSound& sound) {
   const int window = sound.sample_rate / 200;
   std::vector<double> onsets;

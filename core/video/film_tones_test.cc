@@ -28,7 +28,7 @@ struct Fit {
   double slope = 0.0, offset = 0.0;
 };
 
-// Of the first frame's tones over those of a wedge from 0 to 1.
+// Fits the first frame's tones to those of a wedge from 0 to 1.
 Fit FitTones(const Image& image) {
   const int n = image.width;
   double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;

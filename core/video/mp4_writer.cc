@@ -33,7 +33,7 @@ struct CloseMovie {
   }
 };
 
-// `result`: what FFmpeg returned, < 0.
+// `result`: return value of FFmpeg, < 0.
 [[noreturn]] void Fail(const fs::path& path, const char* what, int result) {
   const std::string words = LibavError(result);
   if (result == AVERROR(ENOSPC) || result == AVERROR(EDQUOT) || result == AVERROR(EFBIG)) {

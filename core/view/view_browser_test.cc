@@ -159,7 +159,7 @@ TEST_P(BrowserFormatTest, ShowsColorGrayAndProvenance) {
     EXPECT_NEAR(gray[1], gray[2], 2);
     EXPECT_GT(gray[1], 40);
   }
-  // Greens for what was seen, reds for what was guessed; each Gaussian has kept its own.
+  // Seen colours are green, guessed ones red, per Gaussian.
   const auto seen = Seen(looked, "where_from", "left");
   const auto guessed = Seen(looked, "where_from", "right");
   EXPECT_GT(seen[1], seen[0] + 15);

@@ -113,7 +113,7 @@ TEST(TorchArchiveTest, ReadsTensorsThatShareStorage) {
 }
 
 TEST(TorchArchiveTest, RunsNoCode) {
-  // os.system("true"), and the same behind the other way to name a class.
+  // os.system("true"), and the same with the other instruction that names a class.
   PickleWriter direct;
   direct.Global("os", "system").Text("true").Op('\x85').Op('R');
   EXPECT_THAT(RefusalOf(Archive(direct.Finish())), HasSubstr("\"os.system\""));

@@ -26,8 +26,8 @@ namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 
-// What `attempt` gives in a process of its own that is locked in: its errno, 0 for success, 255
-// when the process came to another end.
+// Runs `attempt` in a sandboxed process. Returns its errno, 0 for success, or 255 if the process
+// ended otherwise.
 int InSandbox(const SandboxRules& rules, const std::function<bool()>& attempt) {
   const Sandbox sandbox(rules);
   const pid_t child = ::fork();
@@ -49,7 +49,7 @@ bool CanOpen(const fs::path& path, int flags) {
 
 bool CanMakeSocket(int family) { return ::socket(family, SOCK_STREAM, 0) >= 0; }
 
-// Connects to a port of ours that listens.
+// Connects to a listening port of this process.
 bool CanConnect(uint16_t port) {
   const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};

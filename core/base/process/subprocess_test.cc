@@ -41,7 +41,7 @@ TEST(Subprocess, ReportsExitCodeLogTimeoutAndCancellation) {
   }
 }
 
-// What a shell program comes to under these limits.
+// Runs a shell script under these limits.
 SubprocessResult RunShell(const std::string& script,
                           const ProcessLimits& limits,
                           const std::filesystem::path& log) {

@@ -162,7 +162,7 @@ TEST(ForeignFormats, CmykIsRejectedWithRemedy) {
   EXPECT_THAT(Refusal(cmyk, "print.jpg"), HasSubstr("print.jpg is in CMYK"));
 }
 
-// OpenCV, with GDAL and GDCM behind it, would look for a decoder by itself.
+// OpenCV would choose among its decoders, GDAL and GDCM included.
 TEST(ForeignFormats, FilesWithReferencesReachNoDecoder) {
   const ScratchFolder folder;
   const std::string secret = (folder.path() / "secret.png").string();

@@ -14,7 +14,7 @@
 namespace color3d {
 namespace {
 
-// Half a step more than what rounding to 8 bits changes.
+// Rounding to 8 bits and half a step.
 constexpr float kSame = 1.5f / 255.0f;
 constexpr int kIntent = INTENT_RELATIVE_COLORIMETRIC;
 constexpr cmsUInt32Number kKeepBlack = cmsFLAGS_BLACKPOINTCOMPENSATION;
@@ -44,7 +44,7 @@ bool IsGray(const ColorTag& tag) {
   return !tag.profile.empty() && std::string_view(tag.profile).substr(16, 4) == "GRAY";
 }
 
-// Of what a file says by numbers.
+// Profile of the chromaticities and the gamma in a file.
 Profile ProfileOfNumbers(const ColorTag& tag) {
   const Chromaticities c =
       tag.primaries.value_or(Chromaticities{0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06});
@@ -73,7 +73,7 @@ Profile OpenProfile(const ColorTag& tag, std::string* problem) {
     *problem = "its colour profile is damaged";
     return nullptr;
   }
-  // Asked of the bytes: what Little CMS answers is an enum, which a damaged profile is not in.
+  // Read from the bytes, because Little CMS returns an enum that cannot hold a damaged value.
   const std::string_view bytes = tag.profile;
   const std::string_view kind = bytes.substr(12, 4), space = bytes.substr(16, 4);
   const bool is_device = kind == "scnr" || kind == "mntr" || kind == "prtr" || kind == "spac";
@@ -86,7 +86,7 @@ Profile OpenProfile(const ColorTag& tag, std::string* problem) {
 
 float Clamped(float v) { return v > 0.0f ? std::min(v, 1.0f) : 0.0f; }  // NaN: 0
 
-// What the grey i / (count - 1) becomes, for all i; empty when the profile cannot be followed.
+// Converted values of the greys i / (count - 1); empty if the profile cannot be used.
 std::vector<float> ToneTable(const Profile& profile, bool gray, size_t count) {
   const Profile target(gray ? SrgbGray() : Profile(cmsCreate_sRGBProfile()));
   const cmsUInt32Number format = gray ? TYPE_GRAY_FLT : TYPE_RGB_FLT;
@@ -136,8 +136,8 @@ bool AreNear(const std::vector<float>& x, const std::vector<float>& y, float dif
   });
 }
 
-// What most profiles are, three curves and a matrix, worked out by tables: as exact as Little CMS's
-// floats, and nine times as quick.
+// Three curves and a matrix, the kind of most profiles, evaluated with tables: as exact as Little
+// CMS's floats, and nine times as fast.
 class MatrixShaper {
  public:
   // Null for other profiles, and for those that this does not follow to 1e-4.

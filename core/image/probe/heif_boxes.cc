@@ -48,7 +48,7 @@ std::vector<Box> ListBoxes(const ProbeContext& context, std::string_view bytes, 
   size_t at = 0;
   while (at < bytes.size() && boxes.size() < kMaxEntries) {
     if (!reader.Has(at, 8)) {
-      if (is_file && !boxes.empty()) break;  // some bytes behind the last one
+      if (is_file && !boxes.empty()) break;  // a few trailing bytes
       throw context.Truncated("it ends inside a box");
     }
     uint64_t size = reader.U32(at);

@@ -190,7 +190,7 @@ TEST(Probe, RejectsBombsByHeader) {
   limits.max_pixels = 300;
   const std::string small = EncodePng8(Noise(23, 17, 1));
   EXPECT_THAT(Refusal([&] { ProbeImage(small, "a.png", limits); }), HasSubstr("23 x 17"));
-  // A right header with hardly any data behind it.
+  // A valid header with hardly any data after it.
   const std::string iend("\0\0\0\0IEND\xAE\x42\x60\x82", 12);
   EXPECT_THAT(Refusal([&] { ProbeImage(PngClaiming(10000, 10000) + iend, "thin.png"); }),
               HasSubstr("holds no image data"));

@@ -149,8 +149,8 @@ TEST(FitChromaTest, MemoryBudgetDoesNotChangeBytes) {
   }
 }
 
-// However many views there are, what is kept of them is within the budgets; the rest is asked for
-// again, by each pass.
+// The caches stay within their budgets for any number of views; each pass requests the other
+// targets again.
 TEST(FitChromaTest, CacheSizeIsIndependentOfViewCount) {
   const GaussianModel geometry = RandomGaussians(60, 4);
   constexpr int64_t kBudget = 150'000, kTargetBudget = 40'000;

@@ -176,7 +176,7 @@ class GeometryTrainer {
     const bool exposed = !state_.exposures.empty();
     if (exposed) Expose(state_.exposures[drawn], pipeline_.color(), run_.pool, exposed_);
     const LossValue loss =
-        Compare(exposed ? exposed_ : pipeline_.color(), target, LearntFrom(view, level), weights);
+        Compare(exposed ? exposed_ : pipeline_.color(), target, TrainingMask(view, level), weights);
     if (!std::isfinite(loss.total)) return false;
     if (exposed) {
       FitExposure(pipeline_.color(),
@@ -202,7 +202,7 @@ class GeometryTrainer {
   }
 
   // The training mask: until motion has been searched for, moving pixels are excluded.
-  std::shared_ptr<const PlaneBuffer> LearntFrom(const PosedCamera& view, int level) {
+  std::shared_ptr<const PlaneBuffer> TrainingMask(const PosedCamera& view, int level) {
     const std::shared_ptr<const PlaneBuffer> mask = MaskOf(view, level);
     if (!problem_.still || !MayMove() || fraction_ >= kSurveyAt) return mask;
     const std::shared_ptr<const PlaneBuffer> still = still_.Get(view, level);
@@ -222,7 +222,7 @@ class GeometryTrainer {
       return loss_.Evaluate(drawn, *target, nullptr, weights, run_.pool, d_color_);
     }
     masked_target_ = *target;
-    TakeWhereMasked(*mask, drawn, masked_target_);
+    CopyWhereMasked(*mask, drawn, masked_target_);
     const LossValue loss =
         loss_.Evaluate(drawn, masked_target_, mask.get(), weights, run_.pool, d_color_);
     ClearWhereMasked(*mask, d_color_);

@@ -30,7 +30,7 @@ double CountingShare(const PlaneBuffer* mask) {
 
 }  // namespace
 
-void TakeWhereMasked(const PlaneBuffer& mask, const PlaneBuffer& other, PlaneBuffer& planes) {
+void CopyWhereMasked(const PlaneBuffer& mask, const PlaneBuffer& other, PlaneBuffer& planes) {
   ForMasked(mask, planes.channels, [&](int c, int y, int x) {
     planes.Row(c, y)[x] = other.Row(c, y)[x];
   });
@@ -45,7 +45,7 @@ PictureQuality CompareClamped(const PlaneBuffer& truth,
                               ImageLoss& loss,
                               ThreadPool& pool,
                               PlaneBuffer& drawn) {
-  if (mask != nullptr) TakeWhereMasked(*mask, truth, drawn);
+  if (mask != nullptr) CopyWhereMasked(*mask, truth, drawn);
   double squares = 0.0;
   for (int c = 0; c < drawn.channels; ++c) {
     for (int y = 0; y < drawn.height; ++y) {

@@ -16,19 +16,19 @@ constexpr int kRadiusPx = 2;
 constexpr double kDeviations = 5.0;
 constexpr double kLeastResidual = 0.03;
 constexpr size_t kMedianFrames = 31;  // at most, evenly over time
-constexpr size_t kFewestFrames = 5;   // that say what stands still
-constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
-constexpr double kConfirmed = 0.1;    // of what was seen to move, by residuals, at least
+constexpr size_t kFewestFrames = 5;   // for a median over time
+constexpr int kSpeckPixels = 6;       // minimum of moving pixels among 3x3
+constexpr double kConfirmed = 0.1;    // minimum share of known moving pixels with high residuals
 // Maximum shares of such pixels in static scenes: with a median over time or known moving regions,
 // and with neither, where badly drawn regions look like motion.
 constexpr double kStillShare = 0.002;
 constexpr double kStillShareAlone = 0.005;
-constexpr size_t kNoiseStep = 7;  // every so many pixels tell the scene's deviation
+constexpr size_t kNoiseStep = 7;  // every 7th pixel is sampled for the standard deviation
 
-using Stand = std::tuple<double, double, double, double, double, double, double, int, int>;
+using StaticCamera = std::tuple<double, double, double, double, double, double, double, int, int>;
 
 // Views with equal pose and size belong to a static camera.
-Stand StandOf(const PosedCamera& p) {
+StaticCamera StaticCameraOf(const PosedCamera& p) {
   const Eigen::Quaterniond& q = p.cam_from_world.rotation;
   const Eigen::Vector3d& t = p.cam_from_world.translation;
   return {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z(), p.camera.width, p.camera.height};
@@ -41,9 +41,9 @@ Image ResidualOf(const SurveyedView& view) {
 }
 
 // Subtracts the median over time, pixel by pixel.
-void RemoveStanding(const std::vector<size_t>& frames,
-                    ThreadPool& pool,
-                    std::vector<Image>& residuals) {
+void SubtractMedianOverTime(const std::vector<size_t>& frames,
+                            ThreadPool& pool,
+                            std::vector<Image>& residuals) {
   const std::vector<size_t> some = EvenlyOf(frames, kMedianFrames);
   const auto pixels = static_cast<int64_t>(residuals[frames.front()].data.size());
   pool.ForRanges(pixels, [&](int64_t begin, int64_t end, int) {
@@ -79,7 +79,7 @@ Image MaskOf(const Image& residual, double threshold) {
 }
 
 // Pixels where motion was detected before training.
-void AddSeenMoving(SurveyedView& view) {
+void AddKnownMotion(SurveyedView& view) {
   for (size_t i = 0; i < view.still.data.size(); ++i) {
     if (view.still.data[i] == 0.0f) view.moving.data[i] = 1.0f;
   }
@@ -87,7 +87,7 @@ void AddSeenMoving(SurveyedView& view) {
 
 // Returns true if the previously detected moving pixels have high residuals; otherwise they are
 // static.
-bool SeenIsConfirmed(const std::vector<SurveyedView>& views) {
+bool KnownMotionIsConfirmed(const std::vector<SurveyedView>& views) {
   double seen = 0.0, confirmed = 0.0;
   for (const SurveyedView& view : views) {
     for (size_t i = 0; i < view.still.data.size(); ++i) {
@@ -116,13 +116,13 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
   std::vector<Image> residuals(views.size());
   pool.ForEach(static_cast<int64_t>(views.size()),
                [&](int64_t i, int) { residuals[i] = ResidualOf(views[i]); });
-  std::map<Stand, std::vector<size_t>> stands;
-  for (size_t i = 0; i < views.size(); ++i) stands[StandOf(views[i].posed)].push_back(i);
+  std::map<StaticCamera, std::vector<size_t>> cameras;
+  for (size_t i = 0; i < views.size(); ++i) cameras[StaticCameraOf(views[i].posed)].push_back(i);
   bool has_median = false;
-  for (const auto& [stand, frames] : stands) {
+  for (const auto& [camera, frames] : cameras) {
     if (frames.size() < kFewestFrames) continue;
     has_median = true;
-    RemoveStanding(frames, pool, residuals);
+    SubtractMedianOverTime(frames, pool, residuals);
   }
   survey.threshold = std::max(kLeastResidual, kDeviations * DeviationOf(residuals));
   double residual = 0.0, moving = 0.0, pixels = 0.0;
@@ -131,10 +131,10 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
                                : MaskOf(residuals[i], survey.threshold);
     residual += Sum(views[i].moving);
   }
-  const bool seen = !one_time && SeenIsConfirmed(views);
+  const bool seen = !one_time && KnownMotionIsConfirmed(views);
   survey.least_share = has_median || seen ? kStillShare : kStillShareAlone;
   for (SurveyedView& view : views) {
-    if (seen) AddSeenMoving(view);
+    if (seen) AddKnownMotion(view);
     moving += Sum(view.moving);
     pixels += static_cast<double>(view.moving.data.size());
   }

@@ -94,7 +94,7 @@ TEST(MotionSurveyTest, FindsNothingInWellDrawnOrSingleTime) {
   EXPECT_EQ(SurveyMotion(pool, moment).moving_share, 0.0);
 }
 
-// What a camera that stands still always shows stands still, however badly it is drawn.
+// For a static camera a constant residual is a badly drawn static region.
 TEST(MotionSurveyTest, ConstantResidualIsNotMotion) {
   ThreadPool pool(2);
   std::vector<SurveyedView> views = Rig(7, false);
@@ -129,7 +129,7 @@ TEST(MotionSurveyTest, KnownMotionDrawnWellIsStatic) {
   EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
-// One camera that moves has no median over time: what it draws badly looks like what moves.
+// A moving camera has no median over time: badly drawn regions look like motion.
 TEST(MotionSurveyTest, MovingCameraNeedsMoreEvidence) {
   ThreadPool pool(2);
   std::vector<SurveyedView> moving;
@@ -209,7 +209,7 @@ TEST(BlocksOfTimeTest, BlocksAreBoundedAndKeepTimesWhole) {
                         Case{1, 400, 4, 100},
                         Case{4, 100, 4, 100},
                         Case{1, 12'800, 100, 128},
-                        Case{20, 50, 2, 500},  // 24 times tell what stands still
+                        Case{20, 50, 2, 500},  // at least 24 times a block
                         Case{30, 12, 1, 360}}) {
     const auto blocks = BlocksOfTime(PosedRig(c.cameras, c.times));
     EXPECT_EQ(blocks.size(), c.blocks);
@@ -230,7 +230,7 @@ TEST(BlocksOfTimeTest, BlocksAreBoundedAndKeepTimesWhole) {
   }
 }
 
-// A long film is surveyed block by block: what moves is seeded in all of them.
+// A long film is surveyed in blocks of time; each has seeds.
 TEST(FindMovingPartTest, LongFilmHasMoversAtAllTimes) {
   constexpr int kFrames = 300, kMost = 3000;
   GeometryProblem problem;

@@ -14,8 +14,8 @@
 namespace color3d {
 namespace {
 
-constexpr int kSmallSidePx = 96;       // of the pictures that tell what hides what
-constexpr size_t kMaxSample = 50'000;  // Gaussians that are looked for
+constexpr int kSmallSidePx = 96;       // of the depth pictures for occlusion
+constexpr size_t kMaxSample = 50'000;  // Gaussians tested for visibility
 constexpr float kLeastLogit = -1.5f;   // fainter ones do not count
 constexpr double kDepthTolerance = 0.04;
 constexpr double kNearShare = 0.15;  // of the focus

@@ -125,13 +125,13 @@ class SogReader {
     }
     ViewerGaussians g = EmptyGaussians(count, degree);
     if (count == 0) return g;
-    ReadPlaces(&g);
+    ReadPositions(&g);
     ReadShapes(&g);
     if (degree > 0) ReadHarmonics(&g);
     return g;
   }
 
-  void ReadPlaces(ViewerGaussians* g) const {
+  void ReadPositions(ViewerGaussians* g) const {
     const std::vector<double> low = Bounds("mins"), high = Bounds("maxs");
     const Pixels lower = Picture("means", 0, g->size()), upper = Picture("means", 1, g->size());
     for (size_t i = 0; i < g->size(); ++i) {

@@ -84,7 +84,7 @@ TEST(SplatSceneTest, IsDeterministic) {
 }
 
 TEST(SplatSceneTest, ViewsWallFromMoreVisibleSide) {
-  // A wall of small things in front of a curtain that hides them from behind.
+  // A wall of small Gaussians in front of a curtain that hides them from behind.
   ViewerGaussians g = BallOnGround(2000);
   for (size_t i = 0; i < g.size(); ++i) {
     const bool curtain = i % 20 == 0;

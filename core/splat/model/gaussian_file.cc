@@ -17,7 +17,7 @@ constexpr char kMagic[8] = {'C', '3', 'D', 'G', 'A', 'U', 'S', 'S'};
 constexpr uint32_t kPlainVersion = 1;
 constexpr uint32_t kConfidenceVersion = 2;  // confidence is the last buffer
 constexpr uint32_t kMotionVersion = 3;      // a MotionHeader follows the header, motion is the last
-constexpr size_t kDigestBytes = 64;         // hexadecimal SHA-256 of all that stands before it
+constexpr size_t kDigestBytes = 64;         // hexadecimal SHA-256 of all bytes before it
 
 struct Header {
   char magic[8];

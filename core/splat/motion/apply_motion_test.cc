@@ -48,7 +48,7 @@ class ApplyMotionTest : public InstructionSetTest<int> {  // of thread counts
  protected:
   ApplyMotionTest() {
     for (int64_t i = 0; i < kMoving; ++i) {
-      // Seen at all of the moments that are asked for.
+      // Visible at all tested times.
       moving_.Row(kRows + kLogWidthRow)[i] = 0.2f * moving_.Row(kRows + kLogWidthRow)[i];
       moving_.Row(kRows + kCenterRow)[i] = 0.5f * moving_.Row(kRows + kCenterRow)[i];
     }

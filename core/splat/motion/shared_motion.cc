@@ -15,12 +15,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Of GaussianMotion. Steps are counted from it: with an even number of them none lies at 0.
+// Of GaussianMotion's t. Time steps are counted from it; with an even number of them none is at 0.
 constexpr double kFirstTime = -1.0;
 constexpr size_t kFewest = 4;           // neighbours, the Gaussian itself among them
 constexpr double kOfAnotherStep = 0.5;  // weight
-constexpr double kLeastWeight = 1e-6;   // so that what nobody sees moves along
-constexpr double kStiffness = 0.01;     // of turning, against neighbours in one line
+constexpr double kLeastWeight = 1e-6;   // for Gaussians that no view sees
+constexpr double kStiffness = 0.01;     // of the rotation, for neighbours in one line
 
 Vector3d Rows(const ParameterBlock& block, int row, int64_t i) {
   return {block.Row(row)[i], block.Row(row + 1)[i], block.Row(row + 2)[i]};
@@ -67,7 +67,7 @@ RigidMotion Fit(const std::vector<Neighbor>& neighbors) {
 }
 
 // Weights down neighbours with a different motion: another object's, or a wrong one.
-void Distrust(const RigidMotion& motion, std::vector<Neighbor>* neighbors) {
+void DownweightOutliers(const RigidMotion& motion, std::vector<Neighbor>* neighbors) {
   std::vector<double> off;
   for (const Neighbor& n : *neighbors) off.push_back((n.velocity - motion.At(n.position)).norm());
   std::vector<double> sorted = off;
@@ -143,7 +143,7 @@ void ShareMotion(const SharedMotionOptions& options, ThreadPool& pool, Parameter
         neighbors.clear();
         for (const NeighborTree::Neighbor& n : nearest) neighbors.push_back(all[n.index]);
         const Vector3d acceleration = MeanAcceleration(neighbors);
-        Distrust(Fit(neighbors), &neighbors);
+        DownweightOutliers(Fit(neighbors), &neighbors);
         const Vector3d velocity = Fit(neighbors).At(all[m].position);
         const int64_t i = members[m];
         MoveTowards(velocity, options.share, options.row + kVelocityRow, i, moving);

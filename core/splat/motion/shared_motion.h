@@ -1,5 +1,5 @@
-// Motion that neighbours share: in the small, things move rigidly (DYNAMIC.md "Motion").
-// Internal to the splat module. Deterministic whatever the thread count.
+// Locally rigid motion: neighbours share their motion (DYNAMIC.md "Motion").
+// Internal to the splat module. Deterministic for every thread count.
 #pragma once
 
 #include "core/base/parallel.h"
@@ -14,11 +14,10 @@ struct SharedMotionOptions {
   double share = 0.05;    // 0: each keeps its own motion, 1: it has that of its neighbours
 };
 
-// Takes the velocity of each Gaussian that share of the way to u + w x (p - c): the rigid motion
-// that fits its nearest neighbours best, each where it is and as it moves at the Gaussian's time
-// step, weighted with their opacity (half of it from another step) and with how well they agree.
-// Acceleration goes to the neighbours' mean likewise. Gaussians with fewer than four neighbours
-// keep their own.
+// Moves the velocity of each Gaussian by this share towards u + w x (p - c), the rigid motion that
+// best fits its nearest neighbours at its time step. Neighbours are weighted by their opacity (half
+// of it if they are of another step) and by their agreement. Acceleration moves towards the
+// neighbours' mean likewise. Gaussians with fewer than four neighbours keep their motion.
 void ShareMotion(const SharedMotionOptions& options, ThreadPool& pool, ParameterBlock& moving);
 
 }  // namespace color3d

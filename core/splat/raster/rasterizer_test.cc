@@ -247,7 +247,7 @@ TEST_P(RasterTest, DroppedGaussiansHaveNoEffect) {
     }
     for (int i = 0; i < p.count(); ++i) sum_all += std::abs(gradient.Row(row)[i]);
     EXPECT_LE(worst, 1e-3 * scale) << "row " << row;
-    EXPECT_DOUBLE_EQ(sum_all, sum_kept) << "row " << row;  // what is dropped learns nothing
+    EXPECT_DOUBLE_EQ(sum_all, sum_kept) << "row " << row;  // dropped Gaussians have no gradient
   }
 }
 

@@ -41,7 +41,7 @@ TEST(RenderViewTest, ReturnsLabDepthAndOpacity) {
   EXPECT_THROW(RenderView(m, camera, Pose(), pool), Error);
 }
 
-// Two Gaussians one behind the other; what counts is how much the nearer one hides.
+// Two Gaussians, one behind the other, with the nearer one of different opacities.
 TEST(RenderViewTest, MedianDepthIsWhereHalfIsOccluded) {
   ThreadPool pool(1);
   GaussianModel m;

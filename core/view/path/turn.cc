@@ -8,7 +8,7 @@ namespace color3d {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr double kLargestGap = kTwoPi / 4;  // between neighbours that stand all around
+constexpr double kLargestGap = kTwoPi / 4;  // between neighbours of a full circle
 constexpr double kLeastReach = 0.1, kMostReach = 0.35;
 // Standard deviations in the weight of a photo: azimuth from the current position, elevation and
 // logarithm of distance from the key view.
@@ -45,13 +45,13 @@ Turn::Place AmongPhotos(const Turn& turn, double angle) {
 
 }  // namespace
 
-Turn TurnOf(const Scene& scene, int key_view, const Stand& stand) {
+Turn TurnOf(const Scene& scene, int key_view, const PagePlacement& placement) {
   Turn turn;
-  turn.start =
-      PlaceOf(stand.Apply(scene.views.at(static_cast<size_t>(key_view)).cam_from_world.Center()));
+  turn.start = PlaceOf(
+      placement.Apply(scene.views.at(static_cast<size_t>(key_view)).cam_from_world.Center()));
   std::vector<double> angles;  // 0..2 pi
   for (const View& view : scene.views) {
-    Turn::Place photo = PlaceOf(stand.Apply(view.cam_from_world.Center()));
+    Turn::Place photo = PlaceOf(placement.Apply(view.cam_from_world.Center()));
     photo.angle -= turn.start.angle;
     turn.photos.push_back(photo);
     angles.push_back(photo.angle - kTwoPi * std::floor(photo.angle / kTwoPi));

@@ -27,7 +27,7 @@ constexpr int kOpacityBound = 1;      // of 255
 // Maximum digits that an offset and a length add to the header.
 constexpr size_t kDigitsOfSpan = 40;
 
-Quantizer OfPositions(const ViewerGaussians& g) {
+Quantizer PositionQuantizer(const ViewerGaussians& g) {
   std::vector<float> sizes = g.log_scale;
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
@@ -37,7 +37,7 @@ Quantizer OfPositions(const ViewerGaussians& g) {
   return {3, bound, 2.0 * bound, bound};
 }
 
-Quantizer OfWholeNumbers(int channels, int bound) {
+Quantizer IntegerQuantizer(int channels, int bound) {
   return {channels, static_cast<double>(bound), 2.0 * bound + 1.0, 1.0};
 }
 
@@ -56,16 +56,16 @@ class Encoder {
         span_s_(model.motion.end_s - model.motion.begin_s),
         frames_(frames),
         first_mover_(model.size() - model.motion.size()),
-        tracks_{HeldTrack(OfPositions(g_), model.motion.size()),
-                HeldTrack(OfWholeNumbers(4, 0), model.motion.size()),
-                HeldTrack(OfWholeNumbers(1, kOpacityBound), model.motion.size())} {
+        tracks_{HeldTrack(PositionQuantizer(g_), model.motion.size()),
+                HeldTrack(IntegerQuantizer(4, 0), model.motion.size()),
+                HeldTrack(IntegerQuantizer(1, kOpacityBound), model.motion.size())} {
     CheckFinite(g_);
   }
 
   std::string File() {
     Survey();
     Order();
-    const std::string still = Stills();
+    const std::string still = StaticSection();
     std::vector<std::string> groups;
     for (int first = 0; first < frames_; first += kFramesOfGroup) {
       groups.push_back(Group(first, std::min(first + kFramesOfGroup, frames_)));
@@ -128,7 +128,7 @@ class Encoder {
     return movers;
   }
 
-  Stream StillMask(Attribute attribute) const {
+  Stream StaticMask(Attribute attribute) const {
     Stream stream{attribute, kStatic, std::vector<uint32_t>((order_.size() + 7) / 8, 0)};
     for (size_t n = 0; n < order_.size(); ++n) {
       if ((Changing(order_[n]) >> attribute & 1u) == 0) stream.symbols[n / 8] |= 128u >> (n % 8);
@@ -160,11 +160,11 @@ class Encoder {
     return stream;
   }
 
-  std::string Stills() {
+  std::string StaticSection() {
     const double position_step = positions().quantizer().base_step;
     const int coefficients = ShCoefficients(g_.sh_degree);
     std::vector<Stream> streams;
-    for (int a = 0; a < kAttributes; ++a) streams.push_back(StillMask(static_cast<Attribute>(a)));
+    for (int a = 0; a < kAttributes; ++a) streams.push_back(StaticMask(static_cast<Attribute>(a)));
     streams.push_back(Differences(kPosition, [&](uint32_t i, int k) {
       if (i >= first_mover_) return positions().Base(i - first_mover_, k);
       return static_cast<int32_t>(std::lround(g_.position[3 * i + k] / position_step));
