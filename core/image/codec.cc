@@ -163,7 +163,8 @@ cv::Mat DecodeStored(std::string_view bytes,
   }
   if (mat.empty()) {
     throw InvalidArgument(
-        "{} cannot be decoded: its image data is damaged or of a rare kind; save it again as JPEG "
+        "{} cannot be decoded: its image data is damaged or of an unsupported kind; save it again "
+        "as JPEG "
         "or PNG",
         file_name);
   }

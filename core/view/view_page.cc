@@ -106,7 +106,7 @@ bool HasViewer() { return !ViewerProgram().empty(); }
 std::string RenderViewPage(const Scene& scene, const ViewPage& page) {
   if (!HasViewer()) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "this build has no viewer: build again where npm reaches its registry");
+                "this build has no viewer; build again with access to the npm registry");
   }
   const std::string scene_text =
       Base64(page.file_is_compressed ? page.file_bytes : Gzip(page.file_bytes));

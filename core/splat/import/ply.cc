@@ -73,8 +73,8 @@ class HeaderReader {
     const size_t end = begin.find("\nend_header");
     const size_t newline = end == begin.npos ? end : begin.find('\n', end + 1);
     if (newline == begin.npos) {
-      throw InvalidArgument("{} has no end of a PLY header; it was cut short: copy it again",
-                            source.name);
+      throw InvalidArgument(
+          "the PLY header of {} has no end: the file was cut short; copy it again", source.name);
     }
     header_.body = newline + 1;
     std::istringstream lines{std::string(begin.substr(0, end + 1))};
@@ -86,7 +86,8 @@ class HeaderReader {
 
   Header Take() {
     if (!saw_vertices_) {
-      throw InvalidArgument("{} is a PLY without vertices, so without Gaussians", source_.name);
+      throw InvalidArgument("{} is a PLY without vertices, that is without Gaussians",
+                            source_.name);
     }
     return std::move(header_);
   }
@@ -118,7 +119,7 @@ class HeaderReader {
     const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), count);
     if (error != std::errc() || end != number.data() + number.size()) {
       throw InvalidArgument(
-          "{} says that it has '{}' of {}; its PLY header is damaged", source_.name, number, name);
+          "{} claims to have '{}' of {}: its PLY header is damaged", source_.name, number, name);
     }
     in_vertices_ = name == "vertex" && !saw_vertices_;
     header_.has_faces = header_.has_faces || name == "face";
@@ -142,7 +143,7 @@ class HeaderReader {
     const Type* found = FindType(type);
     if (found == nullptr) {
       throw InvalidArgument(
-          "{} is no 3DGS PLY: its vertices have the property '{} {}'", source_.name, type, name);
+          "{} is not a 3DGS PLY: its vertices have the property '{} {}'", source_.name, type, name);
     }
     header_.properties[name] = {header_.stride, found};
     header_.stride += found->bytes;
@@ -162,7 +163,7 @@ class PlyReader {
     rows_.remove_prefix(std::min(header_.body, rows_.size()));
     const uint64_t whole = rows_.size() / header_.stride;
     if (whole < header_.count) {
-      throw InvalidArgument("{} ends after {} of its {} Gaussians; it was cut short: copy it again",
+      throw InvalidArgument("{} ends after {} of its {} Gaussians: it was cut short; copy it again",
                             source.name,
                             whole,
                             header_.count);
@@ -244,10 +245,10 @@ class PlyReader {
     }
     if (missing.empty()) return;
     throw InvalidArgument(
-        "{} is {}: its vertices have no {}. Give the PLY that 3D Gaussian splatting has trained",
+        "{} is {}: its vertices have no {}. Give a PLY trained by 3D Gaussian splatting",
         source_.name,
         header_.has_faces ? "the PLY of a mesh, not of a splat"
-        : Has("scale_0")  ? "no whole 3DGS PLY"
+        : Has("scale_0")  ? "an incomplete 3DGS PLY"
                           : "the PLY of a point cloud, not of a splat",
         missing);
   }

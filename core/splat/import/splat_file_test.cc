@@ -150,14 +150,14 @@ TEST(SplatFileTest, NamesUnsupportedVersion) {
   EXPECT_THAT(Refusal(StoredZip({{"meta.json", R"({"version":3,"count":1})"}})),
               HasSubstr("SOG of version 3"));
   EXPECT_THAT(Refusal(StoredZip({{"meta.json", R"({"version":2})"}})), HasSubstr("count"));
-  EXPECT_THAT(Refusal(StoredZip({{"meta.json", "{"}})), HasSubstr("no JSON"));
+  EXPECT_THAT(Refusal(StoredZip({{"meta.json", "{"}})), HasSubstr("not valid JSON"));
   EXPECT_THAT(Refusal(StoredZip({{"photo.jpg", "x"}})), HasSubstr("without meta.json"));
   std::string spz = EncodeSpz(BallOnGround(5), SpzVersion::k4, pool);
   spz[4] = 5;
   EXPECT_THAT(Refusal(spz), HasSubstr("SPZ of version 5"));
   EXPECT_THAT(Refusal(Gzip(std::string("NGSP\x01\0\0\0\x01\0\0\0\0\0\0\0", 16))),
               HasSubstr("SPZ of version 1"));
-  EXPECT_THAT(Refusal(Gzip("a text, packed, of more than 16 bytes")), HasSubstr("no SPZ"));
+  EXPECT_THAT(Refusal(Gzip("a text, packed, of more than 16 bytes")), HasSubstr("not an SPZ"));
 }
 
 // A file is read from its archive or not at all.
@@ -206,7 +206,7 @@ TEST(SplatFileTest, NamesFileThatIsNoSplat) {
   EXPECT_THAT(Refusal(""), HasSubstr("empty"));
   EXPECT_THAT(Refusal("\x89PNG...."), HasSubstr("PNG picture"));
   EXPECT_THAT(Refusal("glTF...."), HasSubstr("glTF"));
-  EXPECT_THAT(Refusal("some text"), HasSubstr("not a splat"));
+  EXPECT_THAT(Refusal("some text"), HasSubstr("not a readable splat"));
 }
 
 }  // namespace

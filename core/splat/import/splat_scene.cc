@@ -129,12 +129,12 @@ SplatScene ImportSplat(std::string_view bytes,
   const std::vector<SplatCamera> cameras =
       ChooseSplatCameras(result.geometry, extent, options, run);
   if (cameras.size() < 2) {
-    throw InvalidArgument("{} can be seen well from one place only; at least 2 views are needed",
+    throw InvalidArgument("only one position shows enough of {}; at least 2 views are needed",
                           name);
   }
   if (static_cast<int>(cameras.size()) < options.views) {
     result.warnings.push_back(fmt::format(
-        "{} views of the splat are used: no others of the {} that are wanted see enough of it",
+        "{} views of the splat are used: no others of the {} requested ones show enough of it",
         cameras.size(),
         options.views));
   }

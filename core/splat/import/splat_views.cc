@@ -106,8 +106,7 @@ class CameraChooser {
         });
     if (!(best.seen > 0.0)) {
       throw InvalidArgument(
-          "the splat cannot be seen from anywhere: its Gaussians are fainter or smaller than can "
-          "be drawn");
+          "the splat cannot be seen from anywhere: its Gaussians are too faint or too small");
     }
     PreferOneDistance(best.distance);
     return Spread(best);

@@ -37,7 +37,7 @@ struct Header {
 Header ReadHeader(std::string_view plain, bool packed_by_gzip, const SplatSource& source) {
   if (plain.size() < kHeaderBytes) ThrowShort(source);
   if (LittleEndianAt(plain, 0, 4) != kMagic) {
-    throw InvalidArgument("{} is no SPZ; give a .spz, a .sog or a 3DGS .ply", source.name);
+    throw InvalidArgument("{} is not an SPZ; give a .spz, a .sog or a 3DGS .ply", source.name);
   }
   Header header;
   header.version = LittleEndianAt(plain, 4, 4);
@@ -135,7 +135,7 @@ std::string StreamsOfZstd(std::string_view bytes, const SplatSource& source, Hea
     all += LittleEndianAt(bytes, table + kTableEntryBytes * i + 8, 4);
   }
   if (all != header->bytes()) {
-    throw InvalidArgument("{} says that it has {} Gaussians, but its parts are of another size",
+    throw InvalidArgument("{} claims to have {} Gaussians, but its parts have other sizes",
                           source.name,
                           header->count);
   }

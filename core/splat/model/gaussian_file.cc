@@ -84,7 +84,7 @@ MotionHeader ReadMotionHeader(std::string_view bytes, const Header& h) {
   if (m.moving == 0 || m.moving > h.count || m.with_confidence > 1 || !std::isfinite(m.begin_s) ||
       !std::isfinite(m.end_s) || m.begin_s > m.end_s) {
     throw Refuse(
-        "its motion of {} Gaussians from {} s to {} s cannot be", m.moving, m.begin_s, m.end_s);
+        "its motion of {} Gaussians from {} s to {} s is invalid", m.moving, m.begin_s, m.end_s);
   }
   return m;
 }
@@ -109,7 +109,7 @@ std::string SerializeGaussians(const GaussianModel& model) {
     const std::string place = FirstNotFinite(name, buffer, width);
     if (!place.empty()) {
       throw Error(
-          ErrorCode::kInternal, "a Gaussian model was to be saved whose {} is not finite", place);
+          ErrorCode::kInternal, "the {} of a Gaussian model to be saved is not finite", place);
     }
     bytes.append(reinterpret_cast<const char*>(buffer.data()), buffer.size() * sizeof(float));
   };

@@ -35,7 +35,7 @@ void CheckModel(const GaussianModel& model) {
   const GaussianMotion& motion = model.motion;
   if (motion.size() > model.size() || !(motion.begin_s <= motion.end_s)) {
     throw InvalidArgument(
-        "Gaussian model: motion of {} Gaussians out of {}, from {} s to {} s, cannot be",
+        "Gaussian model: motion of {} Gaussians out of {}, from {} s to {} s, is invalid",
         motion.size(),
         model.size(),
         motion.begin_s,

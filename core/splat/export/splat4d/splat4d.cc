@@ -113,7 +113,7 @@ class Encoder {
                                             : ever_seen_[i - first_mover_] != 0;
       if (is_seen) order_.push_back(i);
     }
-    if (order_.empty()) throw InvalidArgument("no Gaussian of this scene can be seen");
+    if (order_.empty()) throw InvalidArgument("no Gaussian of this scene is visible");
     std::stable_sort(order_.begin(), order_.end(), [&](uint32_t x, uint32_t y) {
       return Changing(x) < Changing(y);
     });
@@ -330,7 +330,7 @@ std::string EncodeSplat4d(const GaussianModel& model,
                           ThreadPool& pool) {
   if (frames < 1 || frames > kMaxSplat4dFrames) {
     throw InvalidArgument(
-        "a .splat4d of {} frames was asked for; 1 to {} can be", frames, kMaxSplat4dFrames);
+        "a .splat4d of {} frames cannot be written; request 1 to {}", frames, kMaxSplat4dFrames);
   }
   if (model.size() == 0) throw InvalidArgument("there are no Gaussians");
   return Encoder(model, rgb, frame, frames, pool).File();

@@ -36,7 +36,7 @@ int FractionalBits(const std::vector<float>& position) {
   while (bits >= 0 && std::ldexp(farthest, bits) > kPositionLimit) --bits;
   if (bits < 0) {
     throw InvalidArgument(
-        "a coordinate of {} is beyond what SPZ can say; move the scene to the origin", farthest);
+        "a coordinate of {} is out of the range of SPZ; move the scene to the origin", farthest);
   }
   return bits;
 }
@@ -48,9 +48,9 @@ void CheckScales(const std::vector<float>& log_scale) {
   });
   if (2 * static_cast<size_t>(outside) <= log_scale.size()) return;
   throw InvalidArgument(
-      "most Gaussians are smaller than {:.1g} or larger than {:.0f} units, which SPZ cannot say; "
-      "ask "
-      "for another format",
+      "most Gaussians are smaller than {:.1g} or larger than {:.0f} units, out of the range of "
+      "SPZ; "
+      "export another format",
       std::exp(kLowestLogScale),
       std::exp(highest));
 }
