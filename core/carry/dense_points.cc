@@ -141,14 +141,14 @@ SweepPlan PlanSweeps(const Scene& scene, size_t most) {
   plan.candidates.resize(scene.views.size());
   const size_t views = scene.TrainingViews().size();
   if (moments.size() == 1 || moments.size() == views) {
-    plan.views = EvenlyOf(scene.TrainingViews(), most);
+    plan.views = PickEvenly(scene.TrainingViews(), most);
     for (const int view : plan.views) plan.candidates[view] = plan.views;
     return plan;
   }
   const size_t few = std::max<size_t>(1, most * moments.size() / std::max<size_t>(1, views));
-  moments = EvenlyOf(std::move(moments), few);
+  moments = PickEvenly(std::move(moments), few);
   for (std::vector<int>& moment : moments) {
-    moment = EvenlyOf(std::move(moment), most);
+    moment = PickEvenly(std::move(moment), most);
     plan.views.insert(plan.views.end(), moment.begin(), moment.end());
   }
   std::sort(plan.views.begin(), plan.views.end());
@@ -185,7 +185,7 @@ std::vector<SparsePoint> DensePoints(const Scene& scene,
   for (std::vector<SparsePoint>& points : by_view) {
     std::move(points.begin(), points.end(), std::back_inserter(all));
   }
-  return EvenlyOf(std::move(all), options.max_points);
+  return PickEvenly(std::move(all), options.max_points);
 }
 
 }  // namespace color3d

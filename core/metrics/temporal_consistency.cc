@@ -35,7 +35,7 @@ std::vector<Stretch> StretchesOf(const std::vector<std::vector<int>>& shots) {
       stretches.push_back({&shot, begin, std::min(begin + kStretch, frames)});
     }
   }
-  return EvenlyOf(std::move(stretches), kMostStretches);
+  return PickEvenly(std::move(stretches), kMostStretches);
 }
 
 // Sums for one colouring of a stretch.

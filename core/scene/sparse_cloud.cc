@@ -94,7 +94,7 @@ Eigen::Vector3d FocusPoint(const Scene& scene) {
 }
 
 std::vector<int> ViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
-  return EvenlyOf(AllViewsFacing(scene, world, near), kMaxListedViews);
+  return PickEvenly(AllViewsFacing(scene, world, near), kMaxListedViews);
 }
 
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed) {
@@ -125,7 +125,7 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     point.views = AllViewsFacing(scene, point.position, near);
     const bool relaxed = attempt >= patience;
     if (point.views.size() < (relaxed ? 1 : std::min(wanted_views, scene.views.size()))) continue;
-    point.views = EvenlyOf(std::move(point.views), kMaxListedViews);
+    point.views = PickEvenly(std::move(point.views), kMaxListedViews);
     point.reprojection_error_px = -1.0;
     points.push_back(std::move(point));
   }

@@ -29,8 +29,8 @@ constexpr const char* kAbout =
 ordered_json Numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 ordered_json Numbers(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
-ordered_json PhotoJson(const PagePlacement& placement, const View& view, const std::string& jpeg) {
-  const PageCamera camera_on_page = CameraOnPage(placement, view);
+ordered_json PhotoJson(const ScenePlacement& placement, const View& view, const std::string& jpeg) {
+  const PageCamera camera_on_page = PlaceCamera(placement, view);
   const Camera& camera = view.camera;
   return {{"name", view.name},
           {"held_out", view.held_out},
@@ -73,7 +73,7 @@ std::string InHtml(const ordered_json& json) {
 }
 
 std::string Facts(const Scene& scene, const ViewPage& page) {
-  const PagePlacement placement = PlaceOnPage(scene, page.key_view, page.focus);
+  const ScenePlacement placement = PlaceScene(scene, page.key_view, page.focus);
   ordered_json photos = ordered_json::array();
   int key = -1;
   for (const ViewPagePhoto& photo : page.photos) {

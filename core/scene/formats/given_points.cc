@@ -101,7 +101,7 @@ Eigen::Affine3d FrameOf(const json& transforms, const Scene& scene, const Positi
   const Eigen::Affine3d as_it_is = Eigen::Affine3d::Identity();
   const std::optional<Eigen::Affine3d> applied = AppliedTransform(transforms);
   if (!applied) return as_it_is;
-  const Positions tried = EvenlyOf(points, kTriedPoints);
+  const Positions tried = PickEvenly(points, kTriedPoints);
   Eigen::Affine3d best = as_it_is;
   // Keeps the points in the frame of the poses unless far fewer are visible there.
   double most = 2.0 * ShareSeen(scene, tried, as_it_is);

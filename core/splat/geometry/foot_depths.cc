@@ -18,16 +18,16 @@ struct MovingObject {
   double depth = 0.0;       // there
 };
 
-struct FrameObjects {
+struct MovingObjects {
   std::vector<int> of_pixel;  // -1: nothing moves
   std::vector<MovingObject> list;
 };
 
 // Connected components of the moving pixels.
-FrameObjects RegionsOf(const SurveyedView& view) {
+MovingObjects RegionsOf(const SurveyedView& view) {
   const Image& moving = view.moving;
   const double usual = MedianDepth(view);
-  FrameObjects objects;
+  MovingObjects objects;
   objects.of_pixel.assign(moving.data.size(), -1);
   std::vector<int> region;
   for (int start = 0; start < static_cast<int>(moving.data.size()); ++start) {
@@ -71,7 +71,7 @@ int SharedColumns(const MovingObject& a, const MovingObject& b) {
 int Columns(const MovingObject& object) { return object.right - object.left + 1; }
 
 // Torn-off limbs, and the shadow below, belong to the object above which they hang.
-void JoinStackedRegions(FrameObjects* objects) {
+void MergeStackedRegions(MovingObjects* objects) {
   std::vector<int> joined(objects->list.size());
   std::vector<int> order(objects->list.size());
   std::iota(order.begin(), order.end(), 0);
@@ -99,7 +99,7 @@ void JoinStackedRegions(FrameObjects* objects) {
 }
 
 // Depth of the object at the same position in `frame`; 0 without one.
-double DepthAtSamePosition(const MovingObject& object, const FrameObjects& frame) {
+double OverlappingDepth(const MovingObject& object, const MovingObjects& frame) {
   double depth = 0.0;
   int most = 0;
   for (const MovingObject& other : frame.list) {
@@ -120,8 +120,8 @@ std::vector<size_t> OrderByTime(const std::vector<SurveyedView>& views) {
   return order;
 }
 
-void SmoothDepthsOverTime(const std::vector<size_t>& order, std::vector<FrameObjects>* frames) {
-  const std::vector<FrameObjects> before = *frames;
+void SmoothDepthsOverTime(const std::vector<size_t>& order, std::vector<MovingObjects>* frames) {
+  const std::vector<MovingObjects> before = *frames;
   const auto count = static_cast<int>(order.size());
   for (int i = 0; i < count; ++i) {
     for (MovingObject& object : (*frames)[order[i]].list) {
@@ -129,7 +129,7 @@ void SmoothDepthsOverTime(const std::vector<size_t>& order, std::vector<FrameObj
       for (int k = std::max(0, i - kFramesOnEitherSide);
            k <= std::min(count - 1, i + kFramesOnEitherSide);
            ++k) {
-        const double depth = k == i ? 0.0 : DepthAtSamePosition(object, before[order[k]]);
+        const double depth = k == i ? 0.0 : OverlappingDepth(object, before[order[k]]);
         if (depth > 0.0) depths.push_back(depth);
       }
       object.depth = Median(std::move(depths));
@@ -162,10 +162,10 @@ std::vector<Image> FootDepths(const std::vector<SurveyedView>& views, ThreadPool
   if (views.empty()) return {};
   const auto count = static_cast<int64_t>(views.size());
   const bool have_one_pose = HaveOnePose(views);
-  std::vector<FrameObjects> frames(views.size());
+  std::vector<MovingObjects> frames(views.size());
   pool.ForEach(count, [&](int64_t i, int) {
     frames[i] = RegionsOf(views[i]);
-    if (have_one_pose) JoinStackedRegions(&frames[i]);
+    if (have_one_pose) MergeStackedRegions(&frames[i]);
   });
   if (have_one_pose) SmoothDepthsOverTime(OrderByTime(views), &frames);
   std::vector<Image> depths(views.size());

@@ -222,10 +222,10 @@ class GeometryTrainer {
       return loss_.Evaluate(drawn, *target, nullptr, weights, run_.pool, d_color_);
     }
     masked_target_ = *target;
-    CopyWhereMasked(*mask, drawn, masked_target_);
+    CopyMasked(*mask, drawn, masked_target_);
     const LossValue loss =
         loss_.Evaluate(drawn, masked_target_, mask.get(), weights, run_.pool, d_color_);
-    ClearWhereMasked(*mask, d_color_);
+    ZeroMasked(*mask, d_color_);
     return loss;
   }
 

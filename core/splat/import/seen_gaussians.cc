@@ -57,7 +57,7 @@ std::vector<size_t> SpreadSample(const GaussianModel& model, size_t count) {
   for (size_t i = 0; i < model.size(); ++i) {
     if (model.opacity_logit[i] > kLeastLogit) drawn.push_back(i);
   }
-  return EvenlyOf(std::move(drawn), count);
+  return PickEvenly(std::move(drawn), count);
 }
 
 SeenGaussians::SeenGaussians(const GaussianModel& model, const Camera& picture, ThreadPool& pool)

@@ -7,8 +7,8 @@
 
 #include "core/base/error.h"
 #include "core/base/text/name_order.h"
-#include "core/view/page_placement.h"
 #include "core/view/path/turn.h"
+#include "core/view/scene_placement.h"
 
 namespace color3d {
 namespace {
@@ -135,7 +135,7 @@ std::vector<PathCamera> TurnFrames(const Scene& scene,
                                    int key_view,
                                    const Vector3d& focus,
                                    const std::vector<double>& shares) {
-  const PagePlacement placement = PlaceOnPage(scene, key_view, focus);
+  const ScenePlacement placement = PlaceScene(scene, key_view, focus);
   const Turn turn = TurnOf(scene, key_view, placement);
   Camera camera = scene.views.at(static_cast<size_t>(key_view)).camera;
   camera.cx = 0.5 * camera.width;

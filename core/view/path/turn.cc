@@ -45,7 +45,7 @@ Turn::Place AmongPhotos(const Turn& turn, double angle) {
 
 }  // namespace
 
-Turn TurnOf(const Scene& scene, int key_view, const PagePlacement& placement) {
+Turn TurnOf(const Scene& scene, int key_view, const ScenePlacement& placement) {
   Turn turn;
   turn.start = PlaceOf(
       placement.Apply(scene.views.at(static_cast<size_t>(key_view)).cam_from_world.Center()));

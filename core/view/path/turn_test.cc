@@ -39,7 +39,7 @@ Scene SceneOf(const std::vector<double>& degrees) {
 }
 
 Turn TurnOf(const Scene& scene, int key) {
-  return TurnOf(scene, key, PlaceOnPage(scene, key, kFocus));
+  return TurnOf(scene, key, PlaceScene(scene, key, kFocus));
 }
 
 TEST(TurnTest, SurroundingPhotosGiveCircleOthersSway) {
@@ -66,7 +66,7 @@ TEST(TurnTest, PathBeginsAtKeyViewAndStaysNearPhotos) {
   const std::vector<double> arc = {-75, -50, -25, 0};
   for (int key = 0; key < 4; ++key) {
     const Scene scene = SceneOf(arc);
-    const PagePlacement placement = PlaceOnPage(scene, key, kFocus);
+    const ScenePlacement placement = PlaceScene(scene, key, kFocus);
     const Turn turn = TurnOf(scene, key, placement);
     const auto angle = [](const Vector3d& p) { return std::atan2(p.x(), p.z()); };
     double low = 10.0, high = -10.0;
@@ -92,7 +92,7 @@ TEST(TurnTest, PathFollowsHeightOfNearbyPhotos) {
     scene.views.push_back(ViewAt(angle, 4.0, 1.0 + 0.5 * std::cos(angle * kDegree)));
     scene.views.push_back(ViewAt(angle, 0.5, 6.0));  // from above
   }
-  const PagePlacement placement = PlaceOnPage(scene, 0, kFocus);
+  const ScenePlacement placement = PlaceScene(scene, 0, kFocus);
   const Turn turn = TurnOf(scene, 0, placement);
   ASSERT_TRUE(turn.around);
   const auto height = [](const Vector3d& p) { return std::atan2(p.y(), std::hypot(p.x(), p.z())); };

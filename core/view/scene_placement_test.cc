@@ -1,4 +1,4 @@
-#include "core/view/page_placement.h"
+#include "core/view/scene_placement.h"
 
 #include <gtest/gtest.h>
 
@@ -53,13 +53,13 @@ TEST(UpVectorTest, AveragesRollAndAcceptsOverheadViews) {
   EXPECT_EQ(UpVector({}), -Vector3d::UnitY());
 }
 
-TEST(PagePlacementTest, KeyViewIsInFrontWithSamePicture) {
+TEST(ScenePlacementTest, KeyViewIsInFrontWithSamePicture) {
   Scene scene;
   const Vector3d up = Vector3d(0.1, -1.0, 0.2).normalized(), focus(1.0, 2.0, 3.0);
   scene.views = {Looking({5, 1, 0}, focus, up), Looking({4, 1, -4}, focus, up)};
-  const PagePlacement placement = PlaceOnPage(scene, 1, focus);
+  const ScenePlacement placement = PlaceScene(scene, 1, focus);
   EXPECT_LT(placement.Apply(focus).norm(), 1e-12);
-  const PageCamera key = CameraOnPage(placement, scene.views[1]);
+  const PageCamera key = PlaceCamera(placement, scene.views[1]);
   EXPECT_NEAR(key.position.norm(), 2.0, 1e-12);
   EXPECT_NEAR(key.position.x(), 0.0, 1e-9);
   EXPECT_GT(key.position.z(), 0.0);
@@ -68,27 +68,27 @@ TEST(PagePlacementTest, KeyViewIsInFrontWithSamePicture) {
   // A point has the same place before the camera in both worlds, but for the size and the axes.
   const Vector3d point(1.5, 2.5, 2.0);
   for (const View& view : scene.views) {
-    const PageCamera camera = CameraOnPage(placement, view);
+    const PageCamera camera = PlaceCamera(placement, view);
     const Vector3d there =
         camera.rotation.conjugate() * (placement.Apply(point) - camera.position) / placement.scale;
     const Vector3d here = view.cam_from_world.Apply(point);
     EXPECT_LT((Vector3d(here.x(), -here.y(), -here.z()) - there).norm(), 1e-9);
   }
-  EXPECT_THROW(PlaceOnPage(scene, 1, scene.views[1].cam_from_world.Center()), Error);
+  EXPECT_THROW(PlaceScene(scene, 1, scene.views[1].cam_from_world.Center()), Error);
 }
 
-TEST(PagePlacementTest, OverheadCameraHasUprightPicture) {
+TEST(ScenePlacementTest, OverheadCameraHasUprightPicture) {
   Scene scene;
   scene.views = {Looking({0, -3, 0}, Vector3d::Zero(), Vector3d::UnitZ()),
                  Looking({0, 0, -3}, Vector3d::Zero(), -Vector3d::UnitY()),
                  Looking({3, 0, 0}, Vector3d::Zero(), -Vector3d::UnitY()),
                  Looking({-3, 0, 0}, Vector3d::Zero(), -Vector3d::UnitY())};
-  const PagePlacement placement = PlaceOnPage(scene, 0, Vector3d::Zero());
+  const ScenePlacement placement = PlaceScene(scene, 0, Vector3d::Zero());
   EXPECT_NEAR(std::abs(placement.rotation.toRotationMatrix().determinant()), 1.0, 1e-12);
-  EXPECT_GT(CameraOnPage(placement, scene.views[0]).position.y(), 1.8);
+  EXPECT_GT(PlaceCamera(placement, scene.views[0]).position.y(), 1.8);
   // A point behind the camera is not a centre of orbit.
   View away = Looking({0, 0, -3}, {0, 0, -9}, -Vector3d::UnitY());
-  EXPECT_GT((CameraOnPage(placement, away).target - CameraOnPage(placement, away).position).norm(),
+  EXPECT_GT((PlaceCamera(placement, away).target - PlaceCamera(placement, away).position).norm(),
             1.0);
 }
 

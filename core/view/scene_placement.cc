@@ -1,4 +1,4 @@
-#include "core/view/page_placement.h"
+#include "core/view/scene_placement.h"
 
 #include <cmath>
 
@@ -40,7 +40,7 @@ Vector3d UpVector(const std::vector<View>& views) {
   return level.ldlt().solve(kTiltWeight * up).normalized();
 }
 
-PagePlacement PlaceOnPage(const Scene& scene, int key_view, const Vector3d& focus) {
+ScenePlacement PlaceScene(const Scene& scene, int key_view, const Vector3d& focus) {
   const View& key = scene.views.at(key_view);
   const double distance = (focus - key.cam_from_world.Center()).norm();
   if (!(distance > 0.0) || !std::isfinite(distance)) {
@@ -59,7 +59,7 @@ PagePlacement PlaceOnPage(const Scene& scene, int key_view, const Vector3d& focu
   return {Eigen::Quaterniond(rows), focus, kKeyDistance / distance};
 }
 
-PageCamera CameraOnPage(const PagePlacement& placement, const View& view) {
+PageCamera PlaceCamera(const ScenePlacement& placement, const View& view) {
   PageCamera camera;
   camera.position = placement.Apply(view.cam_from_world.Center());
   const Eigen::Quaterniond flip(0.0, 1.0, 0.0, 0.0);  // y down, z forward -> y up, z back

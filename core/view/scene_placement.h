@@ -11,7 +11,7 @@
 namespace color3d {
 
 // page = scale * (rotation * (scene - center)).
-struct PagePlacement {
+struct ScenePlacement {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double scale = 1.0;
@@ -28,7 +28,7 @@ Eigen::Vector3d UpVector(const std::vector<View>& views);
 
 // `focus`: the point that the key view looks at, in the scene's units. Throws
 // Error{kInvalidArgument} if it is the camera's centre.
-PagePlacement PlaceOnPage(const Scene& scene, int key_view, const Eigen::Vector3d& focus);
+ScenePlacement PlaceScene(const Scene& scene, int key_view, const Eigen::Vector3d& focus);
 
 // A view's camera in the page's world, axes as in OpenGL: x right, y up, looking along -z.
 struct PageCamera {
@@ -37,6 +37,6 @@ struct PageCamera {
   // The centre of orbit: on the camera's axis, at the distance of the focus.
   Eigen::Vector3d target = Eigen::Vector3d::Zero();
 };
-PageCamera CameraOnPage(const PagePlacement& placement, const View& view);
+PageCamera PlaceCamera(const ScenePlacement& placement, const View& view);
 
 }  // namespace color3d
