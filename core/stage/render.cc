@@ -83,7 +83,7 @@ void RunRender(const RenderOptions& options, StageContext& context) {
     movie.pictures = false;  // `pictures` means those of the films of the cameras
     RenderMovie(movie, scene, model, context);
   }
-  if (scene.capture().is_dynamic) {  // moving or static
+  if (scene.HasTimes()) {  // moving or static
     if (HasColors(context, scene)) WriteFilmsOfCameras(scene, options.pictures, context);
   } else if (options.pictures) {
     context.progress().OnWarning(

@@ -30,13 +30,13 @@ ordered_json Numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 ordered_json Numbers(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
 ordered_json PhotoJson(const ScenePlacement& placement, const View& view, const std::string& jpeg) {
-  const PageCamera camera_on_page = PlaceCamera(placement, view);
+  const PageCamera pose = PlaceCamera(placement, view);
   const Camera& camera = view.camera;
   return {{"name", view.name},
           {"held_out", view.held_out},
-          {"position", Numbers(camera_on_page.position)},
-          {"rotation", Numbers(camera_on_page.rotation)},
-          {"target", Numbers(camera_on_page.target)},
+          {"position", Numbers(pose.position)},
+          {"rotation", Numbers(pose.rotation)},
+          {"target", Numbers(pose.target)},
           {"aspect", static_cast<double>(camera.width) / camera.height},
           {"tan", 0.5 * camera.height / camera.fy},  // half the vertical field of view
           {"center", {camera.cx / camera.width, camera.cy / camera.height}},

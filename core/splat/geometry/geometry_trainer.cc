@@ -148,7 +148,7 @@ class GeometryTrainer {
     const auto target = [&](const PosedCamera& view, int level) {
       return targets_.Get(view, level);
     };
-    const FoundMovers found =
+    const MoverSearchResult found =
         FindMovingPart(problem_, times_, state_.parameters, Colors(), target, options_, run_.pool);
     run_.progress.OnError(state_.iteration, "moving_share", found.moving_share);
     if (found.moving.parameters.count() == 0) return;

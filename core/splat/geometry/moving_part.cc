@@ -125,20 +125,20 @@ std::vector<std::vector<PosedCamera>> BlocksOfTime(const std::vector<PosedCamera
   return blocks;
 }
 
-FoundMovers FindMovingPart(const GeometryProblem& problem,
-                           const TimeSpan& times,
-                           const ParameterBlock& still,
-                           const ColorSpec& color,
-                           const LevelTarget& target,
-                           const GeometryOptions& options,
-                           ThreadPool& pool) {
+MoverSearchResult FindMovingPart(const GeometryProblem& problem,
+                                 const TimeSpan& times,
+                                 const ParameterBlock& still,
+                                 const ColorSpec& color,
+                                 const LevelTarget& target,
+                                 const GeometryOptions& options,
+                                 ThreadPool& pool) {
   MoverSeedOptions seeds;
   seeds.rows = still.rows();
   seeds.channels = color.channels;
   seeds.coefficients = ShCoefficients(options.sh_degree);
   seeds.width = TuningOf(options).seed_width;
   seeds.interval = times.Interval();
-  FoundMovers found;
+  MoverSearchResult found;
   double residual_share = 0.0, least_share = 0.0;
   ParameterBlock& parameters = found.moving.parameters;
   for (const std::vector<PosedCamera>& block : BlocksOfTime(problem.training)) {

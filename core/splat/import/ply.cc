@@ -198,7 +198,7 @@ class PlyReader {
 
  private:
   bool Has(const std::string& name) const { return header_.properties.contains(name); }
-  bool HasBytesOfColor() const {
+  bool HasByteColors() const {
     const auto red = header_.properties.find("red");
     return red != header_.properties.end() && red->second.type->read == ReadNumber<uint8_t> &&
            Has("green") && Has("blue");
@@ -238,7 +238,7 @@ class PlyReader {
                              "opacity"}) {
       if (missing.empty() && !Has(name)) missing = name;
     }
-    if (missing.empty() && !HasBytesOfColor()) {
+    if (missing.empty() && !HasByteColors()) {
       for (const char* name : {"f_dc_0", "f_dc_1", "f_dc_2"}) {
         if (missing.empty() && !Has(name)) missing = name;
       }

@@ -52,9 +52,9 @@ Image GrayPicture(const Image& luminance) {
 
 std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
   std::optional<GaussianModel> model;
-  if (scene.capture().is_reconstructed && context.HasInput(artifact::kModel)) {
+  if (context.HasInput(artifact::kModel)) {
     model = ParseGaussians(context.ReadInput(artifact::kModel));
-    if (model->channels != 3) model.reset();
+    if (model->channels != 3 || model->size() == 0) model.reset();
   }
   const std::vector<int> chosen = ChosenViews(scene, model.has_value(), context);
   const double side = kLargestPx * std::sqrt(kViewsAtLargest / std::max<size_t>(1, chosen.size()));

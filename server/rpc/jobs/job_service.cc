@@ -70,15 +70,12 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
 }
 
 SceneFacts FactsOf(const SceneRecord& scene) {
-  const bool is_splat = scene.layout == CaptureLayout::kSplat;
-  return {.photos = scene.photo_count,
-          .has_poses = InfoOf(scene.layout).has_poses,
+  return {.pictures = scene.photo_count,
+          .layout = scene.layout,
           .augment_files = static_cast<int>(
-              std::count_if(scene.files.begin(),
-                            scene.files.end(),
-                            [](const auto& file) { return IsAugmentFile(file.path); })),
-          .is_film = scene.layout == CaptureLayout::kFilm,
-          .is_splat = is_splat};
+              std::count_if(scene.files.begin(), scene.files.end(), [](const auto& file) {
+                return IsAugmentFile(file.path);
+              }))};
 }
 
 // Returns the route's colorize_key_view job, by default the accepted one of its scene, and the
@@ -234,7 +231,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext*
   return AnswerWrite(
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
-        *out = ToProto(WithRoomMade(parts_.make_room, [&] {
+        *out = ToProto(RetryAfterMakingRoom(parts_.make_room, [&] {
           return call.store.Cancel(in.name(), IdempotencyKey("CancelJob", in));
         }));
         spdlog::info("[job={}] cancellation requested", in.name());
@@ -264,7 +261,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext*
                      response,
                      [this](const Call& call, const auto& in, v1::DeleteJobResponse*) {
                        CheckName(in.name(), "jobs");
-                       WithRoomMade(parts_.make_room, [&] {
+                       RetryAfterMakingRoom(parts_.make_room, [&] {
                          call.store.Delete(in.name(), IdempotencyKey("DeleteJob", in));
                        });
                      });

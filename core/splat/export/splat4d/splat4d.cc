@@ -120,7 +120,7 @@ class Encoder {
   }
 
   // Moving Gaussians, in the file's order, whose attribute changes.
-  std::vector<size_t> MoversOf(Attribute attribute) const {
+  std::vector<size_t> MovingGaussians(Attribute attribute) const {
     std::vector<size_t> movers;
     for (const uint32_t i : order_) {
       if ((Changing(i) >> attribute & 1u) != 0) movers.push_back(i - first_mover_);
@@ -197,7 +197,7 @@ class Encoder {
     std::array<std::vector<int32_t>, 3> before;
     std::vector<Stream> keys, deltas;
     for (int a = 0; a < 3; ++a) {
-      movers[a] = MoversOf(attributes[a]);
+      movers[a] = MovingGaussians(attributes[a]);
       keys.push_back({attributes[a], kKey, {}});
       deltas.push_back({attributes[a], kDelta, {}});
     }
@@ -274,7 +274,7 @@ class Encoder {
                        {"alpha", 2 * kOpacityBound + 1},
                        {"rot", 1}};
     for (int a = 0; a < kAttributes; ++a) {
-      header["dyn"][kNames[a]] = MoversOf(static_cast<Attribute>(a)).size();
+      header["dyn"][kNames[a]] = MovingGaussians(static_cast<Attribute>(a)).size();
     }
     header["groups"] = nlohmann::ordered_json::array();
     for (size_t n = 0, begin = 0; n < order_.size(); begin = n) {
