@@ -269,8 +269,8 @@ TEST(WeightFileTest, DistinguishesOtherKindsOfFiles) {
                                     "F\xf9 j\xa8P\x19.",
                                     15)),
               HasSubstr("before 1.6"));
-  EXPECT_THAT(RefusalOf("\x89HDF\r\n\x1a\n plus more"), HasSubstr("no weight file"));
-  EXPECT_THAT(RefusalOf(""), HasSubstr("no weight file"));
+  EXPECT_THAT(RefusalOf("\x89HDF\r\n\x1a\n plus more"), HasSubstr("not a weight file"));
+  EXPECT_THAT(RefusalOf(""), HasSubstr("not a weight file"));
 }
 
 TEST(WeightFileTest, FourFormatsHaveTheSameValues) {

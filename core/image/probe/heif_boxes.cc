@@ -112,7 +112,7 @@ class MetaReader {
       Fields entry(context_, box.body);
       const uint32_t entry_version = entry.Take32(1);
       entry.Take(3);
-      if (entry_version < 2) continue;  // of no kind that has a type
+      if (entry_version < 2) continue;  // items of these versions have no type
       HeifItem& item = found_.items[entry.Take32(entry_version == 2 ? 2 : 4)];
       item.is_protected = entry.Take(2) != 0;
       item.type = entry.TakeText(4);

@@ -25,9 +25,9 @@ namespace color3d {
 namespace {
 
 constexpr double kErrorReports = 100.0;
-constexpr int64_t kMinDensifyInterval = 10;  // iterations: fewer say little about gradients
+constexpr int64_t kMinDensifyInterval = 10;  // iterations: gradients of fewer are noise
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
-constexpr double kSurveyAt = 0.15;  // of the schedule: where motion is looked for
+constexpr double kSurveyAt = 0.15;  // fraction of the schedule at which motion is searched for
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
 class GeometryTrainer {
@@ -414,7 +414,7 @@ class GeometryTrainer {
   TrainingTargets still_;
   GeometryState state_;
   int64_t initial_count_ = 0;     // Gaussians
-  double fraction_ = 0.0;         // of the schedule that is done
+  double fraction_ = 0.0;         // completed fraction of the schedule
   double earlier_seconds_ = 0.0;  // of training, in the attempts before this one
   PhaseClock clock_;              // of this attempt
   Moment last_round_;             // of densification

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-constexpr double kFarthest = 0.2;  // of its depth that a seed may come in one time step
+constexpr double kFarthest = 0.2;  // maximum movement per time step, relative to the depth
 
 // The views of each camera, ordered by time.
 std::vector<std::vector<size_t>> ByCamera(const std::vector<SurveyedView>& views) {

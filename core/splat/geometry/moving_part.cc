@@ -14,7 +14,7 @@
 namespace color3d {
 namespace {
 
-constexpr double kMoverShare = 0.4;  // of the most Gaussians that there may be
+constexpr double kMoverShare = 0.4;  // maximum share of the Gaussian cap
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
 // Mean over the channels.

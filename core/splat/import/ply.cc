@@ -59,7 +59,7 @@ struct Property {
 };
 
 struct Header {
-  size_t body = 0;  // where the rows begin
+  size_t body = 0;  // offset of the rows
   uint64_t count = 0;
   size_t stride = 0;
   std::map<std::string, Property> properties;  // of the vertices

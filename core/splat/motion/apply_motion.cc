@@ -24,7 +24,7 @@ constexpr float kLn2 = 0.69314718f;
 constexpr float kMaxOpacity = 1.0f - 1e-6f;
 // Minimum width of a time window, so that no product overflows.
 constexpr float kLeastLogWidth = -40.0f;
-constexpr float kFarthest = 1e4f;  // of tau / width: nothing is seen long before
+constexpr float kFarthest = 1e4f;  // limit of tau / width, far beyond visibility
 
 HWY_INLINE F32 Exp(F32 x) {
   return simd::Exp2(simd::Clamp(x * kLog2E, Broadcast(-125.0f), Broadcast(125.0f)));

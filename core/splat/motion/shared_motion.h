@@ -8,9 +8,9 @@
 namespace color3d {
 
 struct SharedMotionOptions {
-  int row = 0;            // where motion begins in the block
+  int row = 0;            // first row of motion in the block
   double interval = 1.0;  // from one time step to the next, in units of GaussianMotion's t
-  int neighbors = 24;     // of the Gaussian's time step and the two beside it
+  int neighbors = 24;     // of the Gaussian's time step and the two adjacent ones
   double share = 0.05;    // 0: each keeps its own motion, 1: it has that of its neighbours
 };
 

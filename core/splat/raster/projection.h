@@ -42,7 +42,7 @@ constexpr int SplatRowFloats(int channels) { return channels <= 2 ? 8 : 12; }
 constexpr int GradientRowFloats(int channels) { return kGradientColor + channels <= 8 ? 8 : 12; }
 
 struct SplatBuffer {
-  int channels = 0;  // colour channels, and one for depth when asked for
+  int channels = 0;  // colour channels, and one for depth if requested
   int row_floats = 8;
   AlignedFloats rows;               // one row per Gaussian
   std::vector<uint32_t> depth_key;  // bits of the camera depth; 0: not visible

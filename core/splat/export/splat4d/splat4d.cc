@@ -19,8 +19,8 @@ namespace {
 constexpr char kMagic[] = "SP4D";
 constexpr int kVersion = 1;
 constexpr int kFramesOfGroup = 30;
-constexpr double kStillFramesPerSecond = 30.0;  // where the frames have no span
-constexpr double kPositionOfSize = 0.05;        // bound, of the median Gaussian's size
+constexpr double kStillFramesPerSecond = 30.0;  // for frames without a time span
+constexpr double kPositionOfSize = 0.05;        // bound, relative to the median Gaussian's size
 constexpr double kFarthestSteps = 1 << 29;
 constexpr double kScaleBound = 0.01;  // relative
 constexpr int kOpacityBound = 1;      // of 255
@@ -304,7 +304,7 @@ class Encoder {
     const size_t length = text_from(0).size() + kDigitsOfSpan * (groups.size() + 1);
     std::string file = kMagic;
     PutLittleEndian(kVersion, 2, &file);
-    PutLittleEndian(0, 2, &file);  // colours as they are
+    PutLittleEndian(0, 2, &file);  // colours are stored unchanged
     PutLittleEndian(length, 4, &file);
     std::string text = text_from(file.size() + length);
     text.resize(length, ' ');

@@ -134,7 +134,7 @@ std::string FirstThree(const ViewerGaussians& g) {
 // True for basis functions that change sign with the axes.
 std::array<float, kMaxShCoefficients> FlippedSigns() {
   double here[kMaxShCoefficients], there[kMaxShCoefficients];
-  EvaluateSh(kMaxShCoefficients, 0.36, 0.48, 0.8, here);  // where none is zero
+  EvaluateSh(kMaxShCoefficients, 0.36, 0.48, 0.8, here);  // a direction without zeros
   EvaluateSh(kMaxShCoefficients, 0.36, -0.48, -0.8, there);
   std::array<float, kMaxShCoefficients> signs;
   for (int k = 0; k < kMaxShCoefficients; ++k) signs[k] = here[k] * there[k] < 0.0 ? -1.0f : 1.0f;
@@ -210,7 +210,7 @@ std::string EncodeSpz(const ViewerGaussians& gaussians, SpzVersion version, Thre
     return Gzip(file);
   }
   PutLittleEndian(streams.size(), 1, &file);
-  PutLittleEndian(kHeaderBytes, 4, &file);  // where the table of sizes begins
+  PutLittleEndian(kHeaderBytes, 4, &file);  // offset of the table of sizes
   file.resize(kHeaderBytes, '\0');
   std::vector<std::string> packed(streams.size());
   pool.ForEach(static_cast<int64_t>(streams.size()),
