@@ -36,9 +36,8 @@ class ChromaTrainer {
         parameters_(parameters),
         in_time_(fitting.geometry, fitting.run.pool) {
     state_.parameters = parameters.block;
-    const int rows = state_.parameters.rows();
-    const int64_t count = state_.parameters.count();
-    state_.moments = {ParameterBlock(rows, count), ParameterBlock(rows, count)};
+    const ParameterBlock zeros = state_.parameters.ZerosOfSameShape();
+    state_.moments = {zeros, zeros};
     state_.random = Random(options_.seed, 1);
   }
 

@@ -245,8 +245,7 @@ class ChromaSolver {
     reader.Block(block);
     reader.Value(state);
     reader.Value(seconds);
-    if (!reader.ok() || block.rows() != parameters_.block.rows() ||
-        block.count() != parameters_.block.count()) {
+    if (!reader.ok() || !block.HasShapeOf(parameters_.block)) {
       run_.progress.OnWarning(
           "chroma: the checkpoint belongs to other options or is damaged; fitting starts afresh");
       return;

@@ -105,8 +105,7 @@ class Refiner {
     for (size_t v = 0; v < views_.size(); ++v) {
       if (views_[v].fitted) order.push_back(v);
     }
-    AdamMoments moments{ParameterBlock(parameters_.rows(), parameters_.count()),
-                        ParameterBlock(parameters_.rows(), parameters_.count())};
+    AdamMoments moments{parameters_.ZerosOfSameShape(), parameters_.ZerosOfSameShape()};
     Random random(options_.seed);
     const int64_t total = static_cast<int64_t>(order.size()) * options_.epochs;
     int64_t step = 0;

@@ -51,9 +51,9 @@ class GeometryTrainer {
         still_(problem.still, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask) {
     state_.parameters = FirstParameters(
         problem.initial, channels_, ShCoefficients(options.sh_degree), options.max_gaussians);
-    const int rows = state_.parameters.rows();
     initial_count_ = state_.parameters.count();
-    state_.moments = {ParameterBlock(rows, initial_count_), ParameterBlock(rows, initial_count_)};
+    const ParameterBlock zeros = state_.parameters.ZerosOfSameShape();
+    state_.moments = {zeros, zeros};
     state_.statistics.Reset(initial_count_);
     state_.random = Random(options.seed);
     if (schedule_.tuning().exposure_rate > 0.0) state_.exposures.resize(problem.training.size());

@@ -158,8 +158,8 @@ MoverSearchResult FindMovingPart(const GeometryProblem& problem,
     parameters = {};
     return found;
   }
-  const ParameterBlock zero(parameters.rows(), parameters.count());
-  found.moving.moments = {zero, zero};
+  const ParameterBlock zeros = parameters.ZerosOfSameShape();
+  found.moving.moments = {zeros, zeros};
   return found;
 }
 

@@ -133,13 +133,11 @@ namespace color3d {
 namespace {
 HWY_EXPORT(MoveRange);
 HWY_EXPORT(BackwardRange);
-
-int64_t Blocks(const ParameterBlock& moving) { return (moving.count() + 15) / 16; }
 }  // namespace
 
 void ApplyMotion(const MotionAt& motion, ThreadPool& pool, ParameterBlock& at, float hidden) {
   const auto move_range = &COLOR3D_KERNEL(MoveRange);
-  pool.ForRanges(Blocks(motion.moving), [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(motion.moving.blocks(), [&](int64_t begin, int64_t end, int) {
     move_range(motion, hidden, begin, end, at);
   });
 }
@@ -150,14 +148,12 @@ void ApplyMotionBackward(const MotionAt& motion,
                          ThreadPool& pool,
                          ParameterBlock& d_moving) {
   const ParameterBlock& moving = motion.moving;
-  if (d_moving.rows() != moving.rows() || d_moving.count() != moving.count()) {
-    d_moving = ParameterBlock(moving.rows(), moving.count());
-  }
+  if (!d_moving.HasShapeOf(moving)) d_moving = moving.ZerosOfSameShape();
   for (int r = 0; r < motion.row; ++r) {
     std::copy_n(d_at.Row(r) + motion.first, moving.count(), d_moving.Row(r));
   }
   const auto backward_range = &COLOR3D_KERNEL(BackwardRange);
-  pool.ForRanges(Blocks(moving), [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(moving.blocks(), [&](int64_t begin, int64_t end, int) {
     backward_range(motion, at, d_at, begin, end, d_moving);
   });
 }

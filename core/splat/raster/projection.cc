@@ -366,14 +366,14 @@ void ProjectSplats(const SplatInput& input,
                    bool depth_channel,
                    ThreadPool& pool,
                    SplatBuffer& splats) {
-  const int64_t count = input.parameters.count();
+  const size_t count = static_cast<size_t>(input.parameters.count());
   splats.channels = input.color.channels + (depth_channel ? 1 : 0);
   splats.row_floats = SplatRowFloats(splats.channels);
-  splats.rows.resize(static_cast<size_t>(count) * splats.row_floats);
-  splats.depth_key.resize(static_cast<size_t>(count));
+  splats.rows.resize(count * splats.row_floats);
+  splats.depth_key.resize(count);
   const ForwardContext ctx{input.parameters, input.color, depth_channel, input.camera, splats};
   const auto project_range = &COLOR3D_KERNEL(ProjectRange);
-  pool.ForRanges((count + 15) / 16,
+  pool.ForRanges(input.parameters.blocks(),
                  [&](int64_t begin, int64_t end, int) { project_range(ctx, begin, end); });
 }
 
@@ -384,10 +384,7 @@ void ProjectSplatsBackward(const SplatInput& input,
                            ThreadPool& pool,
                            const GradientOutput& output) {
   const ParameterBlock& parameters = input.parameters;
-  if (output.parameters.rows() != parameters.rows() ||
-      output.parameters.count() != parameters.count()) {
-    output.parameters = ParameterBlock(parameters.rows(), parameters.count());
-  }
+  if (!output.parameters.HasShapeOf(parameters)) output.parameters = parameters.ZerosOfSameShape();
   const BackwardContext ctx{GradientRowFloats(input.color.channels),
                             kGradientColor + input.color.channels,
                             parameters,
@@ -400,7 +397,7 @@ void ProjectSplatsBackward(const SplatInput& input,
                             output.parameters,
                             output.statistics};
   const auto backward_range = &COLOR3D_KERNEL(BackwardRange);
-  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(parameters.blocks(), [&](int64_t begin, int64_t end, int) {
     const ScopedFlushToZero flush;
     backward_range(ctx, begin, end);
   });
