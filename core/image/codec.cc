@@ -254,7 +254,7 @@ Image Decode(std::string_view bytes,
       image = FloatsFromMat<uint8_t>(mat, 1.0f / 255.0f, size);
     } else if (mat.depth() == CV_16U) {
       image = FloatsFromMat<uint16_t>(mat, 1.0f / 65535.0f, size);
-      // OpenCV inverts 8-bit ones, but not these (film scans).
+      // OpenCV inverts such pictures of 8 bits but not of 16 (film scans).
       if (info.min_is_white) {
         for (float& v : image.data) v = 1.0f - v;
       }

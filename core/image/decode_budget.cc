@@ -91,8 +91,8 @@ int64_t FloatBytes(const ImageInfo& info, int width, int height) {
 int64_t DecodingBytes(const ImageInfo& info, bool copies) {
   const int64_t samples = int64_t{info.width} * info.height * CodecChannels(info);
   const int64_t stored = samples * (info.bits_per_channel > 8 ? 2 : 1);
-  // JPEG files that come in several scans are held as coefficients of two bytes.
-  // WebP and HEIC are held as planes of luma and chroma, too.
+  // JPEG files of several scans are held as coefficients of two bytes, WebP and HEIC also as planes
+  // of luma and chroma.
   const bool is_held_twice = info.format == ImageFormat::kJpeg ||
                              info.format == ImageFormat::kWebp || info.format == ImageFormat::kHeif;
   const int64_t coefficients = is_held_twice ? 2 * samples : 0;

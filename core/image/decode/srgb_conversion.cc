@@ -56,8 +56,7 @@ Profile ProfileOfNumbers(const ColorTag& tag) {
   return Profile(cmsCreateRGBProfile(&white, &primaries, curves));
 }
 
-// Null, with `problem` said, when the tag cannot be followed; null without when there is nothing to
-// follow.
+// Returns null if there is nothing to convert or, with `problem` set, if the tag cannot be used.
 Profile OpenProfile(const ColorTag& tag, std::string* problem) {
   *problem = tag.problem;
   if (!problem->empty()) return nullptr;
@@ -140,7 +139,7 @@ bool AreNear(const std::vector<float>& x, const std::vector<float>& y, float dif
 // CMS's floats, and nine times as fast.
 class MatrixShaper {
  public:
-  // Null for other profiles, and for those that this does not follow to 1e-4.
+  // Returns null for other profiles, and for those that the tables do not reproduce to 1e-4.
   static std::unique_ptr<MatrixShaper> Of(const Profile& profile, const Transform& exact) {
     if (!cmsIsMatrixShaper(profile.get())) return nullptr;
     std::unique_ptr<MatrixShaper> shaper(new MatrixShaper());
@@ -213,7 +212,7 @@ class MatrixShaper {
   float matrix_[3][3] = {};
 };
 
-// Little CMS has a quick way for 8 bits, and an exact one for floats.
+// For 8 bits Little CMS has a fast path.
 void ConvertRow8(const Transform& transform,
                  size_t row,
                  std::vector<uint8_t>& in,
@@ -242,7 +241,7 @@ void ConvertRowExactly(const Transform& transform,
   }
 }
 
-// False when the profile cannot be followed.
+// Returns false if the profile cannot be used.
 bool ConvertColors(const Profile& profile, int bits, Image* image) {
   const Profile srgb(cmsCreate_sRGBProfile());
   const Transform exact(
@@ -269,7 +268,7 @@ bool ConvertColors(const Profile& profile, int bits, Image* image) {
   return true;
 }
 
-// False when the profile cannot be followed.
+// Returns false if the profile cannot be used.
 bool ConvertTones(const Profile& profile, bool gray, int bits, int channels, Image* image) {
   const std::vector<float> table = ToneTable(profile, gray, bits > 8 ? 65536 : 256);
   if (table.empty()) return false;
@@ -289,7 +288,7 @@ std::string Saved(const Profile& profile) {
   }
   std::string bytes(size, '\0');
   cmsSaveProfileToMem(profile.get(), bytes.data(), &size);
-  // The date of its making: equal pictures are to be equal files.
+  // A fixed creation date, so that equal pictures give equal files.
   constexpr size_t kDateAt = 24;
   const std::string date("\x07\xE8\0\x01\0\x01\0\0\0\0\0\0", 12);
   return bytes.replace(kDateAt, date.size(), date);
