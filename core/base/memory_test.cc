@@ -117,7 +117,7 @@ TEST(OwnMemory, ReportsRemainderOfLimit) {
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(ReleaseFreedMemory, ReturnsFreedMemoryToSystem) {
-  constexpr size_t kBlock = 16 << 10, kBlocks = 8192;  // too small to be mapped each by itself
+  constexpr size_t kBlock = 16 << 10, kBlocks = 8192;  // too small for a mapping each
   std::vector<std::unique_ptr<char[]>> blocks(kBlocks);
   for (auto& block : blocks) {
     block.reset(new char[kBlock]);
@@ -153,7 +153,7 @@ int ArenasOfEightThreads() {
   return count;
 }
 
-// In processes of their own: the limit holds for all threads, forever.
+// In child processes, because the limit holds for all threads and cannot be undone.
 TEST(ShareMallocArenasDeathTest, ThreadsShareArenas) {
   testing::FLAGS_gtest_death_test_style = "threadsafe";
   EXPECT_EXIT(

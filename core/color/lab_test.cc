@@ -41,7 +41,7 @@ TEST(Lab, GraysAreNeutralAndMonotone) {
 }
 
 TEST(Lab, ImagePathAgreesWithFloat64) {
-  // 65^3 lattice plus random colours plus the dark corner, where the functions bend most.
+  // A lattice of 65^3, random colours, and the dark corner, where the functions are most curved.
   const int n = 65;
   Image srgb(n * n, n + 40, 3);
   Random random(1);
@@ -136,8 +136,8 @@ TEST(Lab, GamutMappingKeepsLightnessAndHue) {
 }
 
 TEST(Lab, GamutMappingIsContinuousAtYellow) {
-  // Just off the gamut's surface, everywhere: strict chroma reduction fails this by up to 30 units
-  // at bright yellow, where the gamut is not star-shaped.
+  // Just outside the gamut's surface, everywhere: strict chroma reduction fails this by up to 30
+  // units at bright yellow, where the gamut is not star-shaped.
   Random random(7);
   double worst = 0.0;
   for (int i = 0; i < 40000; ++i) {

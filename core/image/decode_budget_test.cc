@@ -66,7 +66,7 @@ TEST(DecodeBudget, LimitsConcurrentDecodes) {
 TEST(DecodeBudget, NestedTurnsOfOneThreadDoNotWait) {
   DecodeBudget budget([] { return 1000 * kMiB; });
   const PictureTurn whole({"a.png", 10'000, 7'000, 800 * kMiB}, budget);
-  const PictureTurn part({"a.png", 10'000, 7'000, 700 * kMiB}, budget);  // must not wait for itself
+  const PictureTurn part({"a.png", 10'000, 7'000, 700 * kMiB}, budget);  // must not deadlock
 }
 
 TEST(DecodingBytes, CountsCodecMemory) {
@@ -78,7 +78,7 @@ TEST(DecodingBytes, CountsCodecMemory) {
   EXPECT_EQ(DecodingBytes(info, true), 24'000'000);
   info.bits_per_channel = 16;
   EXPECT_EQ(DecodingBytes(info, false), 18'000'000);
-  info.channels = 2;  // a codec's four
+  info.channels = 2;  // four in the codec
   EXPECT_EQ(DecodingBytes(info, false), 24'000'000);
 }
 

@@ -37,7 +37,7 @@ Image Stripes(int width, float shift) {
   return srgb;
 }
 
-// Figures of a preset that works on sharper pictures are those of the pictures at the common size.
+// Scores of larger pictures are those of the pictures at the common size.
 TEST(ScoreView, ReducesLargePicturesToTheCommonSize) {
   const Image truth = LabFromSrgb(Stripes(2 * kScoreSidePx, 0.0f));
   const Image wrong = LabFromSrgb(Stripes(2 * kScoreSidePx, 0.1f));

@@ -1,4 +1,4 @@
-// Films of every codec and container: all their frames, and no frame that is damaged.
+// Films of every codec and container: all frames are read, and damaged ones are not returned.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ TEST_F(FilmContainersTest, FindsEveryFrameOfEveryContainer) {
     int b_frames;
     bool is_flat;
   } kinds[] = {{"libx264", "film.mts", 2, false},
-               {"libx264", "film.avi", 3, false},  // of which some are referred to
+               {"libx264", "film.avi", 3, false},  // some of which are reference pictures
                {"libx264", "film.vob", 2, true},
                {"libx264", "film.mkv", 2, false},
                {"libx264", "film.flv", 2, false},

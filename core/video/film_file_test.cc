@@ -1,4 +1,4 @@
-// Films that name other files: none of these is opened.
+// Films that refer to other files, which must not be opened.
 #include "core/video/film_file.h"
 
 #include <gmock/gmock.h>
@@ -127,7 +127,7 @@ std::string LinkedMatroska(const std::string& next) {
 
 class FilmFileTest : public testing::Test {
  protected:
-  // A film with sound that others name.
+  // A film with sound that other films refer to.
   FilmFileTest() {
     WriteNumberedFilm(folder_.path() / "pictures.ts",
                       {.encoder = "mpeg2video", .frames = 30, .group = 6});
@@ -219,7 +219,7 @@ TEST_F(FilmFileTest, MatroskaSegmentsOpenNoOtherFile) {
   EXPECT_FALSE(opened.HasEvent());
 }
 
-// A name in which FFmpeg's libraries would see a pattern, a protocol or a list is one of a file.
+// Names that FFmpeg's libraries would take as a pattern, a protocol or a list are file names.
 TEST_F(FilmFileTest, TakesUrlsAsFileNames) {
   for (const char* name :
        {"f%01d.mp4", "concat:a|b.ts", "http:a.ts", "*.ts", "-i.ts", "a b#?.ts"}) {

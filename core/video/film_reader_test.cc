@@ -171,7 +171,7 @@ TEST_F(FilmReaderTest, AppliesRotationOfPhone) {
     const Image image = film.Read(1);
     ASSERT_EQ(image.width, film.facts().width);
     ASSERT_EQ(image.height, film.facts().height);
-    // The dark side was on the left: clockwise it comes to the top, the right, the bottom.
+    // The dark left side turns clockwise to the top, the right, the bottom.
     const int w = image.width, h = image.height;
     const float dark = turns == 1   ? MeanGreen(image, 8, w - 8, 4, h / 2 - 4)
                        : turns == 2 ? MeanGreen(image, w / 2 + 4, w - 4, 8, h - 8)

@@ -150,7 +150,7 @@ class FrameConverterTest : public testing::TestWithParam<AVPixelFormat> {
  protected:
   const AVPixFmtDescriptor& facts() const { return *av_pix_fmt_desc_get(GetParam()); }
 
-  // A frame of one luma, and of no colour: `share` of the way from black to white.
+  // A grey frame of one luma, `share` of the way from black to white.
   Frame Plain(double share, bool is_full) {
     Frame frame = EmptyFrame(GetParam());
     for (int c = 0; c < facts().nb_components; ++c) {

@@ -36,7 +36,7 @@ TEST(UpVectorTest, CamerasLookingDownFromOneSideAreLevel) {
     const Vector3d around = AngleAxisd(degrees * M_PI / 180, up) * side;
     views.push_back(Looking(3.0 * around + 3.0 * up, Vector3d::Zero(), up));
   }
-  // Their mean leans by 40 degrees; level horizons tell the truth.
+  // Their mean leans by 40 degrees; the level horizons determine the up vector.
   EXPECT_GT(UpVector(views).dot(up), std::cos(12.0 * M_PI / 180));
 }
 
@@ -65,7 +65,7 @@ TEST(ScenePlacementTest, KeyViewIsInFrontWithSamePicture) {
   EXPECT_GT(key.position.z(), 0.0);
   EXPECT_LT(key.target.norm(), 1e-9);
   EXPECT_GT((placement.rotation * up).y(), 0.999);
-  // A point has the same place before the camera in both worlds, but for the size and the axes.
+  // A point has the same position relative to the camera in both worlds, up to scale and axes.
   const Vector3d point(1.5, 2.5, 2.0);
   for (const View& view : scene.views) {
     const PageCamera camera = PlaceCamera(placement, view);

@@ -64,7 +64,7 @@ TEST(ViewPageTest, PageIsSelfContained) {
   EXPECT_DOUBLE_EQ(photo.at("aspect"), 1.5);
   EXPECT_DOUBLE_EQ(photo.at("tan"), 0.25);
   EXPECT_DOUBLE_EQ(photo.at("center").at(0), 0.55);
-  // The focus in the file is at (10, 0, 8): it comes into the origin.
+  // The focus, at (10, 0, 8) in the file, becomes the origin.
   const auto& frame = facts.at("frame");
   const auto& q = frame.at("rotation");
   const Eigen::Quaterniond rotation(q.at(3).get<double>(), q.at(0), q.at(1), q.at(2));

@@ -197,7 +197,7 @@ TEST(TorchArchiveTest, EndsQuicklyForDeepAndCyclicPickles) {
               HasSubstr("no tensors"));
 }
 
-// Modules that hold each other, and a chain of 60 modules that each hold the next twice (2^60
+// Modules that contain each other, and a chain of 60 modules that each contain the next twice (2^60
 // paths).
 TEST(TorchArchiveTest, RefusesCyclicAndDoublingModules) {
   const auto script = [](const std::string& pickle) {

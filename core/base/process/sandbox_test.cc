@@ -98,7 +98,7 @@ TEST_F(SandboxTest, DeniesFilesOutsideRules) {
       EACCES);
   EXPECT_EQ(InSandbox(rules_, [&] { return ::unlink((scratch_.path() / "secret").c_str()) == 0; }),
             EACCES);
-  // A way around by a name of one's own for it.
+  // A symbolic link does not bypass the rules.
   fs::create_symlink(scratch_.path() / "secret", own / "link");
   EXPECT_EQ(InSandbox(rules_, [&] { return CanOpen(own / "link", O_RDONLY); }), EACCES);
 
@@ -129,7 +129,7 @@ TEST_F(SandboxTest, FollowsSocketRules) {
 
   EXPECT_EQ(InSandbox(rules_, [] { return CanMakeSocket(AF_UNIX); }), EPERM);
   EXPECT_EQ(InSandbox(rules_, [] { return CanMakeSocket(AF_INET); }), EPERM);
-  // The kernel looks at the lower half of the number only.
+  // The kernel reads only the lower half of the number.
   const auto with_high_bits = [] {
     return ::syscall(SYS_socket, (1L << 32) | AF_INET, SOCK_STREAM, 0) >= 0;
   };

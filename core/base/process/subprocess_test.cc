@@ -106,7 +106,7 @@ TEST(Subprocess, SandboxedProgramReachesOwnFolderOnly) {
                            (other.path() / "out").string() + "'"};
   options.sandbox = SandboxRules();
   options.sandbox->writable = {scratch.path()};
-  options.log_path = other.path() / "log";  // opened by us
+  options.log_path = other.path() / "log";  // opened by the parent
   EXPECT_NE(RunSubprocess(options, CancellationToken()).exit_code, 0);
   EXPECT_EQ(ReadFile(scratch.path() / "in"), "in\n");
   EXPECT_FALSE(std::filesystem::exists(other.path() / "out"));

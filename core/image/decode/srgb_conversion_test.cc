@@ -20,7 +20,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Colours that all of the spaces hold, away from their edges.
+// Colours inside all of the spaces, away from their edges.
 Image Colors(int channels) {
   Image image(12, 9, channels);
   Random random(3);
@@ -87,7 +87,7 @@ TEST(SrgbConversion, GrayPicturesKeepOneChannelWithSrgbTones) {
   const Image srgb = Colors(1);
   for (const Container& container : Containers()) {
     const std::string name = container.name;
-    if (name == "WebP" || name == "BMP") continue;  // have no grey
+    if (name == "WebP" || name == "BMP") continue;  // without grey
     for (const std::string& profile :
          {GrayGammaProfile(1.8), GrayGammaProfile(2.2), DotGainProfile(20.0)}) {
       const Image other = ConvertToProfile(srgb, profile);

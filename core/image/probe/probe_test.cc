@@ -107,7 +107,7 @@ TEST(Probe, ReadsTheHeaderOfEveryFormat) {
 TEST(Probe, NamesEveryTruncatedFile) {
   for (const Sample& sample : Samples()) {
     for (size_t length = 0; length < sample.bytes.size(); ++length) {
-      // A heap copy of the exact size, so that an address sanitizer sees the first byte too many.
+      // A heap copy of the exact size, so that an address sanitizer reports the first byte beyond.
       const std::vector<char> cut(sample.bytes.begin(), sample.bytes.begin() + length);
       const std::string_view view(cut.data(), cut.size());
       const std::string said = Refusal([&] { ProbeImage(view, sample.name); });
@@ -164,7 +164,7 @@ TEST(Probe, RejectsOtherFiles) {
               HasSubstr("BigTIFF"));
 }
 
-// A PNG of one chunk with a right checksum.
+// A PNG of one chunk with a valid checksum.
 std::string PngClaiming(uint32_t width, uint32_t height) {
   std::string header("IHDR", 4);
   for (uint32_t v : {width, height}) {

@@ -112,7 +112,7 @@ TEST(TiffPagesTest, RejectsRawAndCmykWithRemedy) {
     }
     return "";
   };
-  // A preview in front of a sensor's data is not the picture.
+  // The preview before a sensor's data is not the picture.
   EXPECT_THAT(refusal(TiffFile({{.image = Plain(10, 8, 0.2f)},
                                 {.image = Plain(40, 30, 0.8f), .photometric = 32803}})),
               HasSubstr("a.tif holds a camera's raw data; develop it"));

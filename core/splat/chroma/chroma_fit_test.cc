@@ -1,4 +1,4 @@
-// Chroma of a room whose colours are known, and of systems that have no unique answer.
+// Chroma of a room with known colours, and of systems without a unique solution.
 #include "core/splat/chroma/chroma_fit.h"
 
 #include <gmock/gmock.h>
@@ -168,7 +168,7 @@ TEST(FitChromaTest, ConfidenceIsMeanOverVisiblePixels) {
   ASSERT_EQ(even.size(), geometry.size());
   double sum = 0.0;
   for (const float c : even) sum += c;
-  EXPECT_NEAR(sum / even.size(), 0.5, 0.1);  // half of the views are sure
+  EXPECT_NEAR(sum / even.size(), 0.5, 0.1);  // half of the views have confidence 1
   EXPECT_EQ(even.back(), 0.0f) << "not seen";
   // Pixels of lower weight count less for the confidence, too.
   guessed_weight = 0.0;

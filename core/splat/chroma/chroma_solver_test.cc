@@ -25,7 +25,7 @@ using chroma_problems::Fit;
 using chroma_problems::RandomGaussians;
 using chroma_problems::RandomProblem;
 
-// W of one view by the float64 renderer: a picture per coefficient, which is set to 1 alone.
+// W of one view by the float64 renderer: one picture per coefficient, with the others 0.
 Eigen::MatrixXd DenseWeights(const GaussianModel& geometry, int degree, const PosedCamera& view) {
   const ChromaParameters p = ChromaParameters::From(geometry, degree);
   const int n = p.coefficients();

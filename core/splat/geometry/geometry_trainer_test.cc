@@ -33,7 +33,7 @@ class Recorder : public ProgressObserver {
   std::vector<std::string> warnings;
 };
 
-// Saves once, after `save_after` questions whether to, and then cancels the work.
+// Saves once, at call `save_after` of WantsSave(), and then cancels the work.
 class SaveThenStop : public CheckpointStore {
  public:
   SaveThenStop(int save_after, CancellationToken* cancel) : left_(save_after), cancel_(cancel) {}
@@ -260,7 +260,7 @@ TEST(TrainGeometryTest, NamesPositionOfNaNInPicture) {
   EXPECT_THAT(refusal.message, testing::HasSubstr("view 1: the pixel at 7, 5"));
 }
 
-// An extent that makes every step overflow, however often the rate is halved.
+// An extent with which every step overflows, even at the lowest rate.
 TEST(TrainGeometryTest, RestoresLastGoodStateThenGivesUp) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
   GeometryProblem problem = ProblemOf(s, -1);

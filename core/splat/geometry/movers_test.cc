@@ -34,7 +34,7 @@ PosedCamera CameraAt(double x, int shot, double time_s) {
 
 Eigen::Vector3d BallAt(double time_s) { return {0.4 * time_s - 0.8, 0.0, 4.0}; }
 
-// A wall at z = kWall and a ball before it.
+// A wall at z = kWall and a ball in front of it.
 SurveyedView ViewAt(double x, int shot, double time_s, bool with_ball) {
   SurveyedView view;
   view.posed = CameraAt(x, shot, time_s);
@@ -104,7 +104,7 @@ TEST(MotionSurveyTest, ConstantResidualIsNotMotion) {
   EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
-// Rows first to end - 1 were seen to move.
+// Rows first to end - 1 have known motion.
 std::vector<SurveyedView> WithSeen(std::vector<SurveyedView> views, int first, int end) {
   for (SurveyedView& view : views) {
     view.still = Image(kSide, kSide, 1, 1.0f);

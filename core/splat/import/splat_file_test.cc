@@ -124,7 +124,7 @@ TEST(SplatFileTest, ChecksSizesBeforeAllocating) {
   for (const SpzVersion version : {SpzVersion::k2, SpzVersion::k4}) {
     EXPECT_THAT(Refusal(EncodeSpz(BallOnGround(5), version, pool), few), HasSubstr("at most 4"));
   }
-  // A header of SPZ 2 that promises 4 billion Gaussians in a hundred bytes.
+  // A header of SPZ 2 that claims 4 billion Gaussians in a hundred bytes.
   std::string header("NGSP\x02\0\0\0\xff\xff\xff\xff\0\x0c\0\0", 16);
   EXPECT_THAT(Refusal(Gzip(header + std::string(1000, '\0'))), HasSubstr("cut short"));
 }
@@ -160,7 +160,7 @@ TEST(SplatFileTest, NamesUnsupportedVersion) {
   EXPECT_THAT(Refusal(Gzip("a text, packed, of more than 16 bytes")), HasSubstr("not an SPZ"));
 }
 
-// A file is read from its archive or not at all.
+// Files outside the archive are not read.
 TEST(SplatFileTest, DoesNotReadFilesOutsideArchive) {
   const ScratchFolder folder;
   const std::filesystem::path outside = folder.path() / "means.webp";
@@ -181,7 +181,7 @@ TEST(SplatFileTest, SpzVersion3UsesRotationsOfVersion4) {
   const ViewerGaussians g = BallOnGround(20);
   const std::string four = EncodeSpz(g, SpzVersion::k4, pool);
   const ViewerGaussians expected = ReadSpz(four);
-  // The same streams behind the older header: positions, opacities, colours, scales, rotations.
+  // The same streams after the older header: positions, opacities, colours, scales, rotations.
   std::string three("NGSP\x03\0\0\0\x14\0\0\0", 12);
   three += four.substr(12, 2) + std::string(2, '\0');
   const auto byte = [&](double value) { three += static_cast<char>(std::lround(value)); };
@@ -194,7 +194,7 @@ TEST(SplatFileTest, SpzVersion3UsesRotationsOfVersion4) {
   for (const float logit : expected.opacity_logit) byte(255.0 / (1.0 + std::exp(-logit)));
   for (const float sh : expected.sh) byte(255.0 * (0.15 * sh + 0.5));
   for (const float scale : expected.log_scale) byte(16.0 * (scale + 10.0));
-  for (int i = 0; i < 20; ++i) three += std::string("\0\0\0\xc0", 4);  // w is left out: identity
+  for (int i = 0; i < 20; ++i) three += std::string("\0\0\0\xc0", 4);  // w is omitted: identity
   const ViewerGaussians g3 = ReadSpz(Gzip(three));
   EXPECT_EQ(g3.position, expected.position);
   EXPECT_EQ(g3.log_scale, expected.log_scale);

@@ -1,4 +1,4 @@
-// Motion and its adjoint against a twin in float64, once per instruction set.
+// Motion and its adjoint against a float64 reference, once per instruction set.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ class ApplyMotionTest : public InstructionSetTest<int> {  // of thread counts
     }
   }
 
-  // Still ones, then moving ones at `t`.
+  // Static Gaussians, then moving ones at `t`.
   ParameterBlock At(float t) {
     ParameterBlock at = RandomRows(kRows, kStill + kMoving, 3);
     for (int r = 0; r < kRows; ++r) {

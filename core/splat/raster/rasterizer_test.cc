@@ -251,8 +251,8 @@ TEST_P(RasterTest, DroppedGaussiansHaveNoEffect) {
   }
 }
 
-// Moving the principal point moves all centres alike, so a picture of one Gaussian gives dL/d(u, v)
-// by finite differences of the reference.
+// Moving the principal point moves all centres equally, so a picture of one Gaussian gives dL/d(u,
+// v) by finite differences of the reference.
 TEST_P(RasterTest, ScreenGradientsAgreeWithTheReference) {
   ThreadPool pool(2);
   const int channels = TestCase(), width = 41, height = 35;

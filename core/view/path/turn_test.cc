@@ -48,7 +48,7 @@ TEST(TurnTest, SurroundingPhotosGiveCircleOthersSway) {
   EXPECT_TRUE(TurnOf(SceneOf(ring), 3).around);
   ring.resize(6);  // a quarter and more without photos
   EXPECT_FALSE(TurnOf(SceneOf(ring), 3).around);
-  // The key view in the middle of a wide arc: to both sides alike.
+  // The key view in the middle of a wide arc: equally to both sides.
   Turn turn = TurnOf(SceneOf({-40, -20, 0, 20, 40}), 2);
   EXPECT_FALSE(turn.around);
   EXPECT_NEAR(turn.middle, 0.0, 1e-9);
@@ -56,7 +56,7 @@ TEST(TurnTest, SurroundingPhotosGiveCircleOthersSway) {
   // At an end of it: to the other side only.
   turn = TurnOf(SceneOf({-60, -40, -20, 0}), 3);
   EXPECT_NEAR(std::abs(turn.middle), turn.reach, 1e-9);
-  // Few degrees: not far beyond them.
+  // A narrow arc: not far beyond it.
   turn = TurnOf(SceneOf({-10, 0, 10}), 1);
   EXPECT_NEAR(turn.reach, 10.0 * kDegree, 0.01);
   EXPECT_NEAR(TurnOf(SceneOf({0}), 0).reach, 0.1, 1e-9);

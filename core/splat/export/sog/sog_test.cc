@@ -55,7 +55,7 @@ TEST(SogTest, RoundTripsWithinFormatPrecision) {
         lost += std::pow(g.sh[i * row + k] - file.sh[j * row + k], 2.0);
       }
     }
-    // Random harmonics are the worst that a palette can be given.
+    // Random harmonics are the worst case for a palette.
     if (degree > 0) {
       EXPECT_LT(lost, 0.6 * harmonics) << degree;
     }
