@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
-#   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
+#   core:   base <- {catalogue, simd, grid, color, image, zip <- weights} <- {scene, encoder}
 #           <- {keyview, augment, carry <- film, splat, metrics, report, video, view, matching <- {keycolor, colorizer}}
 #           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- {recolor, report} <- stages
 #   colorizer: colorizer <- model <- neighbors <- training <- personal
@@ -51,7 +51,8 @@ allow core/color 'core/(base|color)'
 allow core/image 'core/(base|image(/(probe|decode))?)'
 allow core/image/decode 'core/(base|image/(probe|decode))'
 allow core/image/probe 'core/(base|image/probe)'
-allow core/weights 'core/(base|weights)'
+allow core/zip 'core/(base|zip)'
+allow core/weights 'core/(base|zip|weights)'
 allow core/scene 'core/(base|catalogue|color|image(/probe)?|scene(/[a-z]+)?)'
 scene='base|catalogue|color|image(/probe)?'
 allow_own core/scene "core/($scene|scene)"
@@ -81,12 +82,12 @@ done
 lower=
 for part in model motion raster training geometry chroma export import; do
   lower="$lower${lower:+|}$part"
-  allow "core/splat/$part" "core/(base|simd|color|image|scene|splat/($lower))"
+  allow "core/splat/$part" "core/(base|zip|simd|color|image|scene|splat/($lower))"
 done
 allow core/report 'core/(base|catalogue|image|report)'
 allow core/video 'core/(base|video)'
 allow core/film 'core/(base|image|carry|film)'
-allow core/view 'core/(base|scene|view(/path)?)'
+allow core/view 'core/(base|zip|scene|view(/path)?)'
 allow core/view/path 'core/(base|scene|view(/path)?)'
 # Below the stages: what they are given, their options, the formats of artifacts; then what several
 # stages share. Other folders of core know nothing of stages.
@@ -123,14 +124,14 @@ allow server/worker/live \
   'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/live)'
 allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
-forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
+forbid 'torch/|ATen/|c10/' core/base core/zip core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \
   core/keycolor/hints core/keycolor/words
 forbid 'grpc|google/protobuf|color3d/v1|spdlog' core
 forbid 'sqlite3' $(find core -name '*.h' -o -name '*.cc' | grep -v '^core/scene/sfm/sfm_database')
 forbid 'libav|libsw' $(ls -d core/*/ | grep -v '^core/video/') server client
 forbid 'sqlite3' server/rpc server/worker client
-forbid 'opencv2' server client core/splat core/base core/simd core/grid
+forbid 'opencv2' server client core/splat core/base core/zip core/simd core/grid
 
 # public FOLDER HEADER...: what the product outside of FOLDER may include of it; the rest is its own.
 # (Tests and benchmarks look inside.)
@@ -168,7 +169,7 @@ public core/splat model/gaussian_cap model/gaussian_model model/memory_plan moti
 public core/stage idle_stages run_stages film_import/import_film formats/artifact_io options/[a-z_]+
 public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path
-public core/weights byte_source safetensors weight_file weight_map weight_reader
+public core/weights safetensors weight_file weight_map weight_reader
 public server/access certificate_roles notify_targets tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck

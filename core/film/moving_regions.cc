@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <mutex>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -13,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/base/median.h"
+#include "core/base/mutex.h"
 #include "core/image/box_mean.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
@@ -287,7 +287,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
                              const std::function<void(int frame, const Image& moving)>& on_frame) {
   constexpr int kAtOnce = 16;  // frames; bounds memory
   ShotMotion motion = MotionOfCamera(frames, pool, cancel);
-  std::mutex adding, handing_over;
+  Mutex adding, handing_over;
   std::vector<Votes> votes(frames.count);
   std::vector<double> share(frames.count, 0.0);
   for (int begin = 0; begin < frames.count; begin += kAtOnce) {
@@ -301,7 +301,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
       const Image forth = DenseFlow(*before, *behind), back = DenseFlow(*behind, *before);
       const PairResidual of_earlier = Compare(*before, forth, back);
       const PairResidual of_later = Compare(*behind, back, forth);
-      const std::lock_guard lock(adding);
+      const MutexLock lock(adding);
       Add(of_earlier, &votes[earlier]);
       Add(of_later, &votes[later]);
     });
@@ -317,7 +317,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
       double sum = 0.0;
       for (const float v : moving.data) sum += v;
       share[frame] = sum / static_cast<double>(moving.data.size());
-      const std::lock_guard lock(handing_over);
+      const MutexLock lock(handing_over);
       on_frame(frame, moving);
     });
   }

@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <functional>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "core/base/range_check.h"
 #include "core/carry/confidence.h"
 #include "core/color/lab.h"
@@ -251,7 +251,7 @@ void RunCorrectColors(const CorrectColorsOptions& options,
   const auto total = std::ssize(scene.views);
   const int samples = static_cast<int>(kPlacesOfAllViews / scene.TrainingViews().size() + 1);
   std::vector<PlaceSample> samples_of(total);
-  std::mutex outputs;
+  Mutex outputs;
   int64_t done = 0;
   double changed = 0.0;
   context.pool().ForEach(total, [&](int64_t index, int) {
@@ -265,7 +265,7 @@ void RunCorrectColors(const CorrectColorsOptions& options,
     if (!provenance.Empty()) CountAsSeen(answer.share, &provenance);
     const std::string ab_png = EncodeAbPng(ab);
     const std::string provenance_png = provenance.Empty() ? "" : EncodePng8(provenance);
-    const std::lock_guard lock(outputs);
+    const MutexLock lock(outputs);
     changed += Mean(answer.share);
     if (!painted.empty()) {
       context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view), ab_png);

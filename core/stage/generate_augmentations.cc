@@ -94,14 +94,8 @@ void GenerateWithBackend(const AugmentationOptions& options,
       continue;
     }
     asked = true;
-    std::vector<Augmentation> made = AugmentationsFromBackend(options.backend,
-                                                              *remote,
-                                                              info,
-                                                              it->first,
-                                                              it->second,
-                                                              key_srgb,
-                                                              options.max_side_px,
-                                                              context);
+    std::vector<Augmentation> made =
+        AugmentationsFromBackend(options, *remote, info, it->first, it->second, key_srgb, context);
     std::ranges::move(made, std::back_inserter(outcome->made));
     it = counts->erase(it);
   }

@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/splat/export/sog/sog.h"
-#include "core/splat/export/sog/zip.h"
 #include "core/splat/export/spz/spz.h"
 #include "core/splat/import/splat_file.h"
+#include "core/zip/zip.h"
 #include "tests/integration/service_fixture.h"
 #include "tests/support/scenes/splat_files.h"
 

@@ -64,7 +64,7 @@ double NormalMatrixCondition(const Fit& f, ThreadPool& pool) {
       std::fill_n(p.Row(kColorRow), count, 0.0f);
       p.Row(kColorRow)[i] = 1.0f;
       const float black = 0.0f;
-      pipeline.Forward(p, color, raster, &black, false, pool);
+      pipeline.Forward({p, color, raster}, &black, false, pool);
       for (int y = 0; y < kSide; ++y) {
         columns.col(i).segment(y * kSide, kSide) =
             Eigen::Map<const Eigen::VectorXf>(pipeline.color().Row(0, y), kSide).cast<double>();

@@ -166,14 +166,14 @@ StabilityResult FarMoments(ThreadPool& pool) {
   result.condition_of = "-";
   for (const float t : {-1.0f, 0.0f, 1.0f, 1e4f}) {
     ParameterBlock at = parameters, gradient;
-    ApplyMotion(moving, kRows, t, 0, pool, at);
+    ApplyMotion({moving, kRows, t, 0}, pool, at);
     // Only what is drawn has a gradient.
     ParameterBlock d_at = RandomBlock(7, 1.0);
     for (int64_t i = 0; i < kBlockCount; ++i) {
       if (at.Row(kOpacityRow)[i] > -9.0f) continue;
       for (int r = 0; r < kRows; ++r) d_at.Row(r)[i] = 0.0f;
     }
-    ApplyMotionBackward(moving, kRows, t, 0, at, d_at, pool, gradient);
+    ApplyMotionBackward({moving, kRows, t, 0}, at, d_at, pool, gradient);
     for (const ParameterBlock* block : {&at, &gradient}) {
       for (int r = 0; r < block->rows(); ++r) {
         result.non_finite += CountNonFinite(block->Row(r), kBlockCount);

@@ -127,7 +127,7 @@ StabilityResult CompareRaster(const RasterCase& raster_case, ThreadPool& pool) {
   result.left_out = static_cast<int64_t>(sampled - pixels.size());
 
   SplatPipeline pipeline;
-  pipeline.Forward(r.parameters, r.color, r.camera, kBackground, true, pool);
+  pipeline.Forward({r.parameters, r.color, r.camera}, kBackground, true, pool);
   result.value_error = ValueError(pipeline, r.color.channels, pixels);
   result.non_finite = NonFinite(pipeline.color().data) + NonFinite(pipeline.transmittance().data);
 
@@ -137,9 +137,11 @@ StabilityResult CompareRaster(const RasterCase& raster_case, ThreadPool& pool) {
   ParameterBlock gradient;
   DensifyStatistics statistics;
   statistics.Reset(r.parameters.count());
-  pipeline.Forward(r.parameters, r.color, r.camera, kBackground, false, pool);
-  pipeline.Backward(
-      r.parameters, r.color, r.camera, adjoint, GradientScope::kAll, pool, gradient, &statistics);
+  pipeline.Forward({r.parameters, r.color, r.camera}, kBackground, false, pool);
+  pipeline.Backward({r.parameters, r.color, r.camera},
+                    adjoint,
+                    pool,
+                    {GradientScope::kAll, gradient, &statistics});
   result.gradient_error = GradientError(
       truth, gradient, ReferenceGradient(truth, r.color, camera, background, pixels, adjoint_list));
   result.non_finite += NonFinite(gradient.values()) + NonFinite(statistics.gradient) +

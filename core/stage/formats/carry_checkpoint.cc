@@ -80,11 +80,14 @@ CarryCheckpoint::CarryCheckpoint(const Scene& scene, StageContext& context)
     : scene_(scene),
       context_(context),
       was_done_(scene.views.size(), 0),
-      is_done_(scene.views.size(), 0),
       coverage_(scene.views.size(), 0.0),
+      is_done_(scene.views.size(), 0),
       records_(kind::kCarryColor, kMagic, context) {
   records_.Restore([&](const json& record) { CheckRecord(record, scene_); },
-                   [&](const json& record) { Restore(record); });
+                   [&](const json& record) {
+                     const MutexLock lock(mutex_);
+                     Restore(record);
+                   });
 }
 
 void CarryCheckpoint::Restore(const json& record) {
@@ -115,7 +118,7 @@ void CarryCheckpoint::Keep(size_t view, double coverage, const std::string& png)
 }
 
 void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto index = static_cast<size_t>(view);
   Keep(index, coverage, png);
   context_.ReportProgress(
@@ -124,7 +127,7 @@ void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
 }
 
 void CarryCheckpoint::ReportProgress(const std::string& message) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   context_.ReportProgress(done_, std::ssize(scene_.views), message);
 }
 
@@ -133,13 +136,13 @@ std::string CarryCheckpoint::Png(int view) const {
 }
 
 void CarryCheckpoint::Replace(int view, double coverage, const std::string& png) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Keep(static_cast<size_t>(view), coverage, png);
   SaveWhenDue();
 }
 
 void CarryCheckpoint::SaveWhenDue() {
-  records_.SaveWhenDue([&] {
+  records_.SaveWhenDue([this]() COLOR3D_REQUIRES(mutex_) {
     std::vector<json> walks;
     for (const auto& [place, walk] : walks_) walks.push_back(RecordOf(walk, scene_));
     return walks;
@@ -147,14 +150,14 @@ void CarryCheckpoint::SaveWhenDue() {
 }
 
 std::vector<FilmWalk> CarryCheckpoint::Walks() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<FilmWalk> walks;
   for (const auto& [place, walk] : walks_) walks.push_back(walk);
   return walks;
 }
 
 void CarryCheckpoint::SetWalk(const FilmWalk& walk) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   walks_[{walk.key, walk.direction}] = walk;
 }
 

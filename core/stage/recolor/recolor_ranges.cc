@@ -6,12 +6,12 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/mutex.h"
 #include "core/carry/confidence.h"
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/corrector.h"
@@ -294,14 +294,14 @@ void RecolorRanges(const std::vector<RangeKeyView>& keys,
   const FilmToRecolor film{scene, images, *colorizer, key, context};
   int64_t total = 0, done = 0;
   for (const RecoloredRange& range : ranges) total += std::ssize(range.views);
-  std::mutex outputs;
+  Mutex outputs;
   for (size_t i = 0; i < ranges.size(); ++i) {
     RangeColorer(ranges[i], film, context.scratch_folder() / fmt::format("range_{}", i))
         .Run([&](int index, const FusedColor& color) {
           const View& view = scene.views[index];
           const std::string ab = EncodeAbPng(color.ab);
           const std::string provenance = EncodePng8(color.provenance);
-          const std::lock_guard lock(outputs);
+          const MutexLock lock(outputs);
           context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view), ab);
           context.WriteOutput(ViewArtifact(artifact::kCorrectedProvenance, view), provenance);
           context.ReportProgress(++done, total, "recolouring " + view.name);

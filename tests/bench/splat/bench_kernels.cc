@@ -43,8 +43,8 @@ void MeasureMotion(benchmark::State& state) {
   const ParameterBlock moving(kColorRow + 1 + kMotionRows, state.range(0));
   ParameterBlock at(kColorRow + 1, state.range(0)), gradient;
   for (auto _ : state) {
-    ApplyMotion(moving, kColorRow + 1, kMoment, 0, pool, at);
-    ApplyMotionBackward(moving, kColorRow + 1, kMoment, 0, at, at, pool, gradient);
+    ApplyMotion({moving, kColorRow + 1, kMoment, 0}, pool, at);
+    ApplyMotionBackward({moving, kColorRow + 1, kMoment, 0}, at, at, pool, gradient);
   }
 }
 

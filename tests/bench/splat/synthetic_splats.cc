@@ -73,14 +73,14 @@ SyntheticIteration::SyntheticIteration(const SyntheticLoad& load, int threads)
 }
 
 void SyntheticIteration::Project() {
-  ProjectSplats(parameters_, color_, false, camera_, pool_, splats_);
+  ProjectSplats({parameters_, color_, camera_}, false, pool_, splats_);
 }
 void SyntheticIteration::Bin() {
   binner_.Bin(splats_, camera_.width, camera_.height, pool_, lists_);
 }
 void SyntheticIteration::Forward() {
   RasterizeForward(
-      splats_, lists_, kBlack, pool_, picture_, &transmittance_, nullptr, block_masks_);
+      splats_, lists_, kBlack, pool_, {picture_, &transmittance_, nullptr}, block_masks_);
 }
 void SyntheticIteration::Loss() {
   loss_.Evaluate(picture_, target_, nullptr, LossWeights(), pool_, d_picture_);
@@ -89,16 +89,12 @@ void SyntheticIteration::Backward() {
   RasterizeBackward(splats_, lists_, block_masks_, picture_, d_picture_, pool_, pair_gradient_);
 }
 void SyntheticIteration::ProjectBackward() {
-  ProjectSplatsBackward(parameters_,
-                        color_,
-                        camera_,
+  ProjectSplatsBackward({parameters_, color_, camera_},
                         splats_,
                         pair_gradient_,
                         lists_.first_pair,
-                        GradientScope::kAll,
                         pool_,
-                        gradient_,
-                        &statistics_);
+                        {GradientScope::kAll, gradient_, &statistics_});
 }
 void SyntheticIteration::Adam() {
   AdamStep(gradient_, learning_rates_, ++step_, pool_, parameters_, moments_);
