@@ -6,9 +6,9 @@
 #   colorizer: colorizer <- model <- neighbors <- training <- personal
 #   scene:  scene <- {masks, formats} <- sfm <- import
 #   server: base <- store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
-# LibTorch is seen only where networks live, protocol buffers never below the server, SQL there only for
-# COLMAP's database (core/scene/sfm/sfm_database.cc). What tests
-# (*_test.cc) set up is not held against their folder; the product never includes tests/.
+# LibTorch is included only by folders with networks, protocol buffers only by the server and above. Below
+# the server SQL is used only for COLMAP's database (core/scene/sfm/sfm_database.cc). Tests (*_test.cc) are
+# exempt; the product never includes tests/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 failed=0
@@ -19,8 +19,8 @@ complain() {
   failed=1
 }
 
-# allow FOLDER REGEX: every include of our own by FOLDER's sources matches REGEX (or is core/base's).
-# Its tests are exempt.
+# allow FOLDER REGEX: all project includes of FOLDER's sources match REGEX or are from core/base.
+# Tests are exempt.
 allow() {
   local bad
   bad=$(grep -rnE '#include "(core|server|client|tests)/' "$1" --include='*.h' --include='*.cc' |
@@ -28,7 +28,7 @@ allow() {
     grep -v '^[^:]*_test\.cc:' || true)
   [ -z "$bad" ] || complain "$1 may not include:" "$bad"
 }
-# allow_own FOLDER REGEX: the same for the files that lie in FOLDER itself.
+# allow_own FOLDER REGEX: the same, without subfolders.
 allow_own() {
   local bad
   bad=$(grep -nE '#include "(core|server|client|tests)/' "$1"/*.h "$1"/*.cc |
@@ -36,7 +36,7 @@ allow_own() {
     grep -v '^[^:]*_test\.cc:' || true)
   [ -z "$bad" ] || complain "$1 may not include:" "$bad"
 }
-# forbid REGEX FOLDER...: no source there has an include that matches REGEX.
+# forbid REGEX FOLDER...: no include of these folders matches REGEX.
 forbid() {
   local pattern=$1 bad
   shift
@@ -89,8 +89,8 @@ allow core/video 'core/(base|video)'
 allow core/film 'core/(base|image|carry|film)'
 allow core/view 'core/(base|zip|scene|view(/path)?)'
 allow core/view/path 'core/(base|scene|view(/path)?)'
-# Below the stages: what they are given, their options, the formats of artifacts; then what several
-# stages share. Other folders of core know nothing of stages.
+# Below the stages: their context and options, the formats of artifacts, then code that several stages
+# share. Other folders of core do not depend on stages.
 below='core/([a-rt-z][a-z]*|scene|simd|splat)(/[a-z]+)?'
 parts=
 for part in context options formats sources movie film_import film recolor report; do
@@ -133,8 +133,8 @@ forbid 'libav|libsw' $(ls -d core/*/ | grep -v '^core/video/') server client
 forbid 'sqlite3' server/rpc server/worker client
 forbid 'opencv2' server client core/splat core/base core/zip core/simd core/grid
 
-# public FOLDER HEADER...: what the product outside of FOLDER may include of it; the rest is its own.
-# (Tests and benchmarks look inside.)
+# public FOLDER HEADER...: the headers of FOLDER that the product may include from outside. (Tests and
+# benchmarks may include all.)
 public() {
   local folder=$1 known bad
   shift
@@ -142,7 +142,7 @@ public() {
   bad=$(grep -rnE "#include \"$folder/" core server client deploy --include='*.h' --include='*.cc' |
     grep -vE "^($folder/|[^:]*_test\.cc:)" |
     grep -vE "#include \"$folder/(${known%|})\.h\"" || true)
-  [ -z "$bad" ] || complain "these headers are $folder's own:" "$bad"
+  [ -z "$bad" ] || complain "headers private to $folder:" "$bad"
 }
 
 public core/augment augment outpaint surrogates

@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-// Says errors and warnings as they come, and keeps the warnings.
+// Prints errors and warnings, and keeps the warnings.
 class PrintingObserver : public ProgressObserver {
  public:
   PrintingObserver(std::string kind, const std::function<void(const std::string&)>& say)
@@ -80,7 +80,7 @@ void LocalPipeline::Run(const std::string& kind,
                        recorder,
                        recorder,
                        cancel);
-  if (SkipIdleStage(kind, context).empty()) stage(context);
+  if (LeaveOutIdleStage(kind, context).empty()) stage(context);
   const double seconds = recorder.Seconds();
   if (!recorder.points().empty()) {
     context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(recorder.points()));

@@ -9,7 +9,7 @@ namespace color3d {
 namespace {
 
 constexpr float kBackground[3] = {0.2f, 0.5f, 0.6f};
-// Denominators of buffers that are zero: far below the eps of Adam, 1e-15.
+// Denominator for buffers of zeros: far below the eps of Adam, 1e-15.
 constexpr double kVanishing = 1e-20;
 
 // Largest |fast - reference| and |reference| of a buffer.
@@ -86,7 +86,7 @@ double GradientError(const ReferenceParameters& parameters,
   return worst;
 }
 
-// Random weights of the pixels, in both forms.
+// Random weights of the pixels, for both renderers.
 void MakeAdjoint(const std::vector<ReferencePixel>& pixels,
                  int channels,
                  PlaneBuffer& planes,

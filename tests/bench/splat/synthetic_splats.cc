@@ -60,7 +60,7 @@ SyntheticIteration::SyntheticIteration(const SyntheticLoad& load, int threads)
   parameters_ = RandomGaussians(load, camera_);
   moments_ = {ParameterBlock(parameters_.rows(), load.gaussians),
               ParameterBlock(parameters_.rows(), load.gaussians)};
-  learning_rates_.assign(parameters_.rows(), 1e-7f);  // the load stays what it is
+  learning_rates_.assign(parameters_.rows(), 1e-7f);  // keeps the load constant
   statistics_.Reset(load.gaussians);
   for (int c = 0; c < load.channels; ++c) {
     for (int y = 0; y < load.height_px; ++y) {

@@ -1,4 +1,4 @@
-// Fixture of tests with several projects on one server: two whose tokens may submit, and an admin.
+// Fixture of tests with several projects on one server: two projects with submitters, and an admin.
 #pragma once
 
 #include <memory>
