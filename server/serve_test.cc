@@ -195,8 +195,7 @@ TEST_F(ProcessTest, TerminationReleasesTheJobAndTheNextServerGoesOn) {
   }
   {
     SqliteDatabase db(scratch_.path() / "data" / "jobs.db", SqliteAccess::kWrite);
-    SqliteStatement job(db.handle(), "select state, attempt from job where name=?");
-    job.Bind(name);
+    SqliteStatement job(db, "select state, attempt from job where name=?", name);
     ASSERT_TRUE(job.Step());
     EXPECT_EQ(job.Text(0), "QUEUED");
     EXPECT_EQ(job.Int(1), 0) << "a drain does not count";

@@ -63,23 +63,22 @@ void SqliteJobStore::SetState(SqliteDatabase& db, int64_t job_id, JobState state
 }
 
 bool SqliteJobStore::InputsAreReady(SqliteDatabase& db, int64_t job_id) {
-  SqliteStatement waiting(
-      db.handle(),
-      "select 1 from job_dependency d join job i on i.job_id=d.input_id where d.job_id=? and "
-      "not (i.state='SUCCEEDED' or (i.state='SKIPPED' and i.skipped_by_plan=1)) limit 1");
-  waiting.Bind(job_id);
-  return !waiting.Step();
+  return !SqliteStatement(
+              db,
+              "select 1 from job_dependency d join job i on i.job_id=d.input_id where d.job_id=? "
+              "and "
+              "not (i.state='SUCCEEDED' or (i.state='SKIPPED' and i.skipped_by_plan=1)) limit 1",
+              job_id)
+              .Step();
 }
 
 void SqliteJobStore::QueueReadyDependants(SqliteDatabase& db, int64_t job_id) {
-  std::vector<int64_t> dependants;
-  {
-    SqliteStatement select(db.handle(),
-                           "select d.job_id from job_dependency d join job j on j.job_id=d.job_id "
-                           "where d.input_id=? and j.state='BLOCKED' order by d.job_id");
-    select.Bind(job_id);
-    while (select.Step()) dependants.push_back(select.Int(0));
-  }
+  const auto dependants =
+      SqliteStatement(db,
+                      "select d.job_id from job_dependency d join job j on j.job_id=d.job_id "
+                      "where d.input_id=? and j.state='BLOCKED' order by d.job_id",
+                      job_id)
+          .All([](const SqliteStatement& row) { return row.Int(0); });
   for (const int64_t dependant : dependants) {
     if (InputsAreReady(db, dependant)) SetState(db, dependant, JobState::kQueued);
   }
@@ -110,16 +109,13 @@ void SqliteJobStore::PropagateEnd(SqliteDatabase& db, const JobRecord& cause) {
   while (!ended.empty()) {
     const JobRecord from = ended.front();
     ended.pop_front();
-    std::vector<JobRecord> waiting;
-    {
-      SqliteStatement select(
-          db.handle(),
-          SelectJobWithoutSpec(
-              "where state='BLOCKED' and job_id in "
-              "(select job_id from job_dependency where input_id=?) order by job_id"));
-      select.Bind(from.id);
-      while (select.Step()) waiting.push_back(JobFromRow(select));
-    }
+    const std::vector<JobRecord> waiting =
+        SqliteStatement(db,
+                        SelectJobWithoutSpec(
+                            "where state='BLOCKED' and job_id in "
+                            "(select job_id from job_dependency where input_id=?) order by job_id"),
+                        from.id)
+            .All(JobFromRow);
     for (const JobRecord& job : waiting) {
       if (job.name != from.parent) {
         db.Run("update job set skip_reason=? where job_id=?", "input " + cause.name + why, job.id);
@@ -202,8 +198,7 @@ void SqliteJobStore::RequireRoom(SqliteDatabase& db,
                                  int64_t jobs,
                                  const QueueLimits& limits) {
   SqliteStatement unfinished(
-      db.handle(), "select count(*), coalesce(sum(project=?), 0) from job where end_ms=0");
-  unfinished.Bind(project);
+      db, "select count(*), coalesce(sum(project=?), 0) from job where end_ms=0", project);
   unfinished.Step();
   if (unfinished.Int(0) + jobs > limits.all) {
     throw ServiceError(ErrorReason::kQueueFull,
@@ -228,8 +223,7 @@ void SqliteJobStore::RequireRoom(SqliteDatabase& db,
 JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
                                       const RequestKey& request,
                                       const QueueLimits& limits) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   std::set<std::string> scenes = {graph.scene};
   for (const NewJob& job : graph.jobs) {
@@ -244,13 +238,12 @@ JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
   for (size_t i = 0; i < graph.jobs.size(); ++i) InsertJob(db, graph, i, names, &ids);
   RecordRequest(db, request, names.back());
   JobRecord root = RequireJob(db, names.back());
-  transaction.Commit();
+  db.Commit();
   return root;
 }
 
 JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& request) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   // The submitted job first: its children then find it finished and leave it alone.
   const std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
@@ -276,13 +269,12 @@ JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& requ
   }
   RecordRequest(db, request, name);
   JobRecord result = RequireJob(db, name);
-  transaction.Commit();
+  db.Commit();
   return result;
 }
 
 JobRecord SqliteJobStore::Kill(const std::string& name) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
   // The submitted job first: its children then find it finished and leave it alone.
   std::ranges::reverse(graph);
@@ -296,26 +288,24 @@ JobRecord SqliteJobStore::Kill(const std::string& name) {
   }
   for (const int64_t id : killed) PropagateEnd(db, JobById(db, id));
   JobRecord result = RequireJob(db, name);
-  transaction.Commit();
+  db.Commit();
   return result;
 }
 
 JobRecord SqliteJobStore::Pin(const std::string& name, bool pinned) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   const JobRecord job = RequireJob(db, name);
   if (!job.parent.empty()) {
     throw InvalidArgument("{} is a stage of {}; pin that", name, job.parent);
   }
   db.Run("update job set pinned=? where job_id=?", pinned, job.id);
   JobRecord result = RequireJob(db, name);
-  transaction.Commit();
+  db.Commit();
   return result;
 }
 
 void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, bool from_scratch) {
-  SqliteStatement lost(db.handle(), "select lost_input from job where job_id=?");
-  lost.Bind(job.id);
+  SqliteStatement lost(db, "select lost_input from job where job_id=?", job.id);
   if (lost.Step() && !lost.Text(0).empty()) {
     throw ServiceError(ErrorReason::kInputDeleted,
                        "{} reads results of {}, which was deleted; submit the work anew",
@@ -323,11 +313,11 @@ void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, boo
                        lost.Text(0));
   }
   SqliteStatement bad(
-      db.handle(),
+      db,
       SelectJob("where job_id in (select input_id from job_dependency where job_id=?) and "
                 "(state in('FAILED','CANCELLED') or (state='SKIPPED' and skipped_by_plan=0)) "
-                "limit 1"));
-  bad.Bind(job.id);
+                "limit 1"),
+      job.id);
   if (bad.Step()) {
     throw WrongState(JobFromRow(bad), "retry it before " + job.name + ", which reads its results");
   }
@@ -351,8 +341,7 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
                                 bool from_scratch,
                                 const RequestKey& request,
                                 const QueueLimits& limits) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   const JobRecord job = RequireJob(db, name);
   if (!CanBeRetried(job)) throw WrongState(job, "only failed or cancelled jobs can be retried");
@@ -372,13 +361,12 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
   }
   RecordRequest(db, request, name);
   JobRecord result = RequireJob(db, name);
-  transaction.Commit();
+  db.Commit();
   return result;
 }
 
 void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (CheckRequest(db, request)) return;
   const JobRecord root = RequireJob(db, name);
   std::vector<int64_t> ids;
@@ -388,7 +376,7 @@ void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) 
   }
   const std::string list = JoinIds(ids);
   SqliteStatement reader(
-      db.handle(),
+      db,
       SelectJob("where end_ms=0 and job_id in (select job_id from job_dependency where input_id in "
                 "(" +
                 list + ")) limit 1"));
@@ -405,17 +393,15 @@ void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) 
       "i.job_id=d.input_id where d.job_id=job.job_id and d.input_id in (" +
       list + ") limit 1) where job_id in (select job_id from job_dependency where input_id in (" +
       list + "))");
-  std::vector<std::string> blobs;
-  {
-    SqliteStatement named(db.handle(),
-                          "select sha256 from artifact where job_id in (" + list +
-                              ") union select sha256 from job_blob where job_id in (" + list + ")");
-    while (named.Step()) blobs.push_back(named.Text(0));
-  }
+  const std::vector<std::string> blobs =
+      SqliteStatement(db,
+                      "select sha256 from artifact where job_id in (" + list +
+                          ") union select sha256 from job_blob where job_id in (" + list + ")")
+          .Texts();
   db.Run("delete from job where job_id in (" + list + ")");
   ReleaseHoldings(db, root.project, blobs);
   RecordRequest(db, request, name);
-  transaction.Commit();
+  db.Commit();
 }
 
 }  // namespace color3d

@@ -127,7 +127,7 @@ int64_t InsertRow(SqliteDatabase& db, const char* table, Record record) {
   static const std::vector<std::string> names = ColumnNames<Record>();
   const auto inserted = names.begin() + 1;  // all but the id
   const std::vector<const char*> places(names.size() - 1, "?");
-  SqliteStatement insert(db.handle(),
+  SqliteStatement insert(db,
                          fmt::format("insert into {}({}) values({})",
                                      table,
                                      fmt::join(inserted, names.end(), ", "),

@@ -20,10 +20,11 @@ constexpr int64_t kSpareBytes = int64_t{16} << 20;
 
 // Nothing: the file has no tables.
 std::optional<int64_t> VersionOf(SqliteDatabase& db) {
-  SqliteStatement table(db.handle(),
-                        "select 1 from sqlite_master where type='table' and name='schema_version'");
-  if (!table.Step()) return std::nullopt;
-  SqliteStatement version(db.handle(), "select version from schema_version");
+  if (!SqliteStatement(db,
+                       "select 1 from sqlite_master where type='table' and name='schema_version'")
+           .Step())
+    return std::nullopt;
+  SqliteStatement version(db, "select version from schema_version");
   return version.Step() ? std::optional(version.Int(0)) : std::nullopt;
 }
 
@@ -58,10 +59,7 @@ void Migrate(SqliteDatabase& db) {
 // A store of before version 6 keeps what deleted rows leave free, for ever. Building it anew takes
 // twice its length on the disk; where that is not free it is done at another start.
 void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
-  const auto number = [&](const char* pragma) {
-    SqliteStatement select(db.handle(), pragma);
-    return select.Step() ? select.Int(0) : 0;
-  };
+  const auto number = [&](const char* pragma) { return SqliteStatement(db, pragma).NextInt(); };
   if (number("pragma auto_vacuum") != 0) return;
   const int64_t bytes =
       (number("pragma page_count") - number("pragma freelist_count")) * number("pragma page_size");
@@ -93,18 +91,18 @@ void MakeTables(SqliteDatabase& db) {
 }
 
 bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
-  SqliteStatement same(db.handle(), "select 1 from server where version=? and boot_id=?");
-  same.Bind(identity.program_version, identity.boot_id);
-  return same.Step();
+  return SqliteStatement(db,
+                         "select 1 from server where version=? and boot_id=?",
+                         identity.program_version,
+                         identity.boot_id)
+      .Step();
 }
 
 // Writes nothing where nothing has changed: on a full disk the server still answers those who read.
 void SayWhoServes(SqliteDatabase& db, const ServerIdentity& identity) {
   if (IsKnown(db, identity)) return;
   SqliteTransaction transaction(db);
-  SqliteStatement before(db.handle(), "select 1 from server where boot_id=?");
-  before.Bind(identity.boot_id);
-  if (!before.Step()) {
+  if (!SqliteStatement(db, "select 1 from server where boot_id=?", identity.boot_id).Step()) {
     db.Exec("update job set lease_expires_ms=0 where state='RUNNING'");
     db.Exec(
         "update meta set value=0 where name in('collected_steady_ms', "

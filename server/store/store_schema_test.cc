@@ -22,7 +22,7 @@ class StoreSchemaTest : public JobStoreTest {
   }
   int64_t VersionOf(const fs::path& file) {
     SqliteDatabase db(file, SqliteAccess::kWrite);
-    SqliteStatement version(db.handle(), "select version from schema_version");
+    SqliteStatement version(db, "select version from schema_version");
     return version.Step() ? version.Int(0) : 0;
   }
   // What a program of version 1 has written.
@@ -31,11 +31,8 @@ class StoreSchemaTest : public JobStoreTest {
     SqliteDatabase old(File(), SqliteAccess::kWrite);
     old.Exec("pragma auto_vacuum=NONE");
     old.Exec("vacuum");
-    std::vector<std::string> triggers;
-    {
-      SqliteStatement all(old.handle(), "select name from sqlite_master where type='trigger'");
-      while (all.Step()) triggers.push_back(all.Text(0));
-    }
+    const std::vector<std::string> triggers =
+        SqliteStatement(old, "select name from sqlite_master where type='trigger'").Texts();
     for (const std::string& trigger : triggers) old.Exec(("drop trigger " + trigger).c_str());
     old.Exec(
         "drop index scene_file_blob; alter table scene_file rename to newer; create table "
@@ -105,7 +102,7 @@ TEST_F(StoreSchemaTest, ServerMigratesAnOldStoreAndKeepsACopy) {
 int64_t FreePages(const fs::path& file) {
   SqliteDatabase db(file, SqliteAccess::kWrite);
   db.Run("pragma wal_checkpoint(truncate)");
-  SqliteStatement free(db.handle(), "pragma freelist_count");
+  SqliteStatement free(db, "pragma freelist_count");
   return free.Step() ? free.Int(0) : -1;
 }
 

@@ -180,19 +180,19 @@ class World {
     EXPECT_TRUE(fs::is_empty(paths_.Scratch()));
     EXPECT_TRUE(fs::is_empty(paths_.Uploads()));
     SqliteDatabase db(paths_.Store(), SqliteAccess::kRead);
-    SqliteStatement wins(db.handle(),
+    SqliteStatement wins(db,
                          "select count(*), count(distinct job_id) from job_attempt where "
                          "outcome='SUCCEEDED'");
     ASSERT_TRUE(wins.Step());
     EXPECT_EQ(wins.Int(0), wins.Int(1)) << "a job succeeded twice";
-    SqliteStatement open(db.handle(), "select count(*) from job_attempt where end_ms=0");
+    SqliteStatement open(db, "select count(*) from job_attempt where end_ms=0");
     ASSERT_TRUE(open.Step());
     EXPECT_EQ(open.Int(0), 0) << "an attempt never ended";
   }
 
   bool HasJoined() const {
     SqliteDatabase db(paths_.Store(), SqliteAccess::kRead);
-    SqliteStatement joined(db.handle(), "select 1 from job_attempt where outcome='JOINED'");
+    SqliteStatement joined(db, "select 1 from job_attempt where outcome='JOINED'");
     return joined.Step();
   }
 
