@@ -1,4 +1,5 @@
-// Who makes and changes the tables; clocks that jump; machines that start anew.
+// Creation and migration of the tables, stores of other versions, clocks that jump, restarts of the
+// machine.
 #include "server/store/store_schema.h"
 
 #include <gtest/gtest.h>
@@ -6,6 +7,7 @@
 #include <map>
 
 #include "server/store/project_store.h"
+#include "server/store/schema.h"
 #include "server/store/sqlite_db.h"
 #include "tests/support/service/job_store_fixture.h"
 
@@ -19,6 +21,24 @@ class StoreSchemaTest : public JobStoreTest {
     StoreOptions options;
     options.program_version = version;
     SqliteJobStore(file, StoreRole::kWorker, TestClocks(), options);
+  }
+  // Brings a store of version 1 to `version`, as a program of that version did.
+  void MigrateOldTo(int version) {
+    SqliteDatabase old(File(), SqliteAccess::kWrite);
+    for (int from = 1; from < version; ++from) old.Exec(kMigrations[from - 1]);
+    old.Run("update schema_version set version=?", version);
+  }
+  // Columns, indexes and triggers of all tables, each on a line.
+  static std::vector<std::string> TablesOf(const fs::path& file) {
+    SqliteDatabase db(file, SqliteAccess::kRead);
+    return SqliteStatement(
+               db,
+               "select t.name||'.'||c.name||' '||lower(c.type)||' '||c.\"notnull\"||' '||"
+               "coalesce(c.dflt_value, '')||' '||c.pk as line from sqlite_master t, "
+               "pragma_table_info(t.name) c where t.type='table' union "
+               "select type||' '||name||': '||replace(replace(sql, char(10), ''), '  ', ' ') from "
+               "sqlite_master where type in('index','trigger') and sql<>'' order by line")
+        .Texts();
   }
   int64_t VersionOf(const fs::path& file) {
     SqliteDatabase db(file, SqliteAccess::kWrite);
@@ -96,6 +116,46 @@ TEST_F(StoreSchemaTest, ServerMigratesAnOldStoreAndKeepsACopy) {
   Open();  // nothing is left to be done
   EXPECT_FALSE(fs::exists(copy));
   EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 1u);
+}
+
+TEST_F(StoreSchemaTest, MigratesEveryEarlierVersion) {
+  const std::vector<std::string> tables = TablesOf(File());
+  EXPECT_GT(tables.size(), 100u);
+  for (int version = 1; version < kSchemaVersion; ++version) {
+    SCOPED_TRACE(version);
+    const JobRecord job = CreateSingle();
+    MakeOld();
+    MigrateOldTo(version);
+    Open();
+    EXPECT_EQ(VersionOf(File()), kSchemaVersion);
+    EXPECT_EQ(TablesOf(File()), tables);
+    EXPECT_EQ(store_->GetScene("scenes/test").files.at(0).path, "a.jpg");
+    EXPECT_EQ(store_->GetProject("").scenes, 1);
+    const JobRecord claimed = ClaimOne();
+    EXPECT_EQ(claimed.name, job.name);
+    EXPECT_EQ(claimed.spec, "spec of single");
+    Succeed(claimed, "result of version " + std::to_string(version));
+  }
+}
+
+// A store of this version that another build wrote has exactly these tables. After a change of the
+// tables raise kSchemaVersion, add a migration and only then change this digest.
+TEST_F(StoreSchemaTest, TablesChangeOnlyWithTheVersion) {
+  std::string text = std::to_string(kSchemaVersion);
+  for (const std::string& line : TablesOf(File())) text += "\n" + line;
+  EXPECT_EQ(Sha256Hex(text), "TABLES_DIGEST") << text;
+}
+
+TEST_F(StoreSchemaTest, RefusesStoreOfNewerVersion) {
+  store_.reset();
+  SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=version+1");
+  try {
+    Open();
+    ADD_FAILURE() << "the store was opened";
+  } catch (const Error& e) {
+    EXPECT_EQ(ReasonOf(e), "STORE_VERSION");
+    EXPECT_NE(std::string(e.what()).find("use the program that wrote it"), std::string::npos);
+  }
 }
 
 // Free pages of the database, and how long its file is once the log is folded into it.

@@ -10,7 +10,9 @@
 #include <memory>
 
 #include "core/base/error.h"
+#include "core/catalogue/stages.h"
 #include "proto/option_text.h"
+#include "server/planning/job_spec.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
 
@@ -57,6 +59,35 @@ TEST(CarryOptionsFromTest, RefusesJobsOfEarlierVersions) {
   ASSERT_EQ(options.ranges.size(), 1u);
   EXPECT_EQ(options.ranges[0].begin_s, 1.0);
   EXPECT_FALSE(options.ranges[0].end_s);
+}
+
+// The bytes of a queued carry_color job as an earlier version stored it: the additional key view
+// "b" is coloured automatically, by the stage itself.
+TEST(CarryOptionsFromTest, RefusesStoredJobOfVersionBefore) {
+  constexpr std::string_view kStored =
+      "\x0a\x0bscenes/fern"
+      "\x92\x01\x09"
+      "\x32\x07\x0a\x01"
+      "b"
+      "\x12\x02\x30\x01";
+  const v1::JobSpec spec = ParseSpec(std::string(kStored), "jobs/old");
+  try {
+    CarryOptionsFrom(spec.carry_color());
+    ADD_FAILURE() << "the job was accepted";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kFailedPrecondition) << "not tried again";
+    EXPECT_STREQ(e.what(),
+                 "an earlier version of the server planned this job without a job that colours the "
+                 "additional key view b; submit it again");
+  }
+}
+
+TEST(StagesTest, CatalogueHasEveryStageOfTheApi) {
+  const auto* stages = v1::JobSpec::descriptor()->FindOneofByName("stage");
+  for (int i = 0; i < stages->field_count(); ++i) {
+    const std::string& name = stages->field(i)->name();
+    if (name != "reconstruct_dense") EXPECT_NE(FindStage(name), nullptr) << name;
+  }
 }
 
 TEST(ColorizerOptionsFromTest, UnsetFieldsKeepTheMethodsDefaults) {
