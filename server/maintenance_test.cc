@@ -125,7 +125,7 @@ TEST_F(MaintenanceTest, RebootAddsNoAge) {
   EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256)));
 }
 
-TEST_F(MaintenanceTest, OldJobsGoWithTheirScenesAndLogs) {
+TEST_F(MaintenanceTest, DeletesOldJobsWithScenesAndLogs) {
   const JobRecord old = (CreateSingle(), ClaimOne());
   Succeed(old);
   std::ofstream(paths_.JobLogs() / (old.name.substr(5) + ".log")) << "it began\n";
@@ -194,7 +194,7 @@ TEST_F(UnreadableMaintenanceTest, ReportsUnreadableFolders) {
   EXPECT_TRUE(blobs_.Look(hidden.sha256).has_value());
 }
 
-TEST_F(MaintenanceTest, BallastIsMadeWhileThereIsRoom) {
+TEST_F(MaintenanceTest, CreatesBallastWhileThereIsRoom) {
   Ballast ballast(paths_.BallastFile(), 1 << 20);
   MaintenanceTiming timing = Quick();
   timing.ballast = &ballast;
@@ -207,7 +207,7 @@ TEST_F(MaintenanceTest, BallastIsMadeWhileThereIsRoom) {
   EXPECT_FALSE(ballast.IsThere()) << "there is no room beyond the reserve";
 }
 
-TEST_F(MaintenanceTest, NoJobIsBegunWhileSpaceIsLow) {
+TEST_F(MaintenanceTest, StartsNoJobWhileSpaceIsLow) {
   CreateSingle();
   MaintenanceTiming timing = Quick();
   timing.low_space_bytes = int64_t{1} << 60;
@@ -218,7 +218,7 @@ TEST_F(MaintenanceTest, NoJobIsBegunWhileSpaceIsLow) {
   EXPECT_TRUE(store_->Claim("w", kLease).has_value());
 }
 
-TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
+TEST_F(MaintenanceTest, SetsDamagedBlobsAside) {
   std::vector<FileDigest> all;
   for (int i = 0; i < 20; ++i) all.push_back(blobs_.PutBytes("blob " + std::to_string(i)));
   const fs::path damaged = blobs_.Fetch(all[7].sha256);
@@ -250,7 +250,7 @@ class FullStore : public SqliteJobStore {
   static Error Full() { return ServiceError(ErrorReason::kStorageFull, "full"); }
 };
 
-TEST_F(MaintenanceTest, AServerOnAFullDiskLivesAndStarts) {
+TEST_F(MaintenanceTest, ServerRunsAndStartsOnFullDisk) {
   store_->UpdateWorker({"gone", std::numeric_limits<int32_t>::max(), "", 0, 0});
   StoreOptions options;
   options.boot_id = boot_id_;
@@ -266,7 +266,7 @@ TEST_F(MaintenanceTest, AServerOnAFullDiskLivesAndStarts) {
 }
 
 // A sweep that hangs keeps no lost job from going on.
-TEST_F(MaintenanceTest, ReapsLeasesDuringASweep) {
+TEST_F(MaintenanceTest, ReapsLeasesDuringSweep) {
   class HangingBlobs : public FileBlobStore {
    public:
     using FileBlobStore::FileBlobStore;

@@ -102,22 +102,22 @@ class ConnectionsTest : public ::testing::Test {
   const ScratchFolder scratch_;
 };
 
-TEST_F(ConnectionsTest, ThoseThatSendNothing) {
+TEST_F(ConnectionsTest, ServesOthersBesideSilentOnes) {
   ServerProcess few(scratch_.path(), {}, 1, kFewDescriptors);
   Attack(few, "");
 }
 
-TEST_F(ConnectionsTest, ThoseThatSendNothingToAServerWithManyDescriptors) {
+TEST_F(ConnectionsTest, ServesOthersBesideSilentOnesWithManyDescriptors) {
   ServerProcess server(scratch_.path(), {});
   Attack(server, "");
 }
 
-TEST_F(ConnectionsTest, ThoseThatSendOneByte) {
+TEST_F(ConnectionsTest, ServesOthersBesideThoseThatSentOneByte) {
   ServerProcess few(scratch_.path(), {}, 1, kFewDescriptors);
   Attack(few, "P");
 }
 
-TEST_F(ConnectionsTest, ThoseThatSendNothingToAUnixSocket) {
+TEST_F(ConnectionsTest, ServesOthersBesideSilentOnesOnUnixSocket) {
   ServerProcess few(scratch_.path(),
                     {"--listen", "unix:" + (scratch_.path() / "s").string()},
                     1,
@@ -126,7 +126,7 @@ TEST_F(ConnectionsTest, ThoseThatSendNothingToAUnixSocket) {
 }
 
 // They are clients by all appearances; the one with a call stays.
-TEST_F(ConnectionsTest, ThoseThatSpeakHttpAndMakeNoCall) {
+TEST_F(ConnectionsTest, ServesOthersBesideHttpConnectionsWithoutCalls) {
   ServerProcess few(scratch_.path(), {}, 1, kFewDescriptors);
   TestClient watcher(OwnConnection(few.address()));
   const std::string job =
@@ -147,7 +147,7 @@ TEST_F(ConnectionsTest, ThoseThatSpeakHttpAndMakeNoCall) {
   EXPECT_EQ(last, v1::Job::STATE_SUCCEEDED);
 }
 
-TEST_F(ConnectionsTest, AServerThatNobodyReachesSaysSoAndEnds) {
+TEST_F(ConnectionsTest, UnreachableServerReportsAndEnds) {
   const fs::path socket = scratch_.path() / "s";
   ::testing::internal::CaptureStderr();
   ServerProcess server(scratch_.path(),
@@ -161,7 +161,7 @@ TEST_F(ConnectionsTest, AServerThatNobodyReachesSaysSoAndEnds) {
   EXPECT_THAT(said, ::testing::HasSubstr("nobody was answered on unix:" + socket.string()));
 }
 
-TEST_F(ConnectionsTest, ASecondServerDoesNotTakeTheSocketOver) {
+TEST_F(ConnectionsTest, SecondServerDoesNotTakeOverSocket) {
   const std::string address = "unix:" + (scratch_.path() / "s").string();
   const fs::path other = scratch_.path() / "other";
   fs::create_directory(other);

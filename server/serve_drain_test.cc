@@ -103,7 +103,7 @@ class DrainTest : public ::testing::Test {
   std::vector<std::thread> threads_;
 };
 
-TEST_F(DrainTest, WatchersUploadsAndJobsGoOnWithTheNextServer) {
+TEST_F(DrainTest, WatchesUploadsAndJobsContinueWithNextServer) {
   auto server = Start();
   Connection watching({.address = listen_}, never_), uploading({.address = listen_}, never_);
   const std::string script = "ms=50,steps=" + std::to_string(kSteps);

@@ -105,7 +105,7 @@ class LiveProcessTest : public ::testing::Test {
   std::unique_ptr<ServerProcess> server_;
 };
 
-TEST_F(LiveProcessTest, MixedScenesInOneStreamGetTheirOwnColors) {
+TEST_F(LiveProcessTest, ScenesInOneStreamGetTheirOwnColors) {
   Start();
   const v1::Colorizer first = MakeColorizer(), second = MakeColorizer();
   ASSERT_NE(first.scene(), second.scene());
@@ -134,7 +134,7 @@ TEST_F(LiveProcessTest, MixedScenesInOneStreamGetTheirOwnColors) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, WhatIsWrongWithOnePictureIsToldAndTheStreamGoesOn) {
+TEST_F(LiveProcessTest, BadPictureGetsErrorAndStreamContinues) {
   Start();
   const std::string bare = client().MakeScene().name();
   const v1::Colorizer made = MakeColorizer();
@@ -184,7 +184,7 @@ TEST_F(LiveProcessTest, WhatIsWrongWithOnePictureIsToldAndTheStreamGoesOn) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, PicturesOfAKilledWorkerFailAtOnceAndTheNextIsColored) {
+TEST_F(LiveProcessTest, PicturesOfKilledWorkerFailAndNextIsColored) {
   Start();
   LiveStream live(client());
   const Request example = Example();
@@ -211,7 +211,7 @@ TEST_F(LiveProcessTest, PicturesOfAKilledWorkerFailAtOnceAndTheNextIsColored) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, APictureThatKillsTheWorkerIsNotSentToTheNextOne) {
+TEST_F(LiveProcessTest, PictureThatKilledWorkerIsNotSentAgain) {
   Start();
   LiveStream live(client());
   live.Send(Example(), "poison", "crash");
@@ -224,7 +224,7 @@ TEST_F(LiveProcessTest, APictureThatKillsTheWorkerIsNotSentToTheNextOne) {
 }
 
 // A client that sends what was lost again, as it is told to.
-TEST_F(LiveProcessTest, APictureThatKillsWorkersIsFoundAndTakesNoOtherWithItAgain) {
+TEST_F(LiveProcessTest, PictureThatKillsWorkersIsIsolated) {
   Start();
   LiveStream live(client());
   const Request example = Example();
@@ -253,7 +253,7 @@ TEST_F(LiveProcessTest, APictureThatKillsWorkersIsFoundAndTakesNoOtherWithItAgai
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, ASlowReaderHoldsBoundedMemoryAndLosesNothing) {
+TEST_F(LiveProcessTest, SlowReaderUsesBoundedMemoryAndLosesNothing) {
   Start();
   constexpr int kPictures = 150;  // of 1 MiB each when coloured
   LiveStream live(client());
@@ -283,7 +283,7 @@ TEST_F(LiveProcessTest, ASlowReaderHoldsBoundedMemoryAndLosesNothing) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, CancelledAndLateStreamsLeaveRoomForOthers) {
+TEST_F(LiveProcessTest, CancelledAndLateStreamsReleaseTheirPlaces) {
   Start();
   const Request example = Example();
   LiveStream late(client(), std::chrono::milliseconds(700));
@@ -302,7 +302,7 @@ TEST_F(LiveProcessTest, CancelledAndLateStreamsLeaveRoomForOthers) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, DrainAnswersWhatIsUnderWayAndLeavesNoProcess) {
+TEST_F(LiveProcessTest, DrainAnswersPendingPicturesAndEndsWorker) {
   Start();
   LiveStream live(client()), quiet(client());
   const Request example = Example();
@@ -328,7 +328,7 @@ TEST_F(LiveProcessTest, DrainAnswersWhatIsUnderWayAndLeavesNoProcess) {
   EXPECT_FALSE(IsAlive(worker));
 }
 
-TEST_F(LiveProcessTest, TheWorkerEndsWithAKilledServerAndTheNextServerHasItsOwn) {
+TEST_F(LiveProcessTest, WorkerEndsWithKilledServer) {
   Start();
   {
     LiveStream live(client());
@@ -348,7 +348,7 @@ TEST_F(LiveProcessTest, TheWorkerEndsWithAKilledServerAndTheNextServerHasItsOwn)
 }
 
 // A Unix socket's path has at most 107 bytes.
-TEST_F(LiveProcessTest, ALongPathOfTheDataFolderIsNoHindrance) {
+TEST_F(LiveProcessTest, AcceptsLongPathOfDataFolder) {
   Start({}, std::string(120, 'd') + "/" + std::string(120, 'e'));
   LiveStream live(client());
   live.Send(Example(), "x", "x");
@@ -357,7 +357,7 @@ TEST_F(LiveProcessTest, ALongPathOfTheDataFolderIsNoHindrance) {
   EXPECT_EQ(fs::status(folder / "data" / "sockets").permissions(), fs::perms::owner_all);
 }
 
-TEST_F(LiveProcessTest, NoWorkerIsStartedUntilSomebodyAsks) {
+TEST_F(LiveProcessTest, StartsWorkerAtFirstRequest) {
   Start();
   SleepMs(500);
   EXPECT_TRUE(server_->Workers(/*inference=*/true).empty());

@@ -60,7 +60,7 @@ class SecretsTest : public ::testing::Test {
   const ScratchFolder scratch_;
 };
 
-TEST_F(SecretsTest, NoLogHoldsATokenOrAKey) {
+TEST_F(SecretsTest, LogsContainNoTokensOrKeys) {
   const fs::path tokens = scratch_.path() / "tokens", key = scratch_.path() / "notify.key";
   const std::string token = AddToken(tokens, "anna", Role::kSubmit);
   const std::string reader = AddToken(tokens, "bert", Role::kRead);

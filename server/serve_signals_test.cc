@@ -37,7 +37,7 @@ class SignalsTest : public ::testing::Test {
 };
 
 // Ctrl-\\, a container that is shut down, a limit of processor time: all of them drain.
-TEST_F(SignalsTest, WhateverEndsTheServerDrainsIt) {
+TEST_F(SignalsTest, DrainsOnEverySignalToEnd) {
   for (const int signal : {SIGQUIT, SIGPWR, SIGXCPU}) {
     SCOPED_TRACE(::strsignal(signal));
     const fs::path folder = scratch_.path() / std::to_string(signal);
@@ -56,7 +56,7 @@ TEST_F(SignalsTest, WhateverEndsTheServerDrainsIt) {
   }
 }
 
-TEST_F(SignalsTest, WhatIsMeantForOthersDoesNothing) {
+TEST_F(SignalsTest, IgnoresSignalsMeantForOthers) {
   ServerProcess server(scratch_.path(), {});
   const std::string job = Begin(server.client(), 10);
   const pid_t worker = server.Workers().at(0);
@@ -70,7 +70,7 @@ TEST_F(SignalsTest, WhatIsMeantForOthersDoesNothing) {
   EXPECT_FALSE(server.HasEnded());
 }
 
-TEST_F(SignalsTest, AWorkerThatIsHungUpSavesAndIsStartedAfresh) {
+TEST_F(SignalsTest, WorkerSavesAndRestartsOnHangUp) {
   ServerProcess server(scratch_.path(), {});
   const std::string job = Begin(server.client(), 60);
   for (const int signal : {SIGHUP, SIGQUIT}) {
@@ -110,7 +110,7 @@ TEST_F(SignalsTest, WorkersInheritNoSecrets) {
 }
 
 // Nobody else would: what it is told waits until it moves.
-TEST_F(SignalsTest, AFrozenWorkerOfAServerThatWasKilledIsEndedByTheNext) {
+TEST_F(SignalsTest, NextServerEndsFrozenWorkerOfKilledOne) {
   pid_t frozen = 0;
   std::string job;
   {
@@ -140,7 +140,7 @@ int ProcessesNamed(const std::string& name) {
 }
 
 // As the first process of a container the server inherits whatever has lost its parent.
-TEST_F(SignalsTest, AsFirstProcessItReapsWhatIsLeftBehind) {
+TEST_F(SignalsTest, ReapsOrphansAsFirstProcess) {
   const std::string name = "nap" + std::to_string(::getpid());
   const fs::path nap = scratch_.path() / name;
   fs::copy_file("/bin/sleep", nap);
@@ -168,7 +168,7 @@ TEST_F(SignalsTest, AsFirstProcessItReapsWhatIsLeftBehind) {
       << "nobody waited for it";
 }
 
-TEST_F(SignalsTest, CertificatesWithoutRolesAreRefusedAtTheStart) {
+TEST_F(SignalsTest, RefusesClientCaWithoutRolesAtStart) {
   TestAuthority ours(scratch_.path(), "ours");
   const CertificateFiles own = ours.Issue("server");
   const std::vector<std::string> tls = {

@@ -84,7 +84,7 @@ class SlowClientsTest : public ::testing::Test {
   double before_mib_ = 0.0;
 };
 
-TEST_F(SlowClientsTest, StreamsThatNobodyReads) {
+TEST_F(SlowClientsTest, BoundsMemoryOfUnreadStreams) {
   constexpr int kWatches = 900, kDownloads = 240;
   const v1::Digest blob = good_.Upload(std::string(2 << 20, 'b'));
   const std::string job = good_.Create(ScriptedSpec(good_.MakeScene().name(), "steps=1")).name();
@@ -108,7 +108,7 @@ TEST_F(SlowClientsTest, StreamsThatNobodyReads) {
 }
 
 // More uploads than may be open, each with the largest message that gRPC takes.
-TEST_F(SlowClientsTest, UploadsThatNobodyWants) {
+TEST_F(SlowClientsTest, BoundsMemoryOfRefusedUploads) {
   constexpr int kThreads = 24, kUploads = 20;
   google::bytestream::WriteRequest request;
   request.set_resource_name("uploads/u/blobs/" + DigestOf("x").sha256() + "/100000000");
@@ -135,7 +135,7 @@ TEST_F(SlowClientsTest, UploadsThatNobodyWants) {
   EXPECT_LT(GrowthMib(), 800.0) << "of 7,200 that were sent";
 }
 
-TEST_F(SlowClientsTest, AnswersThatNobodyReads) {
+TEST_F(SlowClientsTest, BoundsMemoryOfUnreadAnswers) {
   constexpr int kCalls = 800, kFiles = 8'000;
   v1::Scene scene;
   grpc::ClientContext context;
@@ -187,7 +187,7 @@ TEST_F(SlowClientsTest, AnswersThatNobodyReads) {
   }
 }
 
-TEST_F(SlowClientsTest, MoreRequestsThanAreWorkedOn) {
+TEST_F(SlowClientsTest, BoundsMemoryOfWaitingRequests) {
   constexpr int kCalls = 96;
   v1::CreateSceneRequest request = BigScene(10);
   request.set_display_name(std::string(15 << 20, 'n'));  // refused, once it is read

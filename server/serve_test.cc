@@ -41,7 +41,7 @@ class ProcessTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(ProcessTest, WholeGraphThenTheSameFromTheCache) {
+TEST_F(ProcessTest, RunsWholeGraphThenAnswersFromCache) {
   ServerProcess server(scratch_.path(), {}, 2);
   TestClient& client = server.client();
   v1::JobSpec spec;
@@ -68,7 +68,7 @@ TEST_F(ProcessTest, WholeGraphThenTheSameFromTheCache) {
   EXPECT_TRUE(fs::is_empty(left_over));
 }
 
-TEST_F(ProcessTest, FailuresAreReportedWithTheirReason) {
+TEST_F(ProcessTest, ReportsFailuresWithReason) {
   ServerProcess server(scratch_.path(), {"--stuck-seconds", "1", "--stop-grace-seconds", "0.5"});
   TestClient& client = server.client();
   const std::string scene = client.MakeScene().name();
@@ -96,7 +96,7 @@ TEST_F(ProcessTest, FailuresAreReportedWithTheirReason) {
 }
 
 // A name says nothing of what it stands for.
-TEST_F(ProcessTest, OtherWeightsUnderTheSameNameAreOtherWork) {
+TEST_F(ProcessTest, NewWeightsUnderSameNameMissTheCache) {
   const fs::path weights = scratch_.path() / "weights";
   WriteFileAtomic(weights, "first");
   ServerProcess server(scratch_.path(), {"--model", "mine=" + weights.string()});
@@ -121,7 +121,7 @@ TEST_F(ProcessTest, OtherWeightsUnderTheSameNameAreOtherWork) {
   EXPECT_THAT(job.error().message(), HasSubstr("put it back"));
 }
 
-TEST_F(ProcessTest, WeightsReplacedUnderARunningJobAreNoticed) {
+TEST_F(ProcessTest, NoticesWeightsReplacedDuringJob) {
   const fs::path weights = scratch_.path() / "weights";
   WriteFileAtomic(weights, "first");
   ServerProcess server(scratch_.path(), {"--model", "mine=" + weights.string()});
@@ -136,7 +136,7 @@ TEST_F(ProcessTest, WeightsReplacedUnderARunningJobAreNoticed) {
   EXPECT_EQ(job.attempt(), 2) << "what was begun with the old weights was published";
 }
 
-TEST_F(ProcessTest, ModelsAreListedAndUnknownOnesRefused) {
+TEST_F(ProcessTest, ListsModelsAndRefusesUnknownOnes) {
   const fs::path weights = scratch_.path() / "weights";
   WriteFileAtomic(weights, "........{\"visual.conv1.weight\":");
   ServerProcess server(scratch_.path(),
@@ -162,7 +162,7 @@ TEST_F(ProcessTest, ModelsAreListedAndUnknownOnesRefused) {
   }
 }
 
-TEST_F(ProcessTest, RunningJobIsCancelledSoon) {
+TEST_F(ProcessTest, CancelsRunningJobSoon) {
   ServerProcess server(scratch_.path(), {});
   TestClient& client = server.client();
   const std::string name =
@@ -179,7 +179,7 @@ TEST_F(ProcessTest, RunningJobIsCancelledSoon) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
 }
 
-TEST_F(ProcessTest, TerminationReleasesTheJobAndTheNextServerGoesOn) {
+TEST_F(ProcessTest, TerminatedServerReleasesJobToNextOne) {
   std::string name;
   int64_t steps_before = 0;
   {
@@ -222,7 +222,7 @@ TEST_F(ProcessTest, SecondSignalEndsAtOnce) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
 }
 
-TEST_F(ProcessTest, KilledServerTakesItsWorkersAlongAndLosesNothing) {
+TEST_F(ProcessTest, WorkersEndWithKilledServerAndNothingIsLost) {
   std::string name;
   std::vector<pid_t> workers;
   {
@@ -277,7 +277,7 @@ void StopOutsideTransaction(TestClient& client, pid_t pid) {
 
 // The sharpest case for the fence: the owner sleeps past its lease, an idle worker takes the job
 // over and is well ahead when the old owner wakes up in the middle of a step.
-TEST_F(ProcessTest, ZombieThatWakesUpChangesNothing) {
+TEST_F(ProcessTest, ThawedZombieChangesNothing) {
   const fs::path effects = scratch_.path() / "effects";
   ::setenv("COLOR3D_TEST_EFFECTS", effects.c_str(), 1);
   ServerProcess server(scratch_.path(), {}, 2);
@@ -320,7 +320,7 @@ TEST_F(ProcessTest, FrozenWorkerIsKilled) {
 }
 
 // One worker that stops in the middle of a write must not cost the others their attempts.
-TEST_F(ProcessTest, WorkerThatFreezesInsideAWriteCostsNobodyElseAnAttempt) {
+TEST_F(ProcessTest, WorkerFrozenInWriteCostsOthersNoAttempt) {
   ServerProcess server(scratch_.path(), {"--lease-seconds", "6", "--heartbeat-seconds", "1"}, 2);
   TestClient& client = server.client();
   const std::string scene = client.MakeScene().name();
@@ -342,7 +342,7 @@ TEST_F(ProcessTest, WorkerThatFreezesInsideAWriteCostsNobodyElseAnAttempt) {
 }
 
 // The service manager, the server and the kernel may each tell a worker to end.
-TEST_F(ProcessTest, WorkersDrainHoweverOftenTheyAreTold) {
+TEST_F(ProcessTest, WorkersDrainOnRepeatedSignals) {
   ServerProcess server(scratch_.path(), {});
   TestClient& client = server.client();
   const std::string name =

@@ -91,7 +91,7 @@ class ChaosClockTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(ChaosClockTest, JumpsOfTheClockEndNoLeaseStallNoRetryAndCollectNothing) {
+TEST_F(ChaosClockTest, ClockJumpsEndNoLeaseAndCollectNothing) {
   WallClock wall(library_, scratch_.path() / "offset");
   // Long enough for a machine that is busy with other things; a jump is longer.
   ChaosService service(scratch_.path(), {"--lease-seconds", "20", "--heartbeat-seconds", "0.5"});

@@ -203,20 +203,20 @@ ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib,
   return outcome;
 }
 
-TEST_F(ChaosDiskTest, BelowTheReserveJobsFailByItsNameAndTheStoreGoesOn) {
+TEST_F(ChaosDiskTest, JobsFailBelowReserveAndStoreStaysWritable) {
   // The store itself has room: its log grows to 4 MiB before it is folded into the database.
   const Outcome outcome = Endure("12", "0", 8 << 20);
   EXPECT_GT(outcome.failed, 0) << "the disk was never full: the test proves nothing";
   EXPECT_EQ(outcome.lost_attempts, 0);
 }
 
-TEST_F(ChaosDiskTest, BelowTheMarkNothingIsBegunAndNothingFails) {
+TEST_F(ChaosDiskTest, StartsNoJobWhenSpaceIsLow) {
   const Outcome outcome = Endure("1", "6", 4 << 20);
   EXPECT_EQ(outcome.failed, 0);
   EXPECT_GT(outcome.refused, 0) << "the mark was never reached: the test proves nothing";
 }
 
-TEST_F(ChaosDiskTest, WithoutALastByteJobsWaitOrFailAndReadsAreAnswered) {
+TEST_F(ChaosDiskTest, FullDiskDelaysJobsAndAnswersReads) {
   const Outcome outcome = Endure("0", "0", 0);
   EXPECT_GT(outcome.failed + outcome.lost_attempts + outcome.refused, 0)
       << "the disk was never full: the test proves nothing";
@@ -251,7 +251,7 @@ grpc::Status Answer(Stub& stub,
   return (stub.*method)(&context, request, response);
 }
 
-TEST_F(LargeDiskTest, RowsLeaveTheReserveAndCanBeDeletedOnADiskWithoutALastByte) {
+TEST_F(LargeDiskTest, RowsKeepReserveAndCanBeDeletedOnFullDisk) {
   constexpr int64_t kReserve = 40 << 20, kLow = 60 << 20;
   ChaosService service(scratch_.path(), {"--reserve-mib", "40", "--low-space-mib", "60"});
   TestClient& client = service.client();

@@ -126,7 +126,7 @@ std::string FatesOf(const std::vector<std::unique_ptr<CuttingProxy>>& proxies) {
   return text;
 }
 
-TEST(ChaosNetworkTest, ClientsEndWithEveryResultThroughABadNetwork) {
+TEST(ChaosNetworkTest, ClientsGetAllResultsThroughBadNetwork) {
   const ScratchFolder scratch;
   const int jobs = static_cast<int>(FromEnvironment("COLOR3D_CHAOS_JOBS", 100));
   const uint64_t seed = ChaosSeed();

@@ -84,7 +84,7 @@ std::vector<std::string> Endure(ChaosService& service, const Budget& budget) {
   return problems;
 }
 
-TEST(ChaosTest, EveryJobEndsAsUndisturbedAndEveryEffectIsThereOnce) {
+TEST(ChaosTest, JobsEndAsUndisturbedWithEffectsOnce) {
   const ScratchFolder scratch;
   ChaosService service(scratch.path());
   Budget budget;
@@ -96,7 +96,7 @@ TEST(ChaosTest, EveryJobEndsAsUndisturbedAndEveryEffectIsThereOnce) {
 
 // The control: with workers that write whatever has become of their lease, the same must be seen to
 // go wrong.
-TEST(ChaosTest, WithoutTheFenceEffectsAreThereTwice) {
+TEST(ChaosTest, EffectsAreDoubledWithoutFence) {
   const ScratchFolder scratch;
   ChaosService service(scratch.path(), {"--worker-program", COLOR3D_UNFENCED_WORKER});
   const Budget budget{40, 12, {Fault::kWorkerFrozen}};

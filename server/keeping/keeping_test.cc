@@ -218,7 +218,7 @@ TEST_F(KeepingTest, FsckFindsAndRepairsFaults) {
   EXPECT_EQ(ReasonThrown([&] { Check(paths_.root); }), "FAILED_PRECONDITION") << "a server runs";
 }
 
-TEST_F(KeepingTest, FsckSeesADamagedStore) {
+TEST_F(KeepingTest, FsckReportsDamagedStore) {
   store_.reset();
   std::error_code error;
   fs::remove(paths_.Store().string() + "-wal", error);

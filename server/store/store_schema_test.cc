@@ -92,7 +92,7 @@ class StoreSchemaTest : public JobStoreTest {
   }
 };
 
-TEST_F(StoreSchemaTest, ServerMigratesAnOldStoreAndKeepsACopy) {
+TEST_F(StoreSchemaTest, ServerMigratesOldStoreAndKeepsCopy) {
   CreateSingle();
   const JobRecord done = ClaimOne();
   Succeed(done);
@@ -198,7 +198,7 @@ TEST_F(StoreSchemaTest, WorkersDoNotMigrate) {
   EXPECT_EQ(VersionOf(File()), 1);
 }
 
-TEST_F(StoreSchemaTest, WorkersOfAnotherReleaseGetNoJob) {
+TEST_F(StoreSchemaTest, WorkersOfOtherReleaseGetNoJob) {
   CreateSingle();
   StoreOptions options;
   options.program_version = "0.0.1";
@@ -212,7 +212,7 @@ TEST_F(StoreSchemaTest, WorkersOfAnotherReleaseGetNoJob) {
   EXPECT_EQ(ClaimOne().attempt, 1) << "nothing was spent";
 }
 
-TEST_F(StoreSchemaTest, WorkersOfAnotherBuildGetNoJob) {
+TEST_F(StoreSchemaTest, WorkersOfOtherBuildGetNoJob) {
   CreateSingle();
   SqliteJobStore worker(File(), StoreRole::kWorker, TestClocks());
   SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=version+1");
@@ -257,7 +257,7 @@ TEST_F(StoreSchemaTest, RestartWritesNothing) {
   EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 1u);
 }
 
-TEST_F(StoreSchemaTest, ReadsDoNotWaitForAWriter) {
+TEST_F(StoreSchemaTest, ReadsDoNotWaitForWriter) {
   const JobRecord job = CreateSingle();
   SqliteDatabase frozen(File(), SqliteAccess::kWrite);
   SqliteTransaction held(frozen);

@@ -23,7 +23,7 @@ class BlobCheckpointsTest : public JobStoreTest {
   FileBlobStore blobs_{scratch_.path() / "blobs", {0}};
 };
 
-TEST_F(BlobCheckpointsTest, OnlyTheNewestIsKept) {
+TEST_F(BlobCheckpointsTest, KeepsOnlyNewestCheckpoint) {
   auto checkpoints = Of(Running());
   checkpoints.Save("one");
   checkpoints.Save("two");
@@ -39,7 +39,7 @@ TEST_F(BlobCheckpointsTest, OnlyTheNewestIsKept) {
 }
 
 // Another worker has stored the same bytes and is about to name them.
-TEST_F(BlobCheckpointsTest, KeepsABlobThatAnotherJobIsAboutToName) {
+TEST_F(BlobCheckpointsTest, KeepsBlobThatOtherJobTouched) {
   auto checkpoints = Of(Running());
   checkpoints.Save("equal");
   const FileDigest other = blobs_.PutBytes("equal");  // found there, and touched
@@ -50,7 +50,7 @@ TEST_F(BlobCheckpointsTest, KeepsABlobThatAnotherJobIsAboutToName) {
   EXPECT_EQ(Of(store_->GetJob(another.name)).Load(), "equal");
 }
 
-TEST_F(BlobCheckpointsTest, KeepsABlobThatAnotherJobStoredBefore) {
+TEST_F(BlobCheckpointsTest, KeepsBlobStoredByOtherJob) {
   blobs_.PutBytes("equal");
   auto checkpoints = Of(Running());
   checkpoints.Save("equal");

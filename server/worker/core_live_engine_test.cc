@@ -90,7 +90,7 @@ class CoreLiveEngineTest : public ::testing::Test {
   std::vector<Response> responses_;
 };
 
-TEST_F(CoreLiveEngineTest, MixedExamplesDoNotMixAndLuminanceIsKept) {
+TEST_F(CoreLiveEngineTest, KeepsExamplesApartAndLuminance) {
   const std::string red = Example(40, 15), blue = Example(-5, -30);
   std::vector<Request> requests;
   for (int i = 0; i < 6; ++i) {
@@ -154,7 +154,7 @@ TEST_F(CoreLiveEngineTest, BadPictureFailsAlone) {
   EXPECT_NEAR(MeanOf(LabOf(7)).a, 40, 4);
 }
 
-TEST_F(CoreLiveEngineTest, AColorizerOfAnotherEncoderIsRefusedByDigest) {
+TEST_F(CoreLiveEngineTest, RefusesColorizerOfOtherEncoder) {
   ColorizerOptions options;
   options.iterations = 0;
   options.max_side_px = 64;

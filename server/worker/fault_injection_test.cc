@@ -298,7 +298,7 @@ JobState EndOf(const JobRecord& job) {
   return is_cancelled ? JobState::kCancelled : JobState::kSucceeded;
 }
 
-TEST(FaultInjectionTest, EveryCallIsPartOfTheLife) {
+TEST(FaultInjectionTest, ScenarioMakesEveryCall) {
   EXPECT_THAT(Live(0, false, ErrorCode::kUnavailable).seen,
               ::testing::IsSupersetOf({"Adopt",
                                        "Claim",
@@ -325,7 +325,7 @@ TEST(FaultInjectionTest, EveryCallIsPartOfTheLife) {
                                        "UpdateWorker"}));
 }
 
-TEST(FaultInjectionTest, TransientFailureCostsNoJob) {
+TEST(FaultInjectionTest, TransientFailureFailsNoJob) {
   const Life undisturbed = Live(0, false, ErrorCode::kUnavailable);
   for (const JobRecord& job : undisturbed.jobs) {
     EXPECT_EQ(job.state, EndOf(job)) << job.kind;
@@ -345,7 +345,7 @@ TEST(FaultInjectionTest, TransientFailureCostsNoJob) {
   }
 }
 
-TEST(FaultInjectionTest, DoesNotPublishAMissingResult) {
+TEST(FaultInjectionTest, DoesNotPublishMissingResult) {
   Faults none(0, false, ErrorCode::kUnavailable);
   World world(none, none);
   world.UploadPhoto();
@@ -358,7 +358,7 @@ TEST(FaultInjectionTest, DoesNotPublishAMissingResult) {
   }
 }
 
-TEST(FaultInjectionTest, PermanentFailureEndsTheJobWithItsReason) {
+TEST(FaultInjectionTest, PermanentFailureEndsJobWithReason) {
   const int calls = Live(0, false, ErrorCode::kInternal).calls;
   for (const bool after : {false, true}) {
     for (int n = 1; n <= calls; ++n) {

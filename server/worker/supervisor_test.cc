@@ -21,7 +21,7 @@ class FullStore : public SqliteJobStore {
   std::atomic<bool> full{true};
 };
 
-TEST_F(JobStoreTest, ASilentWorkerIsKilledUnlessTheDiskIsFull) {
+TEST_F(JobStoreTest, KillsSilentWorkerUnlessDiskIsFull) {
   const fs::path program = scratch_.path() / "worker", starts = scratch_.path() / "starts";
   WriteFileAtomic(program, "#!/bin/sh\necho begun >> " + starts.string() + "\nexec sleep 60\n");
   fs::permissions(program, fs::perms::owner_all);

@@ -173,7 +173,7 @@ class WorkerLoopTest : public testing::Test {
   MeetingRunner runner_;
 };
 
-TEST_F(WorkerLoopTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
+TEST_F(WorkerLoopTest, ScenesRunTogetherAndPoisonedOneFailsAlone) {
   const JobRecord root = Submit({1, kPoison, 2});
   Work({root});
   EXPECT_EQ(runner_.most(), 3);
@@ -217,7 +217,7 @@ TEST_F(WorkerLoopTest, AdditionalKeyViewsHaveNumberedFolders) {
             (std::vector<std::string>{name, "key_views/1/" + name, "key_views/2/" + name}));
 }
 
-TEST_F(WorkerLoopTest, NoMoreThanTheConfiguredNumberRunAtOnce) {
+TEST_F(WorkerLoopTest, LimitsConcurrentScenes) {
   options_.batch_scenes = 2;
   runner_.wanted = 2;
   std::vector<uint64_t> seeds;
@@ -241,7 +241,7 @@ TEST_F(WorkerLoopTest, ProjectsShareTheBatchEqually) {
   EXPECT_LT(runner.turns("a"), 160);
 }
 
-TEST_F(WorkerLoopTest, LittleMemoryMeansOneAtATime) {
+TEST_F(WorkerLoopTest, RunsOneAtATimeWithLittleMemory) {
   options_.recycle_memory_bytes = 1;
   runner_.wanted = 1;
   const JobRecord root = Submit({1, 2});
