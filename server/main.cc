@@ -1,5 +1,5 @@
 // color3d-server: `serve` answers RPCs and supervises workers; `token`, `backup`, `restore` and
-// `fsck` are for who runs it; `worker` becomes color3d-worker, the program beside this one that
+// `fsck` are for operators; `worker` executes color3d-worker, the program beside this one that
 // links the method library.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -24,7 +24,7 @@
 namespace color3d {
 namespace {
 
-// Flags of the group "" are hidden: they are for tests.
+// Flags of the group "" are hidden, for tests.
 void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--listen", options->listen, "HOST:PORT (port 0: any free one) or unix:PATH")
       ->capture_default_str();
@@ -171,7 +171,7 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--probe-seconds", options->probe_seconds)->group("");
 }
 
-// Flags win over the environment.
+// Flags override the environment.
 void TakeFromEnvironment(const char* variable, std::vector<std::string>* values) {
   const char* text = std::getenv(variable);
   if (text == nullptr || !values->empty()) return;
@@ -184,10 +184,10 @@ void TakeFromEnvironment(const char* variable, std::vector<std::string>* values)
 struct KeepingArguments {
   std::filesystem::path data_folder, copy;
   bool repair = false;
-  std::function<int()> run;  // empty: another command was given
+  std::function<int()> run;  // empty: another command
 };
 
-// Exit status 1: the copy lacks blobs, which are listed.
+// Returns exit status 1 if the copy lacks blobs, which are listed.
 int SayWhatLacks(const CopiedBlobs& copied, const std::filesystem::path& from) {
   for (const std::string& sha256 : copied.missing) std::cout << "missing: " << sha256 << "\n";
   for (const std::string& sha256 : copied.damaged) std::cout << "damaged: " << sha256 << "\n";
@@ -286,7 +286,7 @@ void AddKeeping(CLI::App* app, KeepingArguments* arguments) {
       ->add_flag("--repair", arguments->repair, "Set damaged blobs aside");
 }
 
-// Replaces this process by color3d-worker with the arguments after "worker".
+// Replaces this process with color3d-worker and the arguments after "worker".
 int ExecWorker(char** argv) {
   const std::string program = (ProgramFolder() / "color3d-worker").string();
   argv[1] = const_cast<char*>(program.c_str());
@@ -297,7 +297,7 @@ int ExecWorker(char** argv) {
 }
 
 int Main(int argc, char** argv) {
-  // Workers inherit this. Threads that wait by spinning make a busy machine many times slower.
+  // Inherited by workers. Threads that spin while waiting slow down a busy machine.
   ::setenv("OMP_WAIT_POLICY", "PASSIVE", /*overwrite=*/0);
   if (argc > 1 && std::string(argv[1]) == "worker") return ExecWorker(argv);
   ServeOptions options;
@@ -323,7 +323,7 @@ int Main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   TakeFromEnvironment("COLOR3D_MODELS", &options.models);
   TakeFromEnvironment("COLOR3D_BACKENDS", &options.backends);
-  // Our own checks say more than gRPC's log does.
+  // The server's own messages are clearer than the log of gRPC.
   ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   try {
     if (keeping.run) return keeping.run();
@@ -342,7 +342,7 @@ int Main(int argc, char** argv) {
     return 0;
   } catch (const Error& e) {
     std::cerr << "color3d-server: " << e.what() << "\n";
-    return e.code() == ErrorCode::kUnavailable ? 1 : 2;  // 1: another try may help
+    return e.code() == ErrorCode::kUnavailable ? 1 : 2;  // 1: a retry may succeed
   } catch (const std::exception& e) {
     std::cerr << "color3d-server: unexpected: " << e.what() << "\n";
     return 1;

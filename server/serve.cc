@@ -47,17 +47,17 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int64_t kFewDescriptors = 4096;
-// Beyond the time in which a worker drains.
+// Added to the time in which a worker drains.
 constexpr double kOrphanSeconds = 10.0;
-// Less is taken by the libraries alone, or by the first photo.
+// The libraries or the first photo alone need this much.
 constexpr int64_t kLeastWorkerMemoryMib = 1024;
 
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000.0));
 }
 
-// MiB that a worker may take: what the options say, else this share of the machine's memory. 0: no
-// limit, where the machine does not tell.
+// Memory limit of a worker, MiB: that of the options, else this share of the machine's memory; 0
+// (no limit) if that is unknown.
 int64_t WorkerMemoryMib(const ServeOptions& options, double share) {
   if (options.worker_memory_mib > 0) return options.worker_memory_mib;
   const int64_t machine = MachineMemoryBytes();
@@ -156,14 +156,14 @@ std::map<std::string, BackendState> ProbeForInfo(BackendProber& prober) {
   return states;
 }
 
-// Started at the first ColorizeImages; without its program there is none.
+// Started by the first ColorizeImages call, if its program is installed.
 InferenceLink InferenceSetup(const ServeOptions& options,
                              const UserModels& models,
                              const SocketFolder& sockets,
                              SupervisorOptions* setup) {
   if (::access(setup->program.c_str(), X_OK) != 0) return {};
   sockets.RemoveAll();
-  // A name of its own: a worker that has outlived its server removes its socket when it ends.
+  // Unique, because a worker that has outlived its server removes its socket at its end.
   const std::string socket = "inference-" + fmt::to_string(::getpid());
   const int machine = std::max(1u, std::thread::hardware_concurrency());
   WorkerSettings settings = options.worker;
@@ -218,7 +218,7 @@ ServerSample SampleOf(const ServeOptions& options,
   return sample;
 }
 
-// As a client would find us. While there is no room for it the gate has spoken for itself.
+// Probes like a client. While the gate has no room, it has reported that itself.
 std::string ProbeOurselves(const RpcServer& server,
                            const TlsFiles& tls,
                            std::chrono::milliseconds limit) {
@@ -294,14 +294,14 @@ void Serve(const ServeOptions& options) {
   };
   RpcServer server(rpc, store, blobs, uploads, clock);
   std::atomic<bool> draining{false};
-  std::string deaf;  // why, once the server does not answer any more
+  std::string deaf;  // reason, once the server does not answer
   SelfProbeTiming probe_timing;
   probe_timing.pause = Milliseconds(options.probe_seconds);
   const auto probe = std::make_unique<SelfProbe>(
       probe_timing,
       [&](std::chrono::milliseconds limit) {
         const std::string why = ProbeOurselves(server, tls, limit);
-        return draining ? "" : why;  // who drains closes his port, too
+        return draining ? "" : why;  // a draining server closes its port
       },
       [&](const std::string& why) {
         if (draining) return;
@@ -313,8 +313,8 @@ void Serve(const ServeOptions& options) {
   chores.reap = std::clamp(Milliseconds(options.worker.lease_seconds / 10.0),
                            std::chrono::milliseconds(100),
                            std::chrono::milliseconds(5'000));
-  // No sign of life while the store cannot be read, or nobody would be answered: systemd's watchdog
-  // then starts us anew.
+  // No sign of life while the store is unreadable or calls are not answered: the watchdog of
+  // systemd then restarts the server.
   chores.keep_jobs = std::chrono::hours(24) * options.keep_days;
   chores.keep_uncommitted = std::chrono::hours(24) * options.keep_uncommitted_days;
   chores.low_space_bytes = options.low_space_mib << 20;

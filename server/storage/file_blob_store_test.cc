@@ -95,7 +95,7 @@ TEST_F(FileBlobStoreTest, RemovesLeftoversOfCrash) {
   EXPECT_TRUE(fs::exists(folder / "new.part"));
 }
 
-// The same number of other bytes, as a failing disk returns them.
+// Other bytes of the same number, as from a failing disk.
 void Damage(const fs::path& blob) {
   ASSERT_EQ(::chmod(blob.c_str(), 0644), 0);
   std::string bytes = ReadFile(blob);
@@ -121,7 +121,7 @@ TEST_F(FileBlobStoreTest, PutReplacesDamagedBytes) {
   EXPECT_TRUE(IsIntact(blobs_, digest));
 }
 
-// Good bytes have come since somebody read damaged ones.
+// The damaged blob was replaced after it was read.
 TEST_F(FileBlobStoreTest, SetsAsideDamagedBlobsOnly) {
   const FileDigest digest = blobs_.PutBytes("some bytes");
   Damage(blobs_.Fetch(digest.sha256));
@@ -188,7 +188,7 @@ TEST_F(FileBlobStoreTest, MissingFolderIsNotFullDisk) {
 
 TEST_F(FileBlobStoreTest, ConcurrentUploadsReserveSpace) {
   const int64_t free = blobs_.FreeBytes();
-  // Leaves room for one and a half of two uploads; what else runs on this disk may move it a
+  // Leaves room for one and a half of two uploads; other programs on this disk may change it a
   // little.
   const int64_t size = int64_t{512} << 20;
   if (free < 2 * size) GTEST_SKIP() << "too little space on this disk";
@@ -198,7 +198,7 @@ TEST_F(FileBlobStoreTest, ConcurrentUploadsReserveSpace) {
   EXPECT_EQ(ReasonThrown([&] { uploads.Open({"b", {Sha256Hex("b"), size}}, 0); }), "STORAGE_FULL");
   first->Append(0, std::string(1000, 'x'));
   EXPECT_EQ(ReasonThrown([&] { uploads.Open({"b", {Sha256Hex("b"), size}}, 0); }), "STORAGE_FULL");
-  first.reset();  // the client has gone
+  first.reset();  // the client disconnected
   uploads.Open({"b", {Sha256Hex("b"), size}}, 0);
 }
 

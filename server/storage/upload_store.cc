@@ -172,7 +172,7 @@ UploadStore::Writer::~Writer() {
   const auto entry = store_->sessions_.find(key);
   if (entry == store_->sessions_.end() || !entry->second.expired()) return;
   store_->sessions_.erase(entry);
-  // Nothing has come: there is nothing to go on from.
+  // Nothing was written, so nothing can be resumed.
   std::error_code error;
   if (fs::file_size(store_->folder_ / key, error) == 0 && !error) {
     fs::remove(store_->folder_ / key, error);

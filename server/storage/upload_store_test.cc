@@ -73,7 +73,7 @@ TEST_F(UploadStoreTest, RemovesDeadUploads) {
   EXPECT_EQ(uploads_.CommittedSize(name), 0);
 }
 
-// What is announced counts while it comes, what is left of it afterwards, also over a restart.
+// Counts the announced size during a write and the size on disk afterwards, also after a restart.
 TEST_F(UploadStoreTest, CountsBytesOfUnfinishedUploads) {
   const UploadName abc{"u1", DigestOf("abc"), "attic"}, de{"u2", DigestOf("de"), "attic"};
   int64_t seen = -1;
@@ -123,7 +123,7 @@ TEST_F(UploadStoreTest, LimitsUnfinishedUploadsOfOwner) {
   for (int i = 0; i < 1000; ++i) leave("attic", i);
   EXPECT_EQ(ReasonThrown([&] { leave("attic", 1000); }), "QUOTA_EXCEEDED");
   leave("cellar", 0);
-  uploads_.Open({"u7", digest, "attic"}, 1)->Append(1, "b");  // what is there goes on
+  uploads_.Open({"u7", digest, "attic"}, 1)->Append(1, "b");  // resumes the partial upload
 }
 
 }  // namespace

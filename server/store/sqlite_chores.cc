@@ -40,8 +40,7 @@ namespace {
 constexpr int kCompactAtOnce = 200;
 }
 
-// In steps, so that nobody waits long for the right to write: along the events, from the oldest to
-// the first that are young.
+// Works in steps from the oldest to the first young event, so that other writers do not wait long.
 void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_ms) {
   for (std::optional<int64_t> revision = 0; revision;) {
     revision = CompactEvents(*revision, events_before_ms);
@@ -192,7 +191,7 @@ std::vector<BlobCandidate> SqliteJobStore::AgedCandidates(int64_t grace_ms) {
   return CandidatesOf(connections_.Read(), grace_ms);
 }
 
-// In steps whose log is short: on a disk that is nearly full there is no room for a long one.
+// Works in steps with a short log: a nearly full disk has no room for a long one.
 int64_t SqliteJobStore::GiveBackSpace(int64_t keep_bytes) {
   constexpr int64_t kPagesAtOnce = 500;
   const SqliteConnections::Writer writer(connections_);
@@ -203,7 +202,7 @@ int64_t SqliteJobStore::GiveBackSpace(int64_t keep_bytes) {
   int64_t free = number("pragma freelist_count");
   for (int step = 0; step < 4 && free > keep; ++step) {
     db.Run(fmt::format("pragma incremental_vacuum({})", std::min(kPagesAtOnce, free - keep)));
-    // The file is cut where its log is folded into it; whoever reads meanwhile delays that.
+    // The checkpoint truncates the file; concurrent readers delay it.
     db.Run("pragma wal_checkpoint(passive)");
     free = number("pragma freelist_count");
   }

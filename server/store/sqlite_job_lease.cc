@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-// Maximum length of a progress message: it may quote a user's file.
+// Maximum length of a progress message, which may quote a user's file.
 constexpr size_t kMaxMessageBytes = 1000;
 
 ServiceError LeaseLost(const Lease& lease) {
@@ -23,7 +23,7 @@ ServiceError LeaseLost(const Lease& lease) {
                       lease.epoch);
 }
 
-#ifdef COLOR3D_FENCE_OFF  // what the chaos suite must notice
+#ifdef COLOR3D_FENCE_OFF  // to be noticed by the chaos suite
 constexpr char kHeld[] = "where job_id=? and ?<>0";
 #else
 constexpr char kHeld[] = "where job_id=? and lease_epoch=? and state='RUNNING'";
@@ -44,7 +44,7 @@ void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
                        options_.program_version,
                        server.Text(0));
   }
-  // Builds of one release may differ in that, too.
+  // Builds of one release may differ in the schema, too.
   SqliteStatement schema(db, "select version from schema_version");
   if (schema.Step() && schema.Int(0) != kSchemaVersion) {
     throw ServiceError(ErrorReason::kWorkerVersion,
@@ -56,7 +56,7 @@ void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
 }
 
 std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_t lease_ms) {
-  // A project that has just had a turn comes after all others of the same priority.
+  // The project whose turn was last comes after all others of the same priority.
   constexpr char kNext[] =
       "select job_id from job left join project on project.name=job.project "
       "where state='QUEUED' and run_after_ms<=? and not exists(select 1 from job r where "
@@ -83,7 +83,7 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
     int64_t lease_ms,
     const std::string& kind,
     const std::function<bool(const JobRecord&)>& accept) {
-  // The jobs of one project do not keep out another's, nor those of one submitted job.
+  // Neither a project nor a submitted job keeps out the jobs of another.
   constexpr char kCandidates[] =
       "where state='QUEUED' and kind=?1 and run_after_ms<=?2 and lost_attempts=0 and not exists("
       "select 1 from job o where o.state='QUEUED' and o.kind<>?1 and o.run_after_ms<=?2 and "
@@ -271,7 +271,7 @@ void SqliteJobStore::Publish(const Lease& lease, const Publication& publication)
   db.Commit();
 }
 
-// Back to the queue, later each time.
+// Requeues the job with growing delays.
 void SqliteJobStore::Requeue(SqliteDatabase& db, const JobRecord& job, bool count_as_lost) {
   const int doublings = std::clamp(job.attempt - 1, 0, 10);
   db.Run("update job set run_after_ms=?, lost_attempts=lost_attempts+? where job_id=?",

@@ -1,5 +1,5 @@
-// The job state machine: creation, cancelling, retrying, and what the end of one job means for
-// those that depend on it.
+// State machine of jobs: creation, cancellation, retries, and effects of a job's end on its
+// dependants.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace color3d {
 namespace {
 
-// All that wait for a job that failed repeat what it says.
+// Maximum length of an error message, which all dependants repeat.
 constexpr size_t kMaxErrorBytes = 4000;
 
 ServiceError WrongState(const JobRecord& job, const std::string& remedy) {
@@ -99,8 +99,8 @@ void SqliteJobStore::EndCancelled(SqliteDatabase& db, int64_t job_id) {
   PropagateEnd(db, JobById(db, job_id));
 }
 
-// Everything that waits for `cause`, directly or not, can never run: the submitted job of the same
-// graph ends as `cause` did, all others are skipped.
+// Direct and indirect dependants of `cause` can never run: the submitted job of the same graph ends
+// like `cause`, all others are skipped.
 void SqliteJobStore::PropagateEnd(SqliteDatabase& db, const JobRecord& cause) {
   const bool failed = cause.state == JobState::kFailed;
   const std::string why =
@@ -250,7 +250,7 @@ JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& requ
   const auto is_left_alone = [](const JobRecord& job) {
     return IsFinished(job.state) || job.cancel_requested;
   };
-  // Asked again it changes nothing either: nothing is written down.
+  // Nothing is recorded, because a repeated call changes nothing either.
   if (std::ranges::all_of(graph, is_left_alone)) return graph.back();
   for (auto it = graph.rbegin(); it != graph.rend(); ++it) {
     const JobRecord job = JobById(db, it->id);
@@ -355,7 +355,7 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
   }
   const auto retried = std::count_if(graph.begin(), graph.end(), CanBeRetried);
   RequireRoom(db, root.project, retried, limits);
-  // In order of creation, so that inputs are reset before those that read them.
+  // In order of creation, so that inputs are reset before their dependants.
   for (const JobRecord& member : graph) {
     if (CanBeRetried(member)) ResetForRetry(db, member, from_scratch);
   }
@@ -387,7 +387,7 @@ void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) 
       "update scene set key_color_job='' where key_color_job in (select name from job where job_id "
       "in (" +
       list + "))");
-  // A reader that failed may be retried; without this input it would be other work.
+  // A failed dependant must not be retried without this input.
   db.Run(
       "update job set lost_input=(select i.name from job_dependency d join job i on "
       "i.job_id=d.input_id where d.job_id=job.job_id and d.input_id in (" +

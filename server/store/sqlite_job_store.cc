@@ -1,5 +1,5 @@
-// Opening, reading and idempotency. The state machine is in sqlite_job_state.cc, what workers call
-// in sqlite_job_lease.cc, scenes and colorizers in sqlite_scene.cc, chores in sqlite_chores.cc.
+// Opening, reading and idempotency. State machine: sqlite_job_state.cc; calls of workers:
+// sqlite_job_lease.cc; scenes and colorizers: sqlite_scene.cc; chores: sqlite_chores.cc.
 #include "server/store/sqlite_job_store.h"
 
 #include <utility>
@@ -109,7 +109,8 @@ std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
   std::string tail = "where job_id < ?";
   if (!filter.parent.empty()) tail += " and parent=?";
   if (!filter.scene.empty()) tail += " and scene=?";
-  // A parent or a scene has few jobs, a project many: its index is for those who ask for all.
+  // A parent or scene has few jobs and a project many, so the index of projects is used only
+  // without a parent and scene.
   const bool is_narrow = !filter.parent.empty() || !filter.scene.empty();
   if (filter.project) tail += is_narrow ? " and +project=?" : " and project=?";
   SqliteStatement select(

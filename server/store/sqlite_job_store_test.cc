@@ -58,12 +58,6 @@ TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
   EXPECT_GT(store_->NewestRevision(), 0);
 }
 
-TEST_F(SqliteJobStoreTest, NewerSchemaIsRefused) {
-  store_.reset();
-  SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=99");
-  EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_VERSION");
-}
-
 TEST_F(SqliteJobStoreTest, ReportsGarbageFile) {
   store_.reset();
   std::filesystem::remove(scratch_.path() / "jobs.db-wal");

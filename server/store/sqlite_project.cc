@@ -1,4 +1,4 @@
-// Projects and what they hold; what holds the queue back; what grows old.
+// Projects and their blobs, holds of the queue, age limits, notifications.
 #include <fmt/core.h>
 
 #include "server/store/sqlite_db.h"
@@ -54,7 +54,7 @@ std::set<std::string> SqliteJobStore::HeldBlobs(const std::string& project,
 
 void SqliteJobStore::ForgetBlob(const std::string& sha256) {
   WriteTransaction db(connections_);
-  // Another may have stored and named the same bytes since.
+  // Equal bytes may have been stored and named again since.
   db.Run(
       "delete from blob_holding where sha256=?1 and not exists(select 1 from artifact where "
       "sha256=?1) and not exists(select 1 from scene_file where sha256=?1) and not exists(select 1 "
@@ -100,7 +100,7 @@ std::set<Hold> SqliteJobStore::Holds() {
 QueuePlace SqliteJobStore::PlaceInQueue(const JobRecord& job) {
   if (job.state != JobState::kQueued && job.state != JobState::kBlocked) return {};
   const auto db = connections_.Read();
-  // Of a submitted job whose stages all wait, the first of them.
+  // For a submitted job whose stages all wait: its first stage.
   SqliteStatement first(
       db,
       "select priority, job_id, run_after_ms, joins_key from job where (name=?1 or parent=?1) and "
@@ -161,7 +161,7 @@ std::vector<std::string> SqliteJobStore::AgeExpired(int64_t ended_before_ms, int
 std::vector<std::string> SqliteJobStore::AgeUnusedScenes(int64_t before_ms,
                                                          int64_t uncommitted_before_ms,
                                                          int64_t grace_ms) {
-  // Jobs are of scenes that are committed.
+  // Only committed scenes have jobs.
   constexpr char kUnused[] =
       "((active=0 and create_ms<?2) or (max(create_ms, commit_ms)<?1 and not exists("
       "select 1 from job where job.scene=scene.name)))";
@@ -184,12 +184,12 @@ std::vector<std::string> SqliteJobStore::AgeUnusedScenes(int64_t before_ms,
 }
 
 namespace {
-constexpr int64_t kLongestPauseMs = 3'600'000;  // and some more; further away: the clock was set
+constexpr int64_t kLongestPauseMs = 3'600'000;  // a longer pause means that the clock was set
 }
 
 std::vector<Notification> SqliteJobStore::DueNotifications(int of_each_receiver) {
   const auto db = connections_.Read();
-  // A receiver is what stands before the address's third slash.
+  // The receiver is the part of the address before its third slash.
   return SqliteStatement(
              db,
              "select n.job_id, job.name, n.url, n.tries, n.first_ms from (select *, row_number() "

@@ -109,7 +109,7 @@ SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
   WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
   RequireScene(db, name, false);
-  // Activating twice changes nothing: the scene is immutable.
+  // A second activation changes nothing: the scene is immutable.
   db.Run(
       "update scene set active=1, layout=?, photo_count=?, commit_ms=? where name=? and "
       "active=0",
@@ -174,7 +174,8 @@ void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& requ
 
 namespace {
 
-// That the artifact is a colorizer of the project (?2, unless ?1) and the scene (?3, unless empty).
+// Condition: the artifact is a colorizer of the project (?2, unless ?1) and scene (?3, unless
+// empty).
 std::string IsColorizer(const char* artifact, const char* job) {
   return fmt::format(
       "{0}.name='{2}' and {1}.kind='{3}' and {1}.state='SUCCEEDED' and (?1 or {1}.project=?2) and "
@@ -194,14 +195,14 @@ ColorizerRecord ColorizerFromRow(const SqliteStatement& row) {
 
 }  // namespace
 
-// Equal files made by several jobs (cached runs) are one colorizer: that of the oldest job.
+// Equal files of several jobs (cached runs) are one colorizer: that of the oldest job.
 std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(
     const std::optional<std::string>& project,
     const std::string& scene,
     int64_t before_id,
     int limit) {
   const auto db = connections_.Read();
-  // From what there is least of: the scene's jobs, or all colorizers, the newest first.
+  // Scans the smaller set: the jobs of the scene, or all colorizers, newest first.
   const std::string walk = scene.empty()
                                ? "from artifact a cross join job j on j.job_id=a.job_id where "
                                : "from job j cross join artifact a on a.job_id=j.job_id where "

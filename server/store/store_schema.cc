@@ -18,7 +18,7 @@ namespace {
 
 constexpr int64_t kSpareBytes = int64_t{16} << 20;
 
-// Nothing: the file has no tables.
+// Returns nothing if the file has no tables.
 std::optional<int64_t> VersionOf(SqliteDatabase& db) {
   if (!SqliteStatement(db,
                        "select 1 from sqlite_master where type='table' and name='schema_version'")
@@ -36,7 +36,7 @@ ServiceError WrongVersion(int64_t version, const char* remedy) {
                       remedy);
 }
 
-// A whole copy, or none.
+// Writes a complete copy or none.
 void KeepCopy(const fs::path& file, int64_t version) {
   const fs::path copy = file.string() + ".v" + std::to_string(version);
   const fs::path unfinished = copy.string() + ".part";
@@ -56,8 +56,8 @@ void Migrate(SqliteDatabase& db) {
   spdlog::info("the job store was brought from version {} to {}", from, kSchemaVersion);
 }
 
-// A store of before version 6 keeps what deleted rows leave free, for ever. Building it anew takes
-// twice its length on the disk; where that is not free it is done at another start.
+// Stores created before version 6 never return the space of deleted rows. Rebuilding takes twice
+// the size of the file; without that space it is left to a later start.
 void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
   const auto number = [&](const char* pragma) { return SqliteStatement(db, pragma).NextInt(); };
   if (number("pragma auto_vacuum") != 0) return;
@@ -84,7 +84,7 @@ void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
 void MakeTables(SqliteDatabase& db) {
   SqliteTransaction transaction(db);
   db.Exec("create table if not exists schema_version(version integer not null)");
-  if (VersionOf(db)) return;  // another store of this process was faster
+  if (VersionOf(db)) return;  // another store object of this process was faster
   db.Exec(kSchema);
   db.Run("insert into schema_version values(?)", kSchemaVersion);
   transaction.Commit();
@@ -98,7 +98,7 @@ bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
       .Step();
 }
 
-// Writes nothing where nothing has changed: on a full disk the server still answers those who read.
+// Writes nothing if nothing has changed, so that the server can still answer reads on a full disk.
 void SayWhoServes(SqliteDatabase& db, const ServerIdentity& identity) {
   if (IsKnown(db, identity)) return;
   SqliteTransaction transaction(db);

@@ -12,8 +12,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr size_t kMaxNameBytes = 64;
-// Key names of a safetensors header or a pickle lie before the numbers; a zip's names of files lie
-// behind them.
+// Key names of safetensors and pickle files precede the data; file names of a zip follow it.
 constexpr int64_t kHeadBytes = int64_t{4} << 20;
 constexpr int64_t kTailBytes = int64_t{1} << 18;
 
