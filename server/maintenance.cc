@@ -26,13 +26,13 @@ void ExpireDeadWorkers(ChoreStore& store) {
   for (const WorkerRecord& worker : store.ListWorkers()) {
     if (IsRunning(static_cast<pid_t>(worker.pid))) continue;
     try {
-      for (const std::string& job : store.ExpireLeasesOf(worker.worker_id)) {
+      for (const std::string& job : store.ExpireLeases(worker.worker_id)) {
         spdlog::info("[job={}] its worker {} is gone", job, worker.worker_id);
       }
       store.RemoveWorker(worker.worker_id);
     } catch (const Error& e) {
       if (e.code() != ErrorCode::kResourceExhausted) throw;
-      spdlog::error("{} is gone, its leases run out by themselves: {}", worker.worker_id, e.what());
+      spdlog::error("{} has ended, its leases will expire: {}", worker.worker_id, e.what());
     }
   }
 }
@@ -109,17 +109,17 @@ std::chrono::milliseconds Maintenance::Reap() {
     const int reaped = store_.ReapExpired();
     counts_.attempts_lost += reaped;
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
-    HoldBackWhenSpaceIsLow();
-    GiveBackSpace();
+    UpdateStorageHold();
+    ReturnFreeSpace();
   } catch (const std::exception& e) {
-    spdlog::error("cannot look after leases: {}", e.what());
+    spdlog::error("cannot check leases: {}", e.what());
   }
   return timing_.reap;
 }
 
-void Maintenance::GiveBackSpace() {
+void Maintenance::ReturnFreeSpace() {
   try {
-    store_.GiveBackSpace(timing_.keep_free_rows_bytes);
+    store_.ReturnFreeSpace(timing_.keep_free_rows_bytes);
   } catch (const Error& e) {
     // Tried again later if the disk is full or another process blocks writes.
     if (!IsRetryableLater(e)) throw;
@@ -129,7 +129,7 @@ void Maintenance::GiveBackSpace() {
   if (blobs_.FreeBytes() >= timing_.reserve_bytes + 2 * ballast->bytes()) ballast->Make();
 }
 
-void Maintenance::HoldBackWhenSpaceIsLow() {
+void Maintenance::UpdateStorageHold() {
   const bool held = store_.Holds().contains(Hold::kStorage);
   const int64_t free = blobs_.FreeBytes();
   const int64_t wanted = timing_.low_space_bytes + (held ? timing_.low_space_bytes / 10 : 0);

@@ -84,8 +84,8 @@ class Maintenance {
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
-  void HoldBackWhenSpaceIsLow();
-  void GiveBackSpace();
+  void UpdateStorageHold();
+  void ReturnFreeSpace();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void ExpireJobs();
   // Adds the paths that could not be read to `unreadable`.

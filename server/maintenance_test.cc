@@ -244,7 +244,7 @@ class FullStore : public SqliteJobStore {
  public:
   using SqliteJobStore::SqliteJobStore;
   int ReapExpired() override { throw Full(); }
-  std::vector<std::string> ExpireLeasesOf(const std::string&) override { throw Full(); }
+  std::vector<std::string> ExpireLeases(const std::string&) override { throw Full(); }
 
  private:
   static Error Full() { return ServiceError(ErrorReason::kStorageFull, "full"); }
@@ -255,7 +255,7 @@ TEST_F(MaintenanceTest, ServerRunsAndStartsOnFullDisk) {
   StoreOptions options;
   options.boot_id = boot_id_;
   FullStore full(File(), StoreRole::kServer, TestClocks(), options);
-  EXPECT_NO_THROW(ExpireDeadWorkers(full)) << "leases run out by themselves";
+  EXPECT_NO_THROW(ExpireDeadWorkers(full)) << "leases expire by themselves";
   std::atomic<int> lives{0};
   MaintenanceTiming timing = Quick();
   timing.on_life = [&] { ++lives; };

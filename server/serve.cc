@@ -219,9 +219,9 @@ ServerSample SampleOf(const ServeOptions& options,
 }
 
 // Probes like a client. While the gate has no room, it has reported that itself.
-std::string ProbeOurselves(const RpcServer& server,
-                           const TlsFiles& tls,
-                           std::chrono::milliseconds limit) {
+std::string ProbeOwnAddress(const RpcServer& server,
+                            const TlsFiles& tls,
+                            std::chrono::milliseconds limit) {
   const int64_t refused = server.connections().refused;
   const std::string why = ProbePort({server.address(), !tls.empty()}, limit);
   return server.connections().refused == refused ? why : "";
@@ -300,7 +300,7 @@ void Serve(const ServeOptions& options) {
   const auto probe = std::make_unique<SelfProbe>(
       probe_timing,
       [&](std::chrono::milliseconds limit) {
-        const std::string why = ProbeOurselves(server, tls, limit);
+        const std::string why = ProbeOwnAddress(server, tls, limit);
         return draining ? "" : why;  // a draining server closes its port
       },
       [&](const std::string& why) {

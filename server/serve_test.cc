@@ -118,7 +118,7 @@ TEST_F(ProcessTest, NewWeightsUnderSameNameMissTheCache) {
   fs::remove(weights);
   const v1::Job job = client.WaitFinished(client.Create(spec).name());
   EXPECT_EQ(job.state(), v1::Job::STATE_FAILED);
-  EXPECT_THAT(job.error().message(), HasSubstr("put it back"));
+  EXPECT_THAT(job.error().message(), HasSubstr("restore it"));
 }
 
 TEST_F(ProcessTest, NoticesWeightsReplacedDuringJob) {

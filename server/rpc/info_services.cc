@@ -20,7 +20,7 @@ void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
     model->set_name(name);
     try {
       const FileDigest digest = parts.digests.Of(file);
-      model->set_kind(LooksLike(file));
+      model->set_kind(GuessModelKind(file));
       model->set_size_bytes(digest.size_bytes);
       model->set_sha256(digest.sha256);
     } catch (const Error& e) {

@@ -30,7 +30,7 @@ class ChoreStore : public virtual CommonStore {
   // Ends attempts with expired leases; returns their number.
   virtual int ReapExpired() = 0;
   // Ends the leases of a dead worker. Returns the names of its jobs.
-  virtual std::vector<std::string> ExpireLeasesOf(const std::string& worker) = 0;
+  virtual std::vector<std::string> ExpireLeases(const std::string& worker) = 0;
   // Returns true if another process blocks all writes for about a second.
   virtual bool IsHeld() = 0;
   // Returns true if writes fail because the disk is full.
@@ -76,7 +76,7 @@ class ChoreStore : public virtual CommonStore {
   virtual void ForgetBlob(const std::string& sha256) = 0;
   // Returns free pages of the database beyond `keep_bytes` to the file system, some MiB per call.
   // Returns the number of bytes still free in it.
-  virtual int64_t GiveBackSpace(int64_t keep_bytes) = 0;
+  virtual int64_t ReturnFreeSpace(int64_t keep_bytes) = 0;
 };
 
 }  // namespace color3d

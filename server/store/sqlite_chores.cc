@@ -45,7 +45,7 @@ void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_m
   for (std::optional<int64_t> revision = 0; revision;) {
     revision = CompactEvents(*revision, events_before_ms);
   }
-  requests_before_ms = std::min(requests_before_ms, NotedRequestAge(requests_before_ms));
+  requests_before_ms = std::min(requests_before_ms, RecordedRequestAge(requests_before_ms));
   int64_t removed = kCompactAtOnce;
   while (removed == kCompactAtOnce) {
     WriteTransaction db(connections_, /*durable=*/false);
@@ -58,7 +58,7 @@ void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_m
   }
 }
 
-int64_t SqliteJobStore::NotedRequestAge(int64_t before_ms) {
+int64_t SqliteJobStore::RecordedRequestAge(int64_t before_ms) {
   constexpr int64_t kDayMs = 24 * 3'600'000;
   WriteTransaction db(connections_, /*durable=*/false);
   db.Run("update meta set value=value+? where name='requests_age_ms'",
@@ -159,7 +159,7 @@ int64_t SqliteJobStore::ElapsedSinceLast(SqliteDatabase& db, const char* name) {
 }
 
 namespace {
-std::vector<BlobCandidate> CandidatesOf(SqliteDatabase& db, int64_t grace_ms) {
+std::vector<BlobCandidate> DueCandidates(SqliteDatabase& db, int64_t grace_ms) {
   return SqliteStatement(
              db, "select sha256, touched_ns from blob_candidate where age_ms>=?", grace_ms)
       .All([](const SqliteStatement& row) {
@@ -182,17 +182,17 @@ std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobC
   db.Run("update blob_candidate set age_ms=age_ms+?", elapsed);
   db.Exec("insert or ignore into blob_candidate select sha256, touched_ns, 0 from told");
   db.Exec("drop table told");
-  std::vector<BlobCandidate> due = CandidatesOf(db, grace_ms);
+  std::vector<BlobCandidate> due = DueCandidates(db, grace_ms);
   db.Commit();
   return due;
 }
 
 std::vector<BlobCandidate> SqliteJobStore::AgedCandidates(int64_t grace_ms) {
-  return CandidatesOf(connections_.Read(), grace_ms);
+  return DueCandidates(connections_.Read(), grace_ms);
 }
 
 // Works in steps with a short log: a nearly full disk has no room for a long one.
-int64_t SqliteJobStore::GiveBackSpace(int64_t keep_bytes) {
+int64_t SqliteJobStore::ReturnFreeSpace(int64_t keep_bytes) {
   constexpr int64_t kPagesAtOnce = 500;
   const SqliteConnections::Writer writer(connections_);
   SqliteDatabase& db = *writer;

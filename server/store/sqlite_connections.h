@@ -45,8 +45,8 @@ class SqliteConnections {
   Reader Read() { return Reader(*this); }
 
  private:
-  std::unique_ptr<SqliteDatabase> TakeReader();
-  void PutBack(std::unique_ptr<SqliteDatabase> reader);
+  std::unique_ptr<SqliteDatabase> AcquireReader();
+  void ReleaseReader(std::unique_ptr<SqliteDatabase> reader);
 
   const std::filesystem::path file_;
   Mutex writing_;

@@ -119,7 +119,7 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess a
     // A sandboxed worker may not write temporary files.
     Exec("pragma temp_store=MEMORY");
     if (writes) {
-      // GiveBackSpace requires incremental vacuum. On an existing file this pragma would write.
+      // ReturnFreeSpace requires incremental vacuum. On an existing file this pragma would write.
       if (IsEmpty()) Exec(kShrinkable);
       Exec("pragma journal_size_limit=4194304");
       Exec("pragma journal_mode=WAL");
@@ -150,7 +150,7 @@ void SqliteDatabase::Exec(const char* sql) {
   if (code != SQLITE_OK) ThrowSqlite(db_, code, fmt::format("cannot run '{}'", sql));
 }
 
-void SqliteDatabase::BuildAnew(const std::filesystem::path& temporary) {
+void SqliteDatabase::Rebuild(const std::filesystem::path& temporary) {
   char* const before = sqlite3_temp_directory;
   sqlite3_temp_directory = sqlite3_mprintf("%s", temporary.c_str());
   Exec(kShrinkable);

@@ -86,7 +86,7 @@ class SqliteDatabase {
   void Exec(const char* sql);
   // Rewrites the file without its free pages (vacuum), with temporary files in `temporary`. Changes
   // nothing if it throws. Requires: no other thread uses any database.
-  void BuildAnew(const std::filesystem::path& temporary);
+  void Rebuild(const std::filesystem::path& temporary);
   // Prepares, binds and runs a statement; returns the number of changed rows.
   template <typename... Values>
   int64_t Run(std::string_view sql, const Values&... values) {

@@ -35,7 +35,7 @@ bool IsRetryable(ErrorCode code) {
 
 }  // namespace
 
-void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
+void SqliteJobStore::RequireServerVersion(SqliteDatabase& db) const {
   SqliteStatement server(db, "select version from server");
   if (server.Step() && server.Text(0) != options_.program_version) {
     throw ServiceError(ErrorReason::kWorkerVersion,
@@ -66,11 +66,11 @@ std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_
       "order by priority, coalesce(turn, 0), job_id limit 1";
   {  // An idle worker only reads.
     const auto db = connections_.Read();
-    RequireServersVersion(db);
+    RequireServerVersion(db);
     if (!SqliteStatement(db, kNext, SteadyNow()).Step()) return std::nullopt;
   }
   WriteTransaction db(connections_);
-  RequireServersVersion(db);
+  RequireServerVersion(db);
   const int64_t id = SqliteStatement(db, kNext, SteadyNow()).NextInt();
   if (id == 0) return std::nullopt;
   JobRecord job = BeginAttempt(db, id, worker, lease_ms);
@@ -95,7 +95,7 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
       "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
       "limit 16";
   const auto choose = [&](SqliteDatabase& db) -> std::optional<int64_t> {
-    RequireServersVersion(db);
+    RequireServerVersion(db);
     SqliteStatement select(db, SelectJob(kCandidates), kind, SteadyNow());
     while (select.Step()) {
       const JobRecord job = JobFromRow(select);
@@ -354,7 +354,7 @@ int SqliteJobStore::ReapExpired() {
   return static_cast<int>(expired.size());
 }
 
-std::vector<std::string> SqliteJobStore::ExpireLeasesOf(const std::string& worker) {
+std::vector<std::string> SqliteJobStore::ExpireLeases(const std::string& worker) {
   WriteTransaction db(connections_);
   std::vector<std::string> names =
       SqliteStatement(db,

@@ -250,8 +250,8 @@ TEST_F(SqliteJobLeaseTest, DeadWorkersLoseLeasesAtOnce) {
   ClaimOne("worker-1-77");
   store_->UpdateWorker({"worker-1-77", 77, job.name, 5, 0});
   ASSERT_EQ(store_->ListWorkers().size(), 1u);
-  EXPECT_TRUE(store_->ExpireLeasesOf("worker-2-78").empty());
-  EXPECT_EQ(store_->ExpireLeasesOf("worker-1-77"), std::vector<std::string>{job.name});
+  EXPECT_TRUE(store_->ExpireLeases("worker-2-78").empty());
+  EXPECT_EQ(store_->ExpireLeases("worker-1-77"), std::vector<std::string>{job.name});
   EXPECT_EQ(store_->ReapExpired(), 1);
   EXPECT_EQ(StateOf(job.name), JobState::kQueued);
 }

@@ -88,7 +88,7 @@ class SqliteJobStore : public JobStore {
   std::optional<JobRecord> FindStage(const std::string& stage_key) override;
 
   int ReapExpired() override;
-  std::vector<std::string> ExpireLeasesOf(const std::string& worker) override;
+  std::vector<std::string> ExpireLeases(const std::string& worker) override;
   bool IsHeld() override;
   bool IsFull() override;
   void UpdateWorker(const WorkerRecord& worker) override;
@@ -137,7 +137,7 @@ class SqliteJobStore : public JobStore {
                                            int64_t grace_ms) override;
   std::vector<BlobCandidate> AgedCandidates(int64_t grace_ms) override;
   int64_t RunningEpoch(const std::string& job_name) override;
-  int64_t GiveBackSpace(int64_t keep_bytes) override;
+  int64_t ReturnFreeSpace(int64_t keep_bytes) override;
 
  private:
   // Reading (sqlite_job_store.cc).
@@ -164,10 +164,10 @@ class SqliteJobStore : public JobStore {
   // Returns the time before which request ids may be deleted, as recorded a day ago by the steady
   // clock, so that a clock jump expires none; 0 if the day is not over. Records `before_ms` for the
   // next day.
-  int64_t NotedRequestAge(int64_t before_ms);
+  int64_t RecordedRequestAge(int64_t before_ms);
 
   // Throws WORKER_VERSION.
-  void RequireServersVersion(SqliteDatabase& db) const;
+  void RequireServerVersion(SqliteDatabase& db) const;
 
   // State machine (sqlite_job_state.cc).
   void AddEvent(SqliteDatabase& db, int64_t job_id, bool progress);

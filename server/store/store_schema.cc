@@ -58,7 +58,7 @@ void Migrate(SqliteDatabase& db) {
 
 // Stores created before version 6 never return the space of deleted rows. Rebuilding takes twice
 // the size of the file; without that space it is left to a later start.
-void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
+void EnableSpaceReturn(const fs::path& file, SqliteDatabase& db) {
   const auto number = [&](const char* pragma) { return SqliteStatement(db, pragma).NextInt(); };
   if (number("pragma auto_vacuum") != 0) return;
   const int64_t bytes =
@@ -74,7 +74,7 @@ void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
     return;
   }
   try {
-    db.BuildAnew(file.parent_path());
+    db.Rebuild(file.parent_path());
     spdlog::info("the job store was built anew: it gives back space from now on");
   } catch (const Error& e) {
     spdlog::warn("the job store cannot give back space yet: {}", e.what());
@@ -99,7 +99,7 @@ bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
 }
 
 // Writes nothing if nothing has changed, so that the server can still answer reads on a full disk.
-void SayWhoServes(SqliteDatabase& db, const ServerIdentity& identity) {
+void RecordServer(SqliteDatabase& db, const ServerIdentity& identity) {
   if (IsKnown(db, identity)) return;
   SqliteTransaction transaction(db);
   if (!SqliteStatement(db, "select 1 from server where boot_id=?", identity.boot_id).Step()) {
@@ -145,8 +145,8 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
     KeepCopy(file, *version);
     Migrate(db);
   }
-  MakeShrinkable(file, db);
-  SayWhoServes(db, identity);
+  EnableSpaceReturn(file, db);
+  RecordServer(db, identity);
 }
 
 }  // namespace color3d

@@ -29,7 +29,7 @@ class StoreSchemaTest : public JobStoreTest {
     old.Run("update schema_version set version=?", version);
   }
   // Columns, indexes and triggers of all tables, each on a line.
-  static std::vector<std::string> TablesOf(const fs::path& file) {
+  static std::vector<std::string> DescribeTables(const fs::path& file) {
     SqliteDatabase db(file, SqliteAccess::kRead);
     return SqliteStatement(
                db,
@@ -119,7 +119,7 @@ TEST_F(StoreSchemaTest, ServerMigratesOldStoreAndKeepsCopy) {
 }
 
 TEST_F(StoreSchemaTest, MigratesEveryEarlierVersion) {
-  const std::vector<std::string> tables = TablesOf(File());
+  const std::vector<std::string> tables = DescribeTables(File());
   EXPECT_GT(tables.size(), 100u);
   for (int version = 1; version < kSchemaVersion; ++version) {
     SCOPED_TRACE(version);
@@ -128,7 +128,7 @@ TEST_F(StoreSchemaTest, MigratesEveryEarlierVersion) {
     MigrateOldTo(version);
     Open();
     EXPECT_EQ(VersionOf(File()), kSchemaVersion);
-    EXPECT_EQ(TablesOf(File()), tables);
+    EXPECT_EQ(DescribeTables(File()), tables);
     EXPECT_EQ(store_->GetScene("scenes/test").files.at(0).path, "a.jpg");
     EXPECT_EQ(store_->GetProject("").scenes, 1);
     const JobRecord claimed = ClaimOne();
@@ -142,7 +142,7 @@ TEST_F(StoreSchemaTest, MigratesEveryEarlierVersion) {
 // tables raise kSchemaVersion, add a migration and only then change this digest.
 TEST_F(StoreSchemaTest, TablesChangeOnlyWithTheVersion) {
   std::string text = std::to_string(kSchemaVersion);
-  for (const std::string& line : TablesOf(File())) text += "\n" + line;
+  for (const std::string& line : DescribeTables(File())) text += "\n" + line;
   EXPECT_EQ(Sha256Hex(text), "TABLES_DIGEST") << text;
 }
 
@@ -184,7 +184,7 @@ TEST_F(StoreSchemaTest, FreePagesReturnToTheFileSystem) {
     store_->DeleteScene(scene.name, {});
     EXPECT_GT(FreePages(File()), 1000);
     int64_t left = 1;
-    for (int i = 0; i < 10 && left > 0; ++i) left = store_->GiveBackSpace(0);
+    for (int i = 0; i < 10 && left > 0; ++i) left = store_->ReturnFreeSpace(0);
     EXPECT_EQ(left, 0);
     EXPECT_EQ(FreePages(File()), 0);
     EXPECT_LT(static_cast<int64_t>(fs::file_size(File())), before - (4 << 20));

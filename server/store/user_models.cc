@@ -46,7 +46,7 @@ Entry Split(const std::string& text, const std::string& flag, const std::string&
   return entry;
 }
 
-[[noreturn]] void GivenTwice(const std::string& flag, const std::string& name) {
+[[noreturn]] void ThrowRepeatedName(const std::string& flag, const std::string& name) {
   throw InvalidArgument("{} {} is given twice; give each name once", flag, name);
 }
 
@@ -69,13 +69,13 @@ UserModels ParseUserModels(const std::vector<std::string>& models,
   for (const std::string& text : models) {
     const Entry entry = Split(text, "--model", "FILE");
     if (!result.files.emplace(entry.name, fs::absolute(entry.value)).second) {
-      GivenTwice("--model", entry.name);
+      ThrowRepeatedName("--model", entry.name);
     }
   }
   for (const std::string& text : backends) {
     const Entry entry = Split(text, "--backend", "ADDRESS");
     if (!result.backends.emplace(entry.name, entry.value).second) {
-      GivenTwice("--backend", entry.name);
+      ThrowRepeatedName("--backend", entry.name);
     }
   }
   return result;
@@ -105,7 +105,7 @@ std::vector<std::string> ToFlags(const UserModels& models) {
   return flags;
 }
 
-std::string LooksLike(const fs::path& file) {
+std::string GuessModelKind(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw Error(ErrorCode::kNotFound, "cannot read {}", file.string());
   const std::string head = ReadUpTo(stream, kHeadBytes);

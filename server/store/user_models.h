@@ -39,7 +39,7 @@ std::string NamesOf(const std::map<std::string, Value>& entries) {
 
 // Guesses the kind of a weight file, for display only: "clip", "ddcolor", "convnext", "torchscript"
 // or "unknown". Throws Error{kNotFound}.
-std::string LooksLike(const std::filesystem::path& file);
+std::string GuessModelKind(const std::filesystem::path& file);
 
 // Identifies the state of a file without reading it; empty if there is no such file.
 std::string FileIdentity(const std::filesystem::path& file);

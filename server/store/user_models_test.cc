@@ -80,7 +80,7 @@ TEST(UserModels, RecognisesKinds) {
   const ScratchFolder folder;
   const auto kind = [&](const std::string& bytes) {
     WriteFileAtomic(folder.path() / "w", bytes);
-    return LooksLike(folder.path() / "w");
+    return GuessModelKind(folder.path() / "w");
   };
   EXPECT_EQ(kind("........{\"visual.conv1.weight\":"), "clip");
   EXPECT_EQ(kind("........{\"encoder.arch.norm0.weight\":"), "ddcolor");

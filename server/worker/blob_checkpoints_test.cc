@@ -1,4 +1,4 @@
-// Checkpoints of several attempts that may be the same bytes.
+// Checkpoints of several attempts, possibly with equal bytes.
 #include "server/worker/blob_checkpoints.h"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ TEST_F(BlobCheckpointsTest, KeepsOnlyNewestCheckpoint) {
   EXPECT_TRUE(IsThere("three")) << "the job's row names it still";
 }
 
-// Another worker has stored the same bytes and is about to name them.
+// Another worker has stored the same bytes and will name them.
 TEST_F(BlobCheckpointsTest, KeepsBlobThatOtherJobTouched) {
   auto checkpoints = Of(Running());
   checkpoints.Save("equal");

@@ -8,7 +8,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// A checkpoint is saved whenever it is time; what is saved takes longer and longer.
+// Checkpoints are saved as soon as possible; each takes longer than the one before.
 TEST(CheckpointPace, LargeCheckpointsTakeTwentiethOfTime) {
   const CheckpointPace::Time begin{};
   CheckpointPace::Time now = begin;

@@ -1,4 +1,4 @@
-// Real pictures through the embedded encoder.
+// Live colorization with the embedded encoder.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using Request = internal::v1::ColorizeImageRequest;
 using Response = internal::v1::ColorizeImageResponse;
 
-// Stripes and a blob of texture, L 20..80; ab everywhere the same.
+// Stripes and a textured blob, L 20..80, constant ab.
 Image TintedLab(float a, float b, int width = 96, int height = 80) {
   Image lab(width, height, 3);
   for (int y = 0; y < height; ++y) {
@@ -63,7 +63,7 @@ class CoreLiveEngineTest : public ::testing::Test {
     request.set_image(image);
     return request;
   }
-  // What the engine says to all of them at once; an error's text where there is one.
+  // Answers of the engine to a batch; an error is given by its text.
   std::vector<std::string> Run(const std::vector<Request>& requests) {
     responses_.assign(requests.size(), {});
     std::vector<LiveTask> tasks;

@@ -40,7 +40,7 @@ TEST(CarryOptionsFromTest, NamesAdditionalKeyViewsInOrder) {
   EXPECT_EQ(CarryOptionsFrom(spec).additional_key_views, (std::vector<std::string>{"b", "a"}));
 }
 
-// As planned before additional key views had jobs of their own.
+// Planned before additional key views had their own jobs.
 TEST(CarryOptionsFromTest, RefusesJobsOfEarlierVersions) {
   v1::FurtherKeyView key;
   key.set_view("b");
@@ -120,10 +120,10 @@ TEST(ColorizerOptionsFromTest, ConvertsSetFields) {
   EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kAuto);
 }
 
-// What the method makes of a stage's options.
+// Conversion and validation of the options of a stage in the method library.
 struct Method {
   std::function<void(const Message&)> validate;
-  std::function<bool(const Message&, const Message&)> same;  // two specs mean the same options
+  std::function<bool(const Message&, const Message&)> same;  // both specs give equal options
 };
 
 template <typename Spec, typename From>
@@ -134,7 +134,7 @@ Method MakeMethod(From from) {
           }};
 }
 
-// A working size, which some stages take beside their options.
+// Working size, which some stages take in addition to their options.
 struct MaxSide {
   int px;
   void Validate() const { CheckMaxSide(px); }
@@ -155,7 +155,7 @@ struct SizedGeometry {
   bool operator==(const SizedGeometry&) const = default;
 };
 
-// Photos, splats and films have options of their own.
+// Options of the import of photos, splats and films.
 struct ImportMethod {
   ImportOptions photos;
   SplatViewOptions splat;
@@ -168,7 +168,7 @@ struct ImportMethod {
   bool operator==(const ImportMethod&) const = default;
 };
 
-// By the stage's name in JobSpec. A stage that is missing here has no options of its own.
+// By the name of the stage in JobSpec; stages without options are omitted.
 const std::map<std::string, Method>& Methods() {
   static const std::map<std::string, Method> methods = {
       {"import_scene", MakeMethod<v1::ImportSceneSpec>([](const auto& s) {
@@ -224,7 +224,7 @@ void SetNumber(const FieldDescriptor& field, double value, Message* message) {
   }
 }
 
-// What the server's check and the method say to one number.
+// Answers of the server's check and of the method to one number.
 struct Verdict {
   bool server = true;
   bool method = true;
@@ -253,7 +253,7 @@ Verdict Try(const FieldDescriptor& stage,
   return verdict;
 }
 
-// Every number has a range, and the method's own Validate draws it where the proto does.
+// Every number has a range, which is equal in the proto and in Validate of the method.
 TEST(OptionRanges, AreEqualInServerAndMethod) {
   int ranges = 0;
   ForEachOption(
@@ -285,8 +285,7 @@ TEST(OptionDefaults, AreThoseOfProto) {
   ForEachOption(
       [&](const FieldDescriptor& stage, const FieldDescriptor& field, const Method& method) {
         const std::string& value = InfoOf(&field).default_value();
-        if (value.empty() || field.name() == "skip")
-          return;  // skip: the planner's, not the method's
+        if (value.empty() || field.name() == "skip") return;  // skip: an option of the planner only
         SCOPED_TRACE(field.full_name());
         const Message& unset = *google::protobuf::MessageFactory::generated_factory()->GetPrototype(
             stage.message_type());
@@ -297,7 +296,7 @@ TEST(OptionDefaults, AreThoseOfProto) {
       });
 }
 
-// A user of the library gets what a user of the service gets.
+// The defaults of library and service are equal.
 TEST(OptionDefaults, EqualFastPreset) {
   const v1::ColorizeSceneSpec fast = WithPreset({});
   EXPECT_EQ(GeometryOptionsFrom(fast.reconstruct_geometry(), 1), GeometryOptions());

@@ -1,4 +1,4 @@
-// Workers that say nothing: killed, but not for a disk that takes no reports.
+// Workers without reports are killed unless the disk is full.
 #include "server/worker/supervisor.h"
 
 #include <atomic>

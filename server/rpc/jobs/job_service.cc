@@ -72,7 +72,7 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
   return inputs;
 }
 
-SceneFacts FactsOf(const SceneRecord& scene) {
+SceneFacts SceneFactsFrom(const SceneRecord& scene) {
   const bool is_splat = scene.layout == CaptureLayout::kSplat;
   return {.photos = scene.photo_count,
           .has_poses = InfoOf(scene.layout).has_poses,
@@ -109,14 +109,14 @@ SceneRouteInputs LoadRoute(const ProjectStore& store,
                           key_color.kind,
                           kind::kColorizeKeyView);
   }
-  SceneRouteInputs inputs{store.GetInputs(key_color), FactsOf(scene)};
+  SceneRouteInputs inputs{store.GetInputs(key_color), SceneFactsFrom(scene)};
   inputs.jobs.push_back(key_color);
   return inputs;
 }
 
 NewGraph PlanRequest(const ProjectStore& store, const v1::JobSpec& spec) {
   if (!spec.has_personalize_scenes()) {
-    return PlanJob(spec, LoadInputs(store, spec), FactsOf(store.GetScene(spec.scene())));
+    return PlanJob(spec, LoadInputs(store, spec), SceneFactsFrom(store.GetScene(spec.scene())));
   }
   std::vector<SceneRouteInputs> routes;
   for (const auto& route : spec.personalize_scenes().routes()) {
