@@ -206,7 +206,7 @@ struct KeepingArguments {
 };
 
 // Returns exit status 1 if the copy lacks blobs, which are listed.
-int ReportIncompleteCopy(const CopiedBlobs& copied, const std::filesystem::path& from) {
+int ReportMissingBlobs(const CopiedBlobs& copied, const std::filesystem::path& from) {
   for (const std::string& sha256 : copied.missing) std::cout << "missing: " << sha256 << "\n";
   for (const std::string& sha256 : copied.damaged) std::cout << "damaged: " << sha256 << "\n";
   for (const std::string& what : copied.unreadable) std::cout << "unreadable: " << what << "\n";
@@ -239,7 +239,7 @@ int RunBackUp(const KeepingArguments& arguments) {
       copied.bytes >> 20,
       copied.kept,
       copied.mended > 0 ? fmt::format("; {} damaged ones replaced", copied.mended) : "");
-  return ReportIncompleteCopy(copied, arguments.data_folder);
+  return ReportMissingBlobs(copied, arguments.data_folder);
 }
 
 int RunRestore(const KeepingArguments& arguments) {
@@ -247,7 +247,7 @@ int RunRestore(const KeepingArguments& arguments) {
   std::cout << fmt::format("{}: {} blobs restored and verified; start color3d-server serve on it\n",
                            arguments.data_folder.string(),
                            copied.copied);
-  return ReportIncompleteCopy(copied, arguments.copy);
+  return ReportMissingBlobs(copied, arguments.copy);
 }
 
 int RunFsck(const KeepingArguments& arguments) {

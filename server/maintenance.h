@@ -84,7 +84,7 @@ class Maintenance {
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
-  void UpdateStorageHold();
+  void PauseWhenSpaceIsLow();
   void ReturnFreeSpace();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void ExpireJobs();

@@ -39,8 +39,8 @@
 #include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/sqlite_job_store.h"
-#include "server/worker/supervisor.h"
-#include "server/worker/worker_settings.h"
+#include "server/worker/supervision/supervisor.h"
+#include "server/worker/supervision/worker_settings.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -219,9 +219,9 @@ ServerSample SampleOf(const ServeOptions& options,
 }
 
 // Probes like a client. While the gate has no room, it has reported that itself.
-std::string ProbeOwnAddress(const RpcServer& server,
-                            const TlsFiles& tls,
-                            std::chrono::milliseconds limit) {
+std::string ProbeOwnServer(const RpcServer& server,
+                           const TlsFiles& tls,
+                           std::chrono::milliseconds limit) {
   const int64_t refused = server.connections().refused;
   const std::string why = ProbePort({server.address(), !tls.empty()}, limit);
   return server.connections().refused == refused ? why : "";
@@ -300,7 +300,7 @@ void Serve(const ServeOptions& options) {
   const auto probe = std::make_unique<SelfProbe>(
       probe_timing,
       [&](std::chrono::milliseconds limit) {
-        const std::string why = ProbeOwnAddress(server, tls, limit);
+        const std::string why = ProbeOwnServer(server, tls, limit);
         return draining ? "" : why;  // a draining server closes its port
       },
       [&](const std::string& why) {

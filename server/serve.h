@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "server/worker/worker_settings.h"
+#include "server/worker/supervision/worker_settings.h"
 
 namespace color3d {
 

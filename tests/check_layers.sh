@@ -3,6 +3,7 @@
 #   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
 #           <- {keyview, augment, carry <- film, splat, metrics, report, video, view, matching <- {keycolor, colorizer}}
 #           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- {recolor, report} <- stages
+#   colorizer: colorizer <- model <- neighbors <- training <- personal
 #   scene:  scene <- {masks, formats} <- sfm <- import
 #   server: base <- store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is seen only where networks live, protocol buffers never below the server, SQL there only for
@@ -71,7 +72,12 @@ for source in references words automatic external; do
     "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/hints)?|keycolor/$source)"
 done
 allow core/carry 'core/(base|grid|color|image|scene|carry)'
-allow core/colorizer 'core/(base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer)'
+colorizer='base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer'
+allow_own core/colorizer "core/($colorizer)"
+for part in model neighbors training personal; do
+  colorizer="$colorizer|colorizer/$part"
+  allow "core/colorizer/$part" "core/($colorizer)"
+done
 lower=
 for part in model motion raster training geometry chroma export import; do
   lower="$lower${lower:+|}$part"
@@ -112,6 +118,9 @@ for folder in blobs jobs live scenes; do
     "core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|$folder))"
 done
 allow server/rpc/calls 'core/(base|catalogue)|server/(base|access|net|store|planning|storage|ops|rpc/calls)'
+allow server/worker/supervision 'core/base|server/(store|ops|worker/supervision)'
+allow server/worker/live \
+  'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/live)'
 allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
@@ -137,12 +146,12 @@ public() {
 
 public core/augment augment outpaint surrogates
 public core/carry carry carry_views confidence dense_points plane_sweep view_color
-public core/colorizer colorizer corrector scene_batch scene_colorizers
+public core/colorizer colorizer corrector scene_batch personal/scene_colorizers personal/train_colorizer
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
   embedded/embedded_weights
 public core/grid edge_weights grid_solver
-public core/image box_mean codec decode_budget draw fill_holes feature_matches flow_agreement guided_upsample local_features optical_flow plane_sampling reduced weighted_resize \
+public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling reduced weighted_resize \
   probe/focal_length probe/orientation probe/probe
 public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
@@ -169,33 +178,28 @@ public server/planning asked_formats job_spec key_view_jobs plan_scenes planner 
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store chore_store client_store job job_store project_store worker_store sqlite_job_store store_file user_models
-public server/worker supervisor worker_settings
+public server/worker supervision/supervisor supervision/worker_settings
 
 # Branches on the kind of a capture belong to its tables (core/catalogue/captures) and to import, which
 # determines the kind. Other sources read a property of it on at most this many lines each; lower a
 # number when it falls, and do not raise it: a new kind is a row, not a new branch.
 kind_branches='
-core/stage/carry_color.cc 2
-core/stage/colorize_scene.cc 5
-core/stage/colorize_views.cc 2
+client/commands/colorize.cc 1
+core/stage/carry_color.cc 1
+core/stage/colorize_scene.cc 3
 core/stage/evaluate.cc 1
-core/stage/film/temporal_scores.cc 1
 core/stage/movie/film_clock.cc 1
-core/stage/movie/movie.cc 7
-core/stage/recolor/time_ranges.cc 3
-core/stage/reconstruct_geometry.cc 1
-core/stage/render.cc 2
+core/stage/recolor/time_ranges.cc 1
+core/stage/render.cc 1
 core/stage/report/next_key_view.cc 1
-core/stage/report/report_views.cc 1
-core/stage/select_key_view.cc 4
-core/stage/sources/chroma_budget.h 1
-server/planning/colorize_scene_graph.cc 5
-server/planning/time_budget.cc 9
-server/rpc/jobs/job_service.cc 2
+core/stage/select_key_view.cc 1
+server/planning/colorize_scene_graph.cc 1
+server/planning/scene_facts.h 3
+server/planning/time_budget.cc 5
 server/rpc/scenes/scene_validation.cc 2
 server/worker/stage_runner.cc 1
 '
-pattern='capture\(\)|ColoredAs\(|([!=]=|case) Capture(Kind|Layout)::|\<facts(\.|->)is_(film|splat|dynamic)\>'
+pattern='capture\(\)|ColoredAs\(|\<(is_reconstructed|is_dynamic)\>|([!=]=|case) (Capture(Kind|Layout)|ViewSource|PoseSource)::'
 branches=$(grep -rnE "$pattern" core server client --include='*.h' --include='*.cc' |
   grep -vE '^[^:]*_test\.cc:|^core/(catalogue/captures|scene/(scene|scene_json|import/[a-z_]+)|stage/(film_import/[a-z_]+|import_scene|formats/artifact_io))\.(h|cc):' || true)
 for file in $(cut -d: -f1 <<<"$branches" | sort -u); do

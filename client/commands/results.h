@@ -41,7 +41,8 @@ std::vector<std::string> DownloadResults(Connection& connection,
 // Returns a JSON artifact in `out`; null if there is none or it cannot be read.
 nlohmann::ordered_json ReadResult(const std::filesystem::path& out, const std::string& name);
 
-// Returns a summary for the user: metrics (in_summary) and results (Artifact::label) in `out`.
+// Returns a summary for the user: metrics (Metric::kInSummary) and results (Artifact::label) in
+// `out`.
 std::string Summary(const std::filesystem::path& out);
 
 }  // namespace color3d::client

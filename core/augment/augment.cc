@@ -106,11 +106,11 @@ class SamplingMap {
     p = {center_.x + p.x * step_, center_.y + p.y * step_};
     Source source;
     source.inside = p.x >= 0.0 && p.y >= 0.0 && p.x <= width_ && p.y <= height_;
-    p = {Reflect(p.x, width_), Reflect(p.y, height_)};
+    p = {Reflected(p.x, width_), Reflected(p.y, height_)};
     source.max_x = width_ - 1;
     source.max_y = height_ - 1;
     if (!cells_.empty()) Unshuffle(p, source);
-    Unturn(p, source);
+    UndoRotation(p, source);
     source.position = {p.x - 0.5, p.y - 0.5};
     return source;
   }
@@ -152,7 +152,7 @@ class SamplingMap {
   }
 
   // Inverts rotation and flip: maps coordinates of the rotated picture to the source.
-  void Unturn(Point& p, Source& source) const {
+  void UndoRotation(Point& p, Source& source) const {
     int width = width_;
     int height = height_;
     for (int i = 0; i < quarter_turns_; ++i) {
@@ -171,13 +171,6 @@ class SamplingMap {
       source.max_x = width - 1 - source.min_x;
       source.min_x = min_x;
     }
-  }
-
-  static double Reflect(double value, double side) {
-    const double period = 2.0 * side;
-    value = std::fmod(value, period);
-    if (value < 0.0) value += period;
-    return std::min(value, period - value);
   }
 
   int width_;  // of the rotated picture
@@ -229,13 +222,6 @@ AugmentOptions AugmentOptions::Paper() {
   options.rot90_probability = 0.5;
   options.shuffle_probability = 0.7;
   return options;
-}
-
-AugmentedSample Augment(const Image& luminance,
-                        const Image& ab,
-                        const AugmentOptions& options,
-                        Random& random) {
-  return Augment(luminance, ab, Image(), options, random);
 }
 
 AugmentedSample Augment(const Image& luminance,

@@ -38,9 +38,4 @@ AugmentedSample Augment(const Image& luminance,
                         const Image& weight,
                         const AugmentOptions& options,
                         Random& random);
-AugmentedSample Augment(const Image& luminance,
-                        const Image& ab,
-                        const AugmentOptions& options,
-                        Random& random);
-
 }  // namespace color3d

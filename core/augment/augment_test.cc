@@ -47,16 +47,16 @@ void ExpectAligned(const AugmentedSample& sample, float tolerance) {
   }
 }
 
-TEST(AugmentTest, IdentityReturnsThePicture) {
+TEST(AugmentTest, ReturnsPictureForIdentity) {
   const Picture picture = MakePicture(64, 64);
   Random random(3);
-  const AugmentedSample sample = Augment(picture.luminance, picture.ab, Identity(64), random);
+  const AugmentedSample sample = Augment(picture.luminance, picture.ab, {}, Identity(64), random);
   EXPECT_EQ(sample.luminance.data, picture.luminance.data);
   EXPECT_EQ(sample.ab.data, picture.ab.data);
   EXPECT_EQ(*std::min_element(sample.valid.data.begin(), sample.valid.data.end()), 1.0f);
 }
 
-TEST(AugmentTest, ChromaStaysOnItsLuminance) {
+TEST(AugmentTest, KeepsChromaWithItsLuminance) {
   const Picture picture = MakePicture(97, 61);
   AugmentOptions mild;
   mild.crop_px = 48;
@@ -65,8 +65,8 @@ TEST(AugmentTest, ChromaStaysOnItsLuminance) {
   paper.crop_px = 48;
   Random random(7);
   for (int i = 0; i < 20; ++i) {
-    ExpectAligned(Augment(picture.luminance, picture.ab, mild, random), 1e-3f);
-    ExpectAligned(Augment(picture.luminance, picture.ab, paper, random), 1e-3f);
+    ExpectAligned(Augment(picture.luminance, picture.ab, {}, mild, random), 1e-3f);
+    ExpectAligned(Augment(picture.luminance, picture.ab, {}, paper, random), 1e-3f);
   }
 }
 
@@ -75,7 +75,7 @@ TEST(AugmentTest, LuminanceJitterLeavesChromaAlone) {
   AugmentOptions options = Identity(64);
   options.luminance_jitter = 5.0;
   Random random(3);
-  const AugmentedSample sample = Augment(picture.luminance, picture.ab, options, random);
+  const AugmentedSample sample = Augment(picture.luminance, picture.ab, {}, options, random);
   EXPECT_EQ(sample.ab.data, picture.ab.data);
   EXPECT_NE(sample.luminance.data, picture.luminance.data);
   for (size_t i = 0; i < sample.luminance.data.size(); ++i) {
@@ -98,7 +98,7 @@ TEST(AugmentTest, ShuffleMovesWholeCellsWithoutMixing) {
   options.elastic_alpha_px = 3.0;
   options.elastic_sigma_px = 20.0;
   Random random(5);
-  const AugmentedSample sample = Augment(luminance, ab, options, random);
+  const AugmentedSample sample = Augment(luminance, ab, {}, options, random);
   for (float value : sample.ab.data) ASSERT_EQ(value, std::round(value));
   EXPECT_NE(sample.luminance.data, luminance.data);
 }
@@ -108,7 +108,7 @@ TEST(AugmentTest, ShuffleIsAPermutation) {
   AugmentOptions options = Identity(64);
   options.shuffle_probability = 1.0;
   Random random(5);
-  const AugmentedSample sample = Augment(picture.luminance, picture.ab, options, random);
+  const AugmentedSample sample = Augment(picture.luminance, picture.ab, {}, options, random);
   std::vector<float> before = picture.luminance.data;
   std::vector<float> after = sample.luminance.data;
   EXPECT_NE(before, after);
@@ -117,7 +117,7 @@ TEST(AugmentTest, ShuffleIsAPermutation) {
   EXPECT_EQ(before, after);
 }
 
-TEST(AugmentTest, QuarterTurnsAndFlipsGiveTheEightSymmetries) {
+TEST(AugmentTest, ProducesAllEightSymmetries) {
   const Picture picture = MakePicture(40, 40);
   AugmentOptions options = Identity(40);
   options.flip_probability = 0.5;
@@ -125,17 +125,17 @@ TEST(AugmentTest, QuarterTurnsAndFlipsGiveTheEightSymmetries) {
   std::set<std::vector<float>> seen;
   Random random(11);
   for (int i = 0; i < 200; ++i) {
-    const AugmentedSample sample = Augment(picture.luminance, picture.ab, options, random);
+    const AugmentedSample sample = Augment(picture.luminance, picture.ab, {}, options, random);
     ExpectAligned(sample, 0.0f + 1e-4f);
     seen.insert(sample.luminance.data);
   }
   EXPECT_EQ(seen.size(), 8u);
 }
 
-TEST(AugmentTest, IsInvalidOutsideThePicture) {
+TEST(AugmentTest, MarksPixelsOutsideThePictureInvalid) {
   const Picture picture = MakePicture(40, 20);
   Random random(1);
-  const AugmentedSample sample = Augment(picture.luminance, picture.ab, Identity(60), random);
+  const AugmentedSample sample = Augment(picture.luminance, picture.ab, {}, Identity(60), random);
   double valid = 0.0;
   for (float value : sample.valid.data) valid += value;
   EXPECT_EQ(valid, 40.0 * 20.0);
@@ -144,14 +144,14 @@ TEST(AugmentTest, IsInvalidOutsideThePicture) {
   ExpectAligned(sample, 1e-3f);
 }
 
-TEST(AugmentTest, SameGeneratorSameSample) {
+TEST(AugmentTest, IsRepeatableForSameGenerator) {
   const Picture picture = MakePicture(50, 50);
   AugmentOptions options = AugmentOptions::Paper();
   options.crop_px = 32;
   Random first(9);
   Random second(9);
-  EXPECT_EQ(Augment(picture.luminance, picture.ab, options, first).ab.data,
-            Augment(picture.luminance, picture.ab, options, second).ab.data);
+  EXPECT_EQ(Augment(picture.luminance, picture.ab, {}, options, first).ab.data,
+            Augment(picture.luminance, picture.ab, {}, options, second).ab.data);
   EXPECT_EQ(first.state().state, second.state().state);
 }
 
@@ -160,14 +160,14 @@ TEST(AugmentTest, AcceptsOnePixelPicture) {
   options.crop_px = 8;
   Random random(2);
   const AugmentedSample sample =
-      Augment(Image(1, 1, 1, 40.0f), Image(1, 1, 2, 5.0f), options, random);
+      Augment(Image(1, 1, 1, 40.0f), Image(1, 1, 2, 5.0f), {}, options, random);
   for (float value : sample.luminance.data) EXPECT_EQ(value, 40.0f);
 }
 
 TEST(AugmentTest, RefusesUnequalSizes) {
   Random random(2);
-  EXPECT_THROW(Augment(Image(4, 4, 1), Image(5, 4, 2), {}, random), Error);
-  EXPECT_THROW(Augment(Image(4, 4, 3), Image(4, 4, 2), {}, random), Error);
+  EXPECT_THROW(Augment(Image(4, 4, 1), Image(5, 4, 2), {}, {}, random), Error);
+  EXPECT_THROW(Augment(Image(4, 4, 3), Image(4, 4, 2), {}, {}, random), Error);
 }
 
 }  // namespace

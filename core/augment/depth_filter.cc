@@ -14,7 +14,7 @@ constexpr int kMeans = 3;
 constexpr float kSameSurface = 0.06f;  // maximum relative difference of depths
 
 // Collects known depths around a pixel, including its own. Returns their number.
-int Neighbours(const Image& depth, int x, int y, std::array<float, kWindow>* values) {
+int Neighbors(const Image& depth, int x, int y, std::array<float, kWindow>* values) {
   int count = 0;
   for (int v = std::max(0, y - kRadius); v <= std::min(depth.height - 1, y + kRadius); ++v) {
     for (int u = std::max(0, x - kRadius); u <= std::min(depth.width - 1, x + kRadius); ++u) {
@@ -36,7 +36,7 @@ Image Filtered(const Image& depth, Reduce reduce) {
         out.At(0, y, x) = 0.0f;
         continue;
       }
-      const int count = Neighbours(depth, x, y, &values);
+      const int count = Neighbors(depth, x, y, &values);
       out.At(0, y, x) = reduce(center, values.data(), count);
     }
   }

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kWidth = 80, kHeight = 60;
 
-// A wall at depth 4 and, before its left half when asked for, a board at depth 2.
+// A wall at depth 4 and, with `board`, a board at depth 2 before its left half.
 DepthView Wall(bool board) {
   DepthView view;
   view.camera = {kWidth, kHeight, 70.0, 70.0, kWidth / 2.0, kHeight / 2.0};
@@ -104,7 +104,7 @@ TEST(DepthFilterTest, RemovesNoiseAndKeepsEdges) {
   }
 }
 
-TEST(DepthWarpTest, ExtremeDepthsAndPosesStayFinite) {
+TEST(DepthWarpTest, StaysFiniteForExtremeDepthsAndPoses) {
   DepthView key = Wall(true);
   key.depth.At(0, 3, 3) = 1e-20f;
   key.depth.At(0, 4, 4) = 1e20f;

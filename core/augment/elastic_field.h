@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -13,6 +14,14 @@ struct PlanePoint {
   double x = 0.0;
   double y = 0.0;
 };
+
+// Reflects a coordinate at 0 and `side` as often as needed to lie between them.
+inline double Reflected(double value, double side) {
+  const double period = 2.0 * side;
+  value = std::fmod(value, period);
+  if (value < 0.0) value += period;
+  return std::min(value, period - value);
+}
 
 // Cubic B-spline over nodes that are uniform in -alpha..alpha px and sigma px apart, so that the
 // displacement never exceeds alpha.

@@ -16,13 +16,6 @@ constexpr double kMaxTurn = 2.0 * std::numbers::pi / 180.0;
 constexpr double kFlowShare = 0.03;     // bound of the flow, relative to the longer side
 constexpr double kSpacingShare = 0.25;  // spacing of its nodes, relative to the longer side
 
-double Mirrored(double value, double side) {
-  const double period = 2.0 * side;
-  value = std::fmod(value, period);
-  if (value < 0.0) value += period;
-  return std::min(value, period - value);
-}
-
 }  // namespace
 
 GeneratedPicture FlowFrame(const Image& lab, uint64_t seed) {
@@ -45,7 +38,7 @@ GeneratedPicture FlowFrame(const Image& lab, uint64_t seed) {
       frame.weight.At(0, y, x) = inside ? 1.0f : 0.0f;
       for (int c = 0; c < 3; ++c) {
         frame.lab.At(c, y, x) =
-            SampleBilinear(lab, c, Mirrored(sx, lab.width) - 0.5, Mirrored(sy, lab.height) - 0.5);
+            SampleBilinear(lab, c, Reflected(sx, lab.width) - 0.5, Reflected(sy, lab.height) - 0.5);
       }
     }
   }

@@ -36,7 +36,7 @@ TEST(FlowFrameTest, FlowIsSmallAndSmooth) {
   EXPECT_GT(moved, 0.5);
 }
 
-TEST(FlowFrameTest, ColorFollowsLuminance) {
+TEST(FlowFrameTest, MovesColorWithLuminance) {
   const GeneratedPicture frame = FlowFrame(Ramp(120, 90), 2);
   int inside = 0;
   for (size_t i = 0; i < frame.lab.PlaneSize(); ++i) {

@@ -27,12 +27,12 @@ Scene ArcScene(const Eigen::Vector3d& target) {
   return scene;
 }
 
-TEST(OrbitTest, CenterIsWhereTheCamerasLook) {
+TEST(OrbitTest, FindsPointThatCamerasFace) {
   const Eigen::Vector3d target(1.0, -0.5, 3.0);
   const Scene scene = ArcScene(target);
   EXPECT_LT((CenterOfAttention(scene, 2, 4.0) - target).norm(), 1e-6);
   EXPECT_NEAR(OrbitAngle(scene, 2, target), 12.0 * std::numbers::pi / 180.0, 1e-9)
-      << "0.4 rad, kept within what a warp bears";
+      << "0.4 rad, clamped to the plausible range";
 }
 
 TEST(OrbitTest, ParallelCamerasOrbitAtKeyDepth) {
@@ -45,7 +45,7 @@ TEST(OrbitTest, ParallelCamerasOrbitAtKeyDepth) {
             1e-6);
 }
 
-TEST(OrbitTest, CameraMovesRightAndUpFacingTheCenter) {
+TEST(OrbitTest, MovesRightAndUpFacingCenter) {
   const Eigen::Vector3d target(0.0, 0.0, 5.0);
   const Pose pose = ViewAt({0.0, 0.0, 0.0}, 0.0).cam_from_world;
   const Pose right = OrbitPose(pose, target, 0.2, 0.0);

@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/random.h"
+#include "core/image/crop.h"
 #include "core/image/fill_holes.h"
 
 namespace color3d {
@@ -38,7 +39,7 @@ struct Axis {
   std::vector<int> overlaps;  // overlap of each with the one before, px
 };
 
-// Patches that cover [begin + overlap, end), each `overlap` px or more over what is there.
+// Patches that cover [begin + overlap, end), each with an overlap of `overlap` px or more.
 Axis CoverAxis(int begin, int end, int patch, int overlap, bool filled_before) {
   Axis axis;
   int filled_to = filled_before ? begin + overlap : begin;
@@ -186,15 +187,7 @@ class Quilter {
     return sum;
   }
 
-  Image CanvasPatch(const Position& at) const {
-    Image patch(patch_, patch_, 3);
-    for (int c = 0; c < 3; ++c) {
-      for (int y = 0; y < patch_; ++y) {
-        for (int x = 0; x < patch_; ++x) patch.At(c, y, x) = canvas_.At(c, at.y + y, at.x + x);
-      }
-    }
-    return patch;
-  }
+  Image CanvasPatch(const Position& at) const { return Crop(canvas_, at.x, at.y, patch_, patch_); }
 
   // Row of the source that continues at this row of the canvas, clamped to the picture.
   double HeightCost(const Place& place, int source_y) const {
@@ -274,23 +267,17 @@ class Quilter {
   }
 
   void Paste(const Place& place, const Position& from) {
-    std::vector<int> first_x(static_cast<size_t>(patch_), 0), first_y = first_x;
-    if (place.left > 0) {
-      std::vector<float> cost(static_cast<size_t>(patch_) * place.left);
+    // `depth`: px of the overlap that the cut runs through.
+    const auto cut = [&](int depth, bool beside) {
+      if (depth == 0) return std::vector<int>(static_cast<size_t>(patch_), 0);
+      std::vector<float> cost(static_cast<size_t>(patch_) * depth);
       for (size_t i = 0; i < cost.size(); ++i) {
-        const int y = static_cast<int>(i) / place.left, x = static_cast<int>(i) % place.left;
-        cost[i] = PixelDifference(place, from, x, y);
+        const int along = static_cast<int>(i) / depth, across = static_cast<int>(i) % depth;
+        cost[i] = PixelDifference(place, from, beside ? across : along, beside ? along : across);
       }
-      first_x = CheapestCut(cost, patch_, place.left);
-    }
-    if (place.top > 0) {
-      std::vector<float> cost(static_cast<size_t>(patch_) * place.top);
-      for (size_t i = 0; i < cost.size(); ++i) {
-        const int x = static_cast<int>(i) / place.top, y = static_cast<int>(i) % place.top;
-        cost[i] = PixelDifference(place, from, x, y);
-      }
-      first_y = CheapestCut(cost, patch_, place.top);
-    }
+      return CheapestCut(cost, patch_, depth);
+    };
+    const std::vector<int> first_x = cut(place.left, true), first_y = cut(place.top, false);
     const Image step = StepAcrossSeam(place, from, first_x, first_y);
     for (int y = 0; y < patch_; ++y) {
       for (int x = 0; x < patch_; ++x) {

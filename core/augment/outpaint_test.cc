@@ -11,8 +11,8 @@
 namespace color3d {
 namespace {
 
-// Every pixel has a colour of its own that tells where it comes from.
-Image Labelled(int width, int height) {
+// The colour of every pixel encodes its position.
+Image Labeled(int width, int height) {
   Image lab(width, height, 3);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
@@ -27,7 +27,7 @@ Image Labelled(int width, int height) {
 const CancellationToken kGoOn;
 
 TEST(OutpaintTest, MovesQuadrantToOppositeCornerAndExtendsIt) {
-  const Image lab = Labelled(81, 64);  // odd and even
+  const Image lab = Labeled(81, 64);  // odd and even
   struct Expectation {
     Quadrant quadrant;
     int source_x, source_y;  // of the quadrant's upper left pixel
@@ -42,8 +42,8 @@ TEST(OutpaintTest, MovesQuadrantToOppositeCornerAndExtendsIt) {
     ASSERT_EQ(picture.lab.height, 64);
     int weighed = 0;
     for (const float w : picture.weight.data) weighed += w == 1.0f ? 1 : 0;
-    EXPECT_EQ(weighed, 41 * 32) << "only the quadrant is real where it lies";
-    // The middle of the quadrant, far from the seams with what was added.
+    EXPECT_EQ(weighed, 41 * 32) << "full weight on the quadrant only";
+    // The middle of the quadrant, far from the seams.
     for (int y = 10; y < 22; ++y) {
       for (int x = 14; x < 26; ++x) {
         EXPECT_EQ(picture.weight.At(0, e.canvas_y + y, e.canvas_x + x), 1.0f);
@@ -57,7 +57,7 @@ TEST(OutpaintTest, MovesQuadrantToOppositeCornerAndExtendsIt) {
   }
 }
 
-TEST(OutpaintTest, ChromaNeverLeavesItsLuminance) {
+TEST(OutpaintTest, KeepsChromaWithItsLuminance) {
   // Dark things are red, bright ones green.
   Image lab(80, 60, 3);
   for (int y = 0; y < 60; ++y) {
@@ -74,7 +74,7 @@ TEST(OutpaintTest, ChromaNeverLeavesItsLuminance) {
   }
 }
 
-TEST(OutpaintTest, EvensOutShadingAtSeams) {
+TEST(OutpaintTest, SmoothsShadingAtSeams) {
   Image lab(160, 120, 3);
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) {
@@ -92,7 +92,7 @@ TEST(OutpaintTest, EvensOutShadingAtSeams) {
   }
 }
 
-TEST(OutpaintTest, SeamsAreAsSmoothAsTheTexture) {
+TEST(OutpaintTest, KeepsSeamsAsSmoothAsTexture) {
   Image lab(160, 120, 3);
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) {
@@ -113,7 +113,7 @@ TEST(OutpaintTest, SeamsAreAsSmoothAsTheTexture) {
 }
 
 TEST(OutpaintTest, IsRepeatableForSameSeed) {
-  Image lab = Labelled(96, 72);
+  Image lab = Labeled(96, 72);
   Random random(5);
   for (float& v : lab.data) v += static_cast<float>(random.NextNormal());
   const auto run = [&](uint64_t seed) {
@@ -125,18 +125,18 @@ TEST(OutpaintTest, IsRepeatableForSameSeed) {
 TEST(OutpaintTest, CoversOddShapesAndRefusesTinyOnes) {
   for (const auto& [width, height] : {std::pair{32, 300}, {333, 33}, {32, 32}, {65, 47}}) {
     const GeneratedPicture picture =
-        OutpaintQuadrant(Labelled(width, height), Quadrant::kUpperLeft, 1, kGoOn);
+        OutpaintQuadrant(Labeled(width, height), Quadrant::kUpperLeft, 1, kGoOn);
     // Luminance 0 is in no source pixel: nothing stayed empty.
     for (size_t i = 0; i < picture.lab.PlaneSize(); ++i) ASSERT_GT(picture.lab.Plane(0)[i], 1.0f);
   }
-  EXPECT_THROW(OutpaintQuadrant(Labelled(31, 300), Quadrant::kUpperLeft, 1, kGoOn), Error);
+  EXPECT_THROW(OutpaintQuadrant(Labeled(31, 300), Quadrant::kUpperLeft, 1, kGoOn), Error);
   EXPECT_THROW(OutpaintQuadrant(Image(64, 64, 1), Quadrant::kUpperLeft, 1, kGoOn), Error);
 }
 
 TEST(OutpaintTest, StopsWhenCancelled) {
   CancellationToken cancel;
   cancel.Cancel();
-  EXPECT_THROW(OutpaintQuadrant(Labelled(64, 64), Quadrant::kUpperLeft, 1, cancel), Error);
+  EXPECT_THROW(OutpaintQuadrant(Labeled(64, 64), Quadrant::kUpperLeft, 1, cancel), Error);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ constexpr double kMinCoverage = 0.25;  // minimum coverage of a picture by the k
 constexpr double kDriftAside = 0.05;
 constexpr double kDriftForward = 0.04;
 
-double MedianOf(std::vector<float> values) {
+double UpperMedian(std::vector<float> values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -59,7 +59,7 @@ Surrogates::Surrogates(const KeyPicture& key,
     if (depth > 0.0f) depths.push_back(depth);
   }
   if (2 * depths.size() < depth_view_.depth.PlaneSize()) return;
-  median_depth_ = MedianOf(std::move(depths));
+  median_depth_ = UpperMedian(std::move(depths));
   center_ = CenterOfAttention(scene, key_index, median_depth_);
   angle_ = OrbitAngle(scene, key_index, center_);
 }

@@ -17,19 +17,19 @@ namespace {
 constexpr int kWindowRadius = 2;  // of the luminance comparison
 constexpr double kNoise = 4.0;    // L units; weaker structure is grain
 
-// The place of each target pixel in the source picture, px, and the agreement of its depth.
+// Position of each target pixel in the source picture, px, and agreement of the depths there.
 struct Correspondence {
   Image position;  // 2 channels (x, y), continuous; meaningless where visible is 0
   Image visible;   // 1 channel, 0..1
 };
 
-// Whether the place lies between pixel centres, so that sampling does not extrapolate.
+// Returns whether `pixel` lies between pixel centres, so that sampling does not extrapolate.
 bool Inside(const Eigen::Vector2d& pixel, const Image& image) {
   return pixel.x() >= 0.5 && pixel.y() >= 0.5 && pixel.x() <= image.width - 0.5 &&
          pixel.y() <= image.height - 0.5;
 }
 
-// (x, y) with pixel centres at +0.5, as cameras have them.
+// Samples at (x, y), with pixel centres at +0.5 as in Camera.
 float Read(const Image& image, int channel, double x, double y) {
   return SampleBilinear(image, channel, x - 0.5, y - 0.5);
 }
@@ -123,7 +123,7 @@ Correspondence Register(const Correspondence& map, const Image& flow, double tol
 // Difference of two pictures in a window, which is clipped at the borders.
 struct WindowDifference {
   double offset;     // difference of the means
-  double structure;  // root mean square of what is left, over kNoise + that of the pictures
+  double structure;  // root mean square of the residual, over kNoise + that of the pictures
 };
 
 WindowDifference CompareWindows(const Image& a, const Image& b, int x, int y) {
@@ -150,7 +150,7 @@ void CheckSizes(const SurfaceView& view, const char* which) {
   for (const Image* image : {&view.luminance, &view.depth}) {
     if (image->channels != 1 || image->width != view.camera.width ||
         image->height != view.camera.height) {
-      throw InvalidArgument("the {} view's camera is {}x{} px, a picture of it {}x{}",
+      throw InvalidArgument("the {} view has a camera of {}x{} px, but a picture of {}x{}",
                             which,
                             view.camera.width,
                             view.camera.height,

@@ -47,7 +47,7 @@ CarriedColor CarryColor(const SurfaceView& source,
 // Replaces each pixel of `color` by that of `other` where `other` is more confident.
 void KeepMoreConfident(const CarriedColor& other, CarriedColor* color);
 // Adds a source of lower rank. Its confidence is multiplied by 1 - that of `color`, so that it
-// fills what is open and changes nothing that is known.
+// fills gaps and does not change known colours.
 void FillFrom(const CarriedColor& other, CarriedColor* color);
 // Share of the pixels whose confidence is above `least`, 0..1.
 double Coverage(const CarriedColor& color, float least);

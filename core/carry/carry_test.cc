@@ -61,7 +61,7 @@ Seen Look(double x, double y, double occluder = 0.0) {
   return out;
 }
 
-TEST(Carry, CarriesColorsOfPlaneByGeometry) {
+TEST(CarryTest, CarriesColorsOfPlaneByGeometry) {
   const Seen source = Look(0.0, 0.0), target = Look(0.5, -0.2);
   const CarriedColor carried =
       CarryColor(source.surface, source.ab, {}, target.surface, CarryOptions{});
@@ -79,8 +79,8 @@ TEST(Carry, CarriesColorsOfPlaneByGeometry) {
   for (int y = 0; y < kHeight; ++y) EXPECT_EQ(carried.confidence.At(0, y, kWidth - 2), 0.0f);
 }
 
-TEST(Carry, SkipsOccludedPixels) {
-  // From the source's place the square hides wall that the target sees.
+TEST(CarryTest, SkipsOccludedPixels) {
+  // The square hides a part of the wall from the source that the target sees.
   const Seen source = Look(0.0, 0.0, 0.25), target = Look(0.6, 0.0, 0.25);
   const CarriedColor carried =
       CarryColor(source.surface, source.ab, {}, target.surface, CarryOptions{});
@@ -90,7 +90,7 @@ TEST(Carry, SkipsOccludedPixels) {
       const double depth = target.surface.depth.At(0, y, x);
       const double wx = 0.6 + depth * (x + 0.5 - kWidth / 2.0) / kFocal;
       const double wy = depth * (y + 0.5 - kHeight / 2.0) / kFocal;
-      // The ray from the source at the origin to this place of the wall passes the square?
+      // Whether the square hides this place of the wall from the source at the origin.
       const bool is_hidden = depth == kWallDepth && std::abs(wx) < 0.47 && std::abs(wy) < 0.47;
       hidden += is_hidden;
       wrong += is_hidden && carried.confidence.At(0, y, x) > 0.25f;
@@ -100,7 +100,7 @@ TEST(Carry, SkipsOccludedPixels) {
   EXPECT_LT(wrong, hidden / 50);
 }
 
-TEST(Carry, DistrustsOtherLuminance) {
+TEST(CarryTest, DistrustsOtherLuminance) {
   const Seen source = Look(0.0, 0.0);
   Seen target = Look(0.2, 0.0);
   Random random(3);
@@ -112,7 +112,7 @@ TEST(Carry, DistrustsOtherLuminance) {
   EXPECT_LT(Coverage(carried, 0.25f), 0.1);
 }
 
-TEST(Carry, AcceptsDarkerExposure) {
+TEST(CarryTest, AcceptsDarkerExposure) {
   const Seen source = Look(0.0, 0.0);
   Seen target = Look(0.2, 0.0);
   for (float& value : target.surface.luminance.data) value = 0.85f * value;
@@ -121,16 +121,16 @@ TEST(Carry, AcceptsDarkerExposure) {
   EXPECT_GT(Coverage(carried, 0.25f), 0.7);
 }
 
-TEST(Carry, CarriesNothingWithoutGeometry) {
+TEST(CarryTest, CarriesNothingWithoutGeometry) {
   Seen source = Look(0.0, 0.0), target = Look(0.1, 0.0);
-  target.surface.depth = Image(kWidth, kHeight, 1);  // no geometry at all
+  target.surface.depth = Image(kWidth, kHeight, 1);
   const CarriedColor carried =
       CarryColor(source.surface, source.ab, {}, target.surface, CarryOptions{});
   EXPECT_EQ(Coverage(carried, 0.0f), 0.0);
   for (float value : carried.ab.data) EXPECT_EQ(value, 0.0f);
 }
 
-TEST(Carry, RefusesPicturesOfOtherSize) {
+TEST(CarryTest, RefusesPicturesOfOtherSize) {
   Seen source = Look(0.0, 0.0);
   Seen target = source;
   target.surface.depth = Image(3, 3, 1);
@@ -143,7 +143,7 @@ TEST(Carry, RefusesPicturesOfOtherSize) {
   }
 }
 
-TEST(Carry, SecondSourceFillsWithoutAveraging) {
+TEST(CarryTest, SecondSourceFillsWithoutAveraging) {
   CarriedColor first{Image(2, 1, 2), Image(2, 1, 1)};
   CarriedColor second = first;
   first.ab.data = {50, 0, 50, 0};
@@ -158,7 +158,7 @@ TEST(Carry, SecondSourceFillsWithoutAveraging) {
 }
 
 // Personalization refuses confidences above 1.
-TEST(Carry, KeepsConfidencesWithinOne) {
+TEST(CarryTest, KeepsConfidencesWithinOne) {
   Random random(3);
   for (int trial = 0; trial < 200; ++trial) {
     const int width = 1 + static_cast<int>(random.NextUniform(0, 60));
@@ -170,7 +170,7 @@ TEST(Carry, KeepsConfidencesWithinOne) {
         const double draw = random.NextUniform(0.0, 1.0);
         value = draw < 0.2 ? 1.0f : static_cast<float>(draw);
       }
-      // A picture that is sure everywhere comes at another size.
+      // Confidences of key views are resized.
       one.confidence = Resize(one.confidence, 3 * width / 2 + 1, height);
       one.confidence = Resize(one.confidence, width, height);
       FillFrom(one, &all);
@@ -185,20 +185,20 @@ TEST(Carry, KeepsConfidencesWithinOne) {
   }
 }
 
-TEST(PlaneSweep, FindsDepthOfWallAndForeground) {
+TEST(PlaneSweepTest, FindsDepthOfWallAndForeground) {
   const Seen reference = Look(0.0, 0.0, 0.25), left = Look(-0.3, 0.0, 0.25),
              right = Look(0.3, 0.1, 0.25);
   const auto posed = [](const Seen& seen) {
     return PosedLuminance{
         seen.surface.camera, seen.surface.cam_from_world, &seen.surface.luminance};
   };
-  const DepthMap map =
+  const Image depth =
       SweepPlanes(posed(reference), {posed(left), posed(right)}, 1.2, 8.0, PlaneSweepOptions{}, {});
   int wall = 0, right_wall = 0, square = 0, right_square = 0;
   for (int y = 10; y < kHeight - 10; ++y) {
     for (int x = 20; x < kWidth - 20; ++x) {
       const double truth = reference.surface.depth.At(0, y, x);
-      const bool close = std::abs(map.depth.At(0, y, x) - truth) < 0.04 * truth;
+      const bool close = std::abs(depth.At(0, y, x) - truth) < 0.04 * truth;
       (truth == kWallDepth ? wall : square) += 1;
       (truth == kWallDepth ? right_wall : right_square) += close;
     }
@@ -208,7 +208,7 @@ TEST(PlaneSweep, FindsDepthOfWallAndForeground) {
 }
 
 // In each photo another object occludes the same part of the wall.
-TEST(PlaneSweep, DoesNotMatchMaskedPixels) {
+TEST(PlaneSweepTest, DoesNotMatchMaskedPixels) {
   Seen seen[3] = {Look(0.0, 0.0), Look(-0.3, 0.0), Look(0.3, 0.1)};
   Image mask(kWidth, kHeight, 1, 1.0f);
   Random random(4);
@@ -230,24 +230,24 @@ TEST(PlaneSweep, DoesNotMatchMaskedPixels) {
                             &surface.luminance,
                             i == 0 ? of_reference : of_sources};
     };
-    const DepthMap map =
+    const Image depth =
         SweepPlanes(posed(0), {posed(1), posed(2)}, 1.2, 8.0, PlaneSweepOptions{}, {});
     int close = 0;
     for (int y = 45; y < 75; ++y) {
       for (int x = 60; x < 100; ++x) {
-        close += std::abs(map.depth.At(0, y, x) - kWallDepth) < 0.05 * kWallDepth;
+        close += std::abs(depth.At(0, y, x) - kWallDepth) < 0.05 * kWallDepth;
       }
     }
     return close / (30.0 * 40.0);
   };
   const double plain = right(nullptr, nullptr), masked = right(&mask, &mask);
   EXPECT_LT(plain, 0.8);
-  EXPECT_GT(masked, 0.95) << "from beside it";
+  EXPECT_GT(masked, 0.95) << "depth from unmasked neighbours";
   const Image whole(kWidth, kHeight, 1, 1.0f);
-  EXPECT_EQ(right(&whole, &whole), plain) << "a mask that leaves all changes nothing";
+  EXPECT_EQ(right(&whole, &whole), plain) << "a mask without zeros has no effect";
 }
 
-TEST(PlaneSweep, RefusesEmptyRangesAndNoSources) {
+TEST(PlaneSweepTest, RefusesEmptyRangesAndNoSources) {
   const Seen seen = Look(0.0, 0.0);
   const PosedLuminance view{
       seen.surface.camera, seen.surface.cam_from_world, &seen.surface.luminance};
@@ -257,25 +257,25 @@ TEST(PlaneSweep, RefusesEmptyRangesAndNoSources) {
   EXPECT_THROW(SweepPlanes(view, {view}, 1, 2, PlaneSweepOptions{.planes = 4}, {}), Error);
 }
 
-TEST(PlaneSweep, GivesFiniteDepthsWithoutTexture) {
+TEST(PlaneSweepTest, GivesFiniteDepthsWithoutTexture) {
   Seen seen = Look(0.0, 0.0), other = Look(0.3, 0.0);
   for (Seen* s : {&seen, &other}) {
     for (float& value : s->surface.luminance.data) value = 42.0f;
   }
-  const DepthMap map =
+  const Image depth =
       SweepPlanes({seen.surface.camera, seen.surface.cam_from_world, &seen.surface.luminance},
                   {{other.surface.camera, other.surface.cam_from_world, &other.surface.luminance}},
                   1.0,
                   9.0,
                   PlaneSweepOptions{},
                   {});
-  for (float depth : map.depth.data) {
-    ASSERT_GE(depth, 0.99f);
-    ASSERT_LE(depth, 9.01f);
+  for (float value : depth.data) {
+    ASSERT_GE(value, 0.99f);
+    ASSERT_LE(value, 9.01f);
   }
 }
 
-TEST(StereoViews, PrefersSomeParallaxAndOverlap) {
+TEST(StereoViewsTest, PrefersSomeParallaxAndOverlap) {
   Scene scene;
   for (double x : {0.0, 0.01, 0.6, 3.9}) {
     View view;
@@ -288,7 +288,8 @@ TEST(StereoViews, PrefersSomeParallaxAndOverlap) {
     for (double x = -1; x <= 1; x += 0.1) wall.emplace_back(x, y, kWallDepth);
   }
   const StereoPlan plan = PlanStereo(scene, 0, wall, {0, 1, 2, 3}, 4);
-  ASSERT_EQ(plan.sources.size(), 2u) << "the view itself and the one beside the wall are no use";
+  ASSERT_EQ(plan.sources.size(), 2u)
+      << "neither the view itself nor one that does not see the wall";
   EXPECT_EQ(plan.sources[0], 2);
   EXPECT_LT(plan.nearest, kWallDepth);
   EXPECT_GT(plan.farthest, kWallDepth);

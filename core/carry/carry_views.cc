@@ -9,9 +9,9 @@
 namespace color3d {
 namespace {
 
-constexpr float kMinOpacity = 0.5f;    // least opacity of a rendered depth
-constexpr size_t kEnoughTracked = 30;  // tracked points of a view that suffice
-constexpr int kSurfaceGridPx = 16;     // distance of the rendered depths that replace them
+constexpr float kMinOpacity = 0.5f;    // minimum opacity for a valid depth
+constexpr size_t kEnoughTracked = 30;  // number of tracked points of a view that suffices
+constexpr int kSurfaceGridPx = 16;     // spacing of the rendered depths that replace them
 
 }  // namespace
 
@@ -62,10 +62,11 @@ std::optional<SurfaceView> SurfaceMaker::Sweep(int view, const SurfaceView& rend
   };
   std::vector<PosedLuminance> sources;
   for (int index : plan.sources) sources.push_back(posed(index));
-  const DepthMap map =
-      SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, sweep_, cancel_);
   SurfaceView swept = rendered;
-  swept.depth = Resize(map.depth, rendered.camera.width, rendered.camera.height);
+  swept.depth =
+      Resize(SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, sweep_, cancel_),
+             rendered.camera.width,
+             rendered.camera.height);
   ClearMasked(images_.Mask(view).get(), &swept.depth);
   return swept;
 }
@@ -79,7 +80,7 @@ std::vector<int> SurfaceMaker::TrainingViewsOfTime(int view) const {
   return same;
 }
 
-// Points that the view sees: tracked ones, or else points of the rendered surface.
+// Points visible in the view: tracked ones if there are enough, else of the rendered surface.
 std::vector<Eigen::Vector3d> SurfaceMaker::SurfacePoints(int view,
                                                          const SurfaceView& rendered) const {
   if (tracked_[view].size() >= kEnoughTracked) return tracked_[view];

@@ -25,8 +25,11 @@ struct SweptView {
   Image depth;               // empty when no other view overlaps
 };
 
-// The mask of a view and its moving objects; empty: nothing is masked.
-Image MaskOf(int view, const ViewImages& images, const StillRegions& still, const Camera& size) {
+// Mask of a view, without its moving objects; empty: nothing is masked.
+Image CombinedMask(int view,
+                   const ViewImages& images,
+                   const StillRegions& still,
+                   const Camera& size) {
   Image both;
   for (const auto& mask : {images.Mask(view), still ? still(view) : nullptr}) {
     if (mask == nullptr) continue;
@@ -46,7 +49,7 @@ SweptView Reduced(const Scene& scene,
   swept.camera = images.WorkingCamera(view).FitWithin(side_px);
   swept.pose = scene.views[view].cam_from_world;
   swept.luminance = Resize(*images.Luminance(view), swept.camera.width, swept.camera.height);
-  swept.mask = MaskOf(view, images, still, swept.camera);
+  swept.mask = CombinedMask(view, images, still, swept.camera);
   return swept;
 }
 
@@ -67,7 +70,7 @@ void Sweep(const Scene& scene,
   std::vector<PosedLuminance> sources;
   for (const int index : plan.sources) sources.push_back(posed(index));
   swept[view].depth =
-      SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, options.sweep, cancel).depth;
+      SweepPlanes(posed(view), sources, plan.nearest, plan.farthest, options.sweep, cancel);
   ClearMasked(swept[view].mask.Empty() ? nullptr : &swept[view].mask, &swept[view].depth);
   swept[view].sources = plan.sources;
 }
@@ -83,10 +86,10 @@ double RelativeExcess(const SweptView& view, const Eigen::Vector3d& point) {
   return depth > 0.0 ? depth / p.z() - 1.0 : std::nan("");
 }
 
-// Points that no view before `view` has given.
-std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
-                                  int view,
-                                  const DensePointsOptions& options) {
+// Points of `view` that no earlier view has contributed.
+std::vector<SparsePoint> ConfirmedPoints(const std::vector<SweptView>& swept,
+                                         int view,
+                                         const DensePointsOptions& options) {
   std::vector<SparsePoint> points;
   const SweptView& own = swept[view];
   if (own.depth.data.empty()) return points;
@@ -119,15 +122,6 @@ std::vector<SparsePoint> PointsOf(const std::vector<SweptView>& swept,
   return points;
 }
 
-// The training views of each time, in order of time.
-std::vector<std::vector<int>> Moments(const Scene& scene) {
-  std::map<double, std::vector<int>> moments;
-  for (const int view : scene.TrainingViews()) moments[scene.views[view].time_s()].push_back(view);
-  std::vector<std::vector<int>> in_order;
-  for (auto& [time, views] : moments) in_order.push_back(std::move(views));
-  return in_order;
-}
-
 struct SweepPlan {
   std::vector<int> views;                    // ascending
   std::vector<std::vector<int>> candidates;  // views to compare with, by view of the scene
@@ -136,24 +130,27 @@ struct SweepPlan {
 // All views of some times, evenly spread. Evenly spread views when there is one time, or one view
 // of each.
 SweepPlan PlanSweeps(const Scene& scene, size_t most) {
-  std::vector<std::vector<int>> moments = Moments(scene);
+  const std::vector<int> training = scene.TrainingViews();
+  std::map<double, std::vector<int>> by_time;
+  for (const int view : training) by_time[scene.views[view].time_s()].push_back(view);
   SweepPlan plan;
   plan.candidates.resize(scene.views.size());
-  const size_t views = scene.TrainingViews().size();
-  if (moments.size() == 1 || moments.size() == views) {
-    plan.views = EvenlyOf(scene.TrainingViews(), most);
+  if (by_time.size() == 1 || by_time.size() == training.size()) {
+    plan.views = PickEvenly(training, most);
     for (const int view : plan.views) plan.candidates[view] = plan.views;
     return plan;
   }
-  const size_t few = std::max<size_t>(1, most * moments.size() / std::max<size_t>(1, views));
-  moments = EvenlyOf(std::move(moments), few);
-  for (std::vector<int>& moment : moments) {
-    moment = EvenlyOf(std::move(moment), most);
-    plan.views.insert(plan.views.end(), moment.begin(), moment.end());
+  const size_t few = std::max<size_t>(1, most * by_time.size() / training.size());
+  std::vector<std::vector<int>> groups;
+  for (auto& [time, views] : by_time) groups.push_back(std::move(views));
+  groups = PickEvenly(std::move(groups), few);
+  for (std::vector<int>& views : groups) {
+    views = PickEvenly(std::move(views), most);
+    plan.views.insert(plan.views.end(), views.begin(), views.end());
   }
   std::sort(plan.views.begin(), plan.views.end());
-  for (const std::vector<int>& moment : moments) {
-    for (const int view : moment) plan.candidates[view] = moment.size() > 1 ? moment : plan.views;
+  for (const std::vector<int>& views : groups) {
+    for (const int view : views) plan.candidates[view] = views.size() > 1 ? views : plan.views;
   }
   return plan;
 }
@@ -180,12 +177,12 @@ std::vector<SparsePoint> DensePoints(const Scene& scene,
     Sweep(scene, view, plan.candidates[view], tracked[view], options, run.cancel, swept);
   });
   std::vector<std::vector<SparsePoint>> by_view(scene.views.size());
-  for_each_view([&](int view) { by_view[view] = PointsOf(swept, view, options); });
+  for_each_view([&](int view) { by_view[view] = ConfirmedPoints(swept, view, options); });
   std::vector<SparsePoint> all;
   for (std::vector<SparsePoint>& points : by_view) {
     std::move(points.begin(), points.end(), std::back_inserter(all));
   }
-  return EvenlyOf(std::move(all), options.max_points);
+  return PickEvenly(std::move(all), options.max_points);
 }
 
 }  // namespace color3d

@@ -65,10 +65,10 @@ class DensePointsTest : public testing::Test {
   Scene scene_;
 };
 
-TEST_F(DensePointsTest, LieOnWallWithoutRepetition) {
+TEST_F(DensePointsTest, CoversWallOnce) {
   const std::vector<SparsePoint> points =
       Points(2, {.depth_side_px = kWidth, .max_points = 1'000'000});
-  // One picture of the wall, and what the last camera shows beyond it.
+  // Each point of the wall once, including the part that only the last camera shows.
   EXPECT_GT(points.size(), 0.8 * kWidth * kHeight);
   EXPECT_LT(points.size(), 2.0 * kWidth * kHeight);
   double squares = 0.0;
@@ -81,7 +81,7 @@ TEST_F(DensePointsTest, LieOnWallWithoutRepetition) {
   EXPECT_LT(std::sqrt(squares / static_cast<double>(points.size())), 0.02 * kDepth);
 }
 
-TEST_F(DensePointsTest, MaskedPixelsGiveAndConfirmNone) {
+TEST_F(DensePointsTest, IgnoresMaskedPixels) {
   Image mask(kWidth, kHeight, 1, 1.0f);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth / 2; ++x) mask.At(0, y, x) = 0.0f;
@@ -103,7 +103,7 @@ TEST_F(DensePointsTest, MaskedPixelsGiveAndConfirmNone) {
   }
 }
 
-TEST_F(DensePointsTest, MovingObjectsHaveNone) {
+TEST_F(DensePointsTest, IgnoresMovingObjects) {
   const auto right = std::make_shared<const Image>([] {
     Image still(kWidth, kHeight, 1);
     for (int y = 0; y < kHeight; ++y) {
@@ -129,10 +129,10 @@ TEST_F(DensePointsTest, MovingObjectsHaveNone) {
   }
 }
 
-// The same cameras at four times; the wall has another picture at each.
-TEST_F(DensePointsTest, ViewsOfOneTimeAreComparedAlone) {
+// The same cameras at four times, with another texture on the wall at each.
+TEST_F(DensePointsTest, ComparesViewsOfOneTimeOnly) {
   Scene rig = scene_;
-  for (int moment = 1; moment < 4; ++moment) {
+  for (int time = 1; time < 4; ++time) {
     for (int i = 0; i < 6; ++i) rig.views.push_back(scene_.views[i]);
   }
   for (int v = 0; v < 24; ++v) {
@@ -160,13 +160,13 @@ TEST_F(DensePointsTest, ViewsOfOneTimeAreComparedAlone) {
   EXPECT_EQ(seen, (std::set<int>{0, 1, 2, 3, 4, 5, 12, 13, 14, 15, 16, 17}));
 }
 
-TEST_F(DensePointsTest, FramesOfOneCameraAreComparedOverTime) {
+TEST_F(DensePointsTest, ComparesFramesOfOneCameraOverTime) {
   for (int v = 0; v < 6; ++v) scene_.views[v].moment = Moment{0.1 * v, 0};
   EXPECT_GT(Points(2, {.depth_side_px = kWidth, .max_points = 1'000'000}).size(),
             0.8 * kWidth * kHeight);
 }
 
-TEST_F(DensePointsTest, DoNotDependOnThreads) {
+TEST_F(DensePointsTest, DoesNotDependOnThreads) {
   const std::vector<SparsePoint> one = Points(1, {.depth_side_px = kWidth, .max_points = 500});
   const std::vector<SparsePoint> three = Points(3, {.depth_side_px = kWidth, .max_points = 500});
   ASSERT_EQ(one.size(), 500u);
@@ -182,7 +182,7 @@ TEST_F(DensePointsTest, DoNotDependOnThreads) {
   EXPECT_GT(highest, 1.2);
 }
 
-TEST_F(DensePointsTest, NoneWithoutNeighborsOrPoints) {
+TEST_F(DensePointsTest, IsEmptyWithoutNeighborsOrPoints) {
   Scene lonely = scene_;
   lonely.points.clear();
   QuietRun run(1);

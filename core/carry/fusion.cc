@@ -16,13 +16,14 @@ namespace color3d {
 namespace {
 
 constexpr double kTolerance = 1e-3;
-constexpr double kMinPull = 1e-6;    // keeps the system definite
-constexpr double kMaxStrange = 4.0;  // feature distance; beyond, all is equally strange
+constexpr double kMinPull = 1e-6;  // keeps the system definite
+constexpr double kMaxStrange =
+    4.0;  // feature distance above which all places are equally unfamiliar
 
 void CheckSize(const char* what, const Image& image, int channels, const Image& luminance) {
   if (image.width != luminance.width || image.height != luminance.height ||
       image.channels != channels) {
-    throw InvalidArgument("fusion: the {} picture is {}x{}x{}, wanted {}x{}x{}",
+    throw InvalidArgument("fusion: the {} picture is {}x{}x{}, expected {}x{}x{}",
                           what,
                           image.width,
                           image.height,
@@ -39,11 +40,11 @@ double SmoothStep(double x, double begin, double end) {
 }
 
 struct GuessShare {
-  double share = 0.0;  // of the prior
-  double color = 0.0;  // of the guess that is added for it
+  double share = 0.0;  // share of the inferred colour that the guess replaces
+  double color = 0.0;  // factor of the guess in the prior
 };
 
-GuessShare ShareOfGuess(double distance, double chroma, const FusionOptions& options) {
+GuessShare InferredShare(double distance, double chroma, const FusionOptions& options) {
   const double faded =
       options.max_guessed * SmoothStep(distance, options.guess_begins, options.guess_ends);
   const double bold =
@@ -92,7 +93,7 @@ FusedColor FuseColors(const FusionSources& sources,
     const double guess_b = guessed.Empty() ? 0.0 : guessed.Plane(1)[i];
     const GuessShare guess =
         distance.Empty() ? GuessShare{}
-                         : ShareOfGuess(distance.data[i], std::hypot(guess_a, guess_b), options);
+                         : InferredShare(distance.data[i], std::hypot(guess_a, guess_b), options);
     const double strangeness =
         distance.Empty() ? 0.0 : std::min<double>(distance.data[i], kMaxStrange);
     const double pull =

@@ -1,4 +1,4 @@
-// The colour of a view from all that is known of it, per pixel by confidence (STILL.md "Fusion of
+// Fuses all colours that are known of a view, per pixel by confidence (STILL.md "Fusion of
 // sources"): carried from a key view > inferred by the personalized colorizer > guessed by the
 // automatic one. Pure functions, thread-safe.
 #pragma once
@@ -13,10 +13,10 @@
 namespace color3d {
 
 struct FusionOptions {
-  // The pull of an inferred colour, times 1 - the pull of the carried one and over 1 + distance^2:
-  // the stranger a place, the more it takes from its surroundings. Carried colours pull with their
-  // confidence squared (less error on three of four scenes than with the confidence itself),
-  // neighbours of equal luminance with 1.
+  // Weight of an inferred colour, times 1 - the weight of the carried one, over 1 + distance^2:
+  // unfamiliar places take more colour from their surroundings. The weight of a carried colour is
+  // its confidence squared (less error on three of four scenes than the confidence itself), that of
+  // a neighbour of equal luminance 1.
   double inferred_weight = 0.1;
   // Carried colours below this confidence are not used, 0..1.
   double min_confidence = kMinMatchProbability;
@@ -26,10 +26,10 @@ struct FusionOptions {
   // inferred colour and where it has its full share.
   double guess_begins = 3.0;
   double guess_ends = 5.0;
-  double max_guessed = 0.9;   // that full share, 0..1
-  double guess_chroma = 0.7;  // of the guess's chroma that is kept: faded, 0..1
-  // A colourful guess (sky, leaves) is seldom made without reason: between these feature distances
-  // and chromas (Lab units) it comes to decide alone, unfaded.
+  double max_guessed = 0.9;   // full share of the guess, 0..1
+  double guess_chroma = 0.7;  // factor of the guess's chroma, 0..1
+  // A colourful guess (sky, leaves) is usually right: between these feature distances and chromas
+  // (Lab units) its share rises to 1, with its full chroma.
   double bold_distance_begins = 1.5;
   double bold_distance_ends = 3.0;
   double bold_chroma_begins = 15.0;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "core/base/error.h"
@@ -42,7 +43,7 @@ void ComputeCensus(const Image& picture, Census* census) {
   const int width = picture.width, height = picture.height;
   census->assign(picture.PlaneSize(), 0);
   for (int y = 0; y < height; ++y) {
-    const float* centre = picture.data.data() + static_cast<size_t>(y) * width;
+    const float* center = picture.data.data() + static_cast<size_t>(y) * width;
     uint32_t* out = census->data() + static_cast<size_t>(y) * width;
     for (int bit = 0; bit < kCensusBits; ++bit) {
       const int yy = std::clamp(y + offsets[bit].y, 0, height - 1);
@@ -50,9 +51,9 @@ void ComputeCensus(const Image& picture, Census* census) {
       const int dx = offsets[bit].x;
       const uint32_t mask = 1u << bit;
       const int begin = std::max(0, -dx), end = std::min(width, width - dx);
-      for (int x = begin; x < end; ++x) out[x] |= row[x + dx] < centre[x] ? mask : 0u;
-      for (int x = 0; x < begin; ++x) out[x] |= row[0] < centre[x] ? mask : 0u;
-      for (int x = end; x < width; ++x) out[x] |= row[width - 1] < centre[x] ? mask : 0u;
+      for (int x = begin; x < end; ++x) out[x] |= row[x + dx] < center[x] ? mask : 0u;
+      for (int x = 0; x < begin; ++x) out[x] |= row[0] < center[x] ? mask : 0u;
+      for (int x = end; x < width; ++x) out[x] |= row[width - 1] < center[x] ? mask : 0u;
     }
   }
 }
@@ -94,27 +95,15 @@ void SumSmallest(const std::vector<std::vector<uint8_t>>& costs,
 // `mask` without the pixels whose census window reaches over its edge. Empty for null.
 Image WholeWindows(const Image* mask) {
   if (mask == nullptr) return Image();
-  Image across = *mask;
-  for (int y = 0; y < mask->height; ++y) {
-    for (int x = 0; x < mask->width; ++x) {
-      if (mask->At(0, y, x) != 0.0f) continue;
-      const int last = std::min(mask->width - 1, x + kCensusRadius);
-      for (int xx = std::max(0, x - kCensusRadius); xx <= last; ++xx) across.At(0, y, xx) = 0.0f;
-    }
-  }
-  Image whole = across;
-  for (int y = 0; y < mask->height; ++y) {
-    for (int x = 0; x < mask->width; ++x) {
-      if (across.At(0, y, x) != 0.0f) continue;
-      const int last = std::min(mask->height - 1, y + kCensusRadius);
-      for (int yy = std::max(0, y - kCensusRadius); yy <= last; ++yy) whole.At(0, yy, x) = 0.0f;
-    }
-  }
+  Image whole = *mask;
+  const cv::Mat plane(mask->height, mask->width, CV_32F, whole.data.data());
+  constexpr int kSide = 2 * kCensusRadius + 1;
+  cv::erode(plane, plane, cv::getStructuringElement(cv::MORPH_RECT, {kSide, kSide}));
   return whole;
 }
 
-// The source seen through the plane at this depth of the reference camera. `valid` is 0 outside and
-// where `source_mask` (may be empty) is.
+// Warps the source through the plane at this depth of the reference camera. `valid` is 0 outside
+// the source and where `source_mask` (may be empty) is 0.
 void WarpThroughPlane(const PosedLuminance& reference,
                       const PosedLuminance& source,
                       const Image& source_mask,
@@ -143,8 +132,8 @@ void WarpThroughPlane(const PosedLuminance& reference,
     float* out = warped->data.data() + static_cast<size_t>(y) * width;
     uint8_t* ok = valid->data() + static_cast<size_t>(y) * width;
     const float py = y + 0.5f;
-    // Places of the pixels of a row; a loop apart from the sampling, so that compilers vectorise
-    // it.
+    // Positions of the pixels of a row, in a loop apart from the sampling, which compilers
+    // vectorise.
     for (int x = 0; x < width; ++x) {
       const float px = x + 0.5f;
       const float w = h(2, 0) * px + h(2, 1) * py + h(2, 2);
@@ -301,23 +290,12 @@ void AggregateDirection(const CostVolume& volume,
   }
 }
 
-// Best plane, refined by a parabola through its neighbours, and its lead over the best other plane.
-void PickPlane(const int16_t* sum, int planes, double* plane, double* margin) {
-  int best = 0;
-  for (int d = 1; d < planes; ++d) {
-    if (sum[d] < sum[best]) best = d;
-  }
-  int second = 1 << 30;
-  for (int d = 0; d < planes; ++d) {
-    if (std::abs(d - best) > 2) second = std::min<int>(second, sum[d]);
-  }
-  *plane = best;
-  if (best > 0 && best + 1 < planes) {
-    const double low = sum[best - 1] - sum[best], high = sum[best + 1] - sum[best];
-    if (low + high > 0) *plane += 0.5 * (low - high) / (low + high);
-  }
-  *margin =
-      second < (1 << 30) ? static_cast<double>(second - sum[best]) / std::max<int>(1, second) : 1.0;
+// Best plane, refined by a parabola through its neighbours.
+double PickPlane(const int16_t* sum, int planes) {
+  const int best = static_cast<int>(std::min_element(sum, sum + planes) - sum);
+  if (best == 0 || best + 1 == planes) return best;
+  const double low = sum[best - 1] - sum[best], high = sum[best + 1] - sum[best];
+  return low + high > 0 ? best + 0.5 * (low - high) / (low + high) : best;
 }
 
 }  // namespace
@@ -326,12 +304,12 @@ void PlaneSweepOptions::Validate() const {
   RangeCheck("plane sweep option")("planes", planes, 8, 512);
 }
 
-DepthMap SweepPlanes(const PosedLuminance& reference,
-                     const std::vector<PosedLuminance>& sources,
-                     double nearest,
-                     double farthest,
-                     const PlaneSweepOptions& options,
-                     const CancellationToken& cancel) {
+Image SweepPlanes(const PosedLuminance& reference,
+                  const std::vector<PosedLuminance>& sources,
+                  double nearest,
+                  double farthest,
+                  const PlaneSweepOptions& options,
+                  const CancellationToken& cancel) {
   options.Validate();
   if (sources.empty() || static_cast<int>(sources.size()) > kMaxSweepSources) {
     throw InvalidArgument("plane sweep compares a view with 1 to {} others, not {}",
@@ -342,11 +320,12 @@ DepthMap SweepPlanes(const PosedLuminance& reference,
     throw InvalidArgument(
         "plane sweep between depths {} and {}: nothing lies between them", nearest, farthest);
   }
+  const auto depth_of = [&](double plane) {
+    const double t = plane / (options.planes - 1.0);
+    return 1.0 / ((1.0 - t) / farthest + t / nearest);
+  };
   std::vector<double> depths(options.planes);
-  for (int d = 0; d < options.planes; ++d) {
-    const double t = d / (options.planes - 1.0);
-    depths[d] = 1.0 / ((1.0 - t) / farthest + t / nearest);
-  }
+  for (int d = 0; d < options.planes; ++d) depths[d] = depth_of(d);
   const CostVolume volume = MatchPlanes(reference, sources, depths, cancel);
   std::vector<int16_t> sum(volume.cost.size());
   for (int dy = -1; dy <= 1; ++dy) {
@@ -356,15 +335,12 @@ DepthMap SweepPlanes(const PosedLuminance& reference,
       AggregateDirection(volume, *reference.luminance, options, dx, dy, sum);
     }
   }
-  DepthMap map{Image(volume.width, volume.height, 1), Image(volume.width, volume.height, 1)};
-  for (size_t i = 0; i < map.depth.PlaneSize(); ++i) {
-    double plane = 0.0, margin = 0.0;
-    PickPlane(sum.data() + i * options.planes, options.planes, &plane, &margin);
-    const double t = plane / (options.planes - 1.0);
-    map.depth.data[i] = static_cast<float>(1.0 / ((1.0 - t) / farthest + t / nearest));
-    map.confidence.data[i] = static_cast<float>(std::clamp(margin * 4.0, 0.0, 1.0));
+  Image depth(volume.width, volume.height, 1);
+  for (size_t i = 0; i < depth.data.size(); ++i) {
+    depth.data[i] =
+        static_cast<float>(depth_of(PickPlane(sum.data() + i * options.planes, options.planes)));
   }
-  return map;
+  return depth;
 }
 
 }  // namespace color3d

@@ -31,18 +31,15 @@ struct PlaneSweepOptions {
   bool operator==(const PlaneSweepOptions&) const = default;
 };
 
-struct DepthMap {
-  Image depth;       // 1 channel, camera depth in scene units; masked pixels take their neighbours'
-  Image confidence;  // 1 channel, 0..1: lead of the best plane over all others
-};
-
-// `nearest` and `farthest`: > 0, camera depth. `sources`: 1..kMaxSweepSources. Throws
-// Error{kInvalidArgument} for an empty range or no source, Error{kCancelled}.
-DepthMap SweepPlanes(const PosedLuminance& reference,
-                     const std::vector<PosedLuminance>& sources,
-                     double nearest,
-                     double farthest,
-                     const PlaneSweepOptions& options,
-                     const CancellationToken& cancel);
+// Returns the camera depth of each pixel of `reference` (1 channel, scene units); masked pixels
+// take that of their neighbours. `nearest` and `farthest`: > 0, camera depth. `sources`:
+// 1..kMaxSweepSources. Throws Error{kInvalidArgument} for an empty range or no source,
+// Error{kCancelled}.
+Image SweepPlanes(const PosedLuminance& reference,
+                  const std::vector<PosedLuminance>& sources,
+                  double nearest,
+                  double farthest,
+                  const PlaneSweepOptions& options,
+                  const CancellationToken& cancel);
 
 }  // namespace color3d

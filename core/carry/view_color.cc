@@ -9,8 +9,8 @@ namespace {
 
 constexpr double kWorthGuessing = 0.02;  // share of a view's pixels
 
-// Whether enough of the view is far from the training pictures and has no carried colour.
-bool WantsGuess(const CarriedColor& carried, const Image& distance, const FusionOptions& options) {
+// Returns whether enough of the view is far from the training pictures and has no carried colour.
+bool NeedsGuess(const CarriedColor& carried, const Image& distance, const FusionOptions& options) {
   size_t strange = 0;
   for (size_t i = 0; i < distance.data.size(); ++i) {
     strange += distance.data[i] > std::min(options.guess_begins, options.bold_distance_begins) &&
@@ -22,11 +22,11 @@ bool WantsGuess(const CarriedColor& carried, const Image& distance, const Fusion
          kWorthGuessing * static_cast<double>(carried.confidence.PlaneSize());
 }
 
-// 1 where what was carried decides alone.
-Image SurelyCarried(const CarriedColor& carried) {
-  Image sure = carried.confidence;
-  for (float& value : sure.data) value = value > kDecisiveConfidence ? 1.0f : 0.0f;
-  return sure;
+// Returns 1 where the carried colour decides alone.
+Image DecisivelyCarried(const CarriedColor& carried) {
+  Image decisive = carried.confidence;
+  for (float& value : decisive.data) value = value > kDecisiveConfidence ? 1.0f : 0.0f;
+  return decisive;
 }
 
 // The colorizer infers no colour for known pixels: their carried colour takes its place, so that
@@ -47,10 +47,10 @@ FusedColor ColorOfView(const Image& luminance,
                        const CancellationToken& cancel) {
   FusionOptions options;
   options.relative_chroma = sources.relative_chroma;
-  const Image known = SurelyCarried(carried);
+  const Image known = DecisivelyCarried(carried);
   InferredColor inferred = sources.infer(luminance, known);
   CopyKnown(carried, known, &inferred.ab);
-  const bool guess = WantsGuess(carried, inferred.distance, options);
+  const bool guess = NeedsGuess(carried, inferred.distance, options);
   const Image guessed = guess ? sources.guess(luminance) : Image();
   return FuseColors(
       {luminance, carried, inferred.ab, inferred.distance, guessed}, options, pool, cancel);

@@ -15,64 +15,57 @@ constexpr char kMp4[] = "video/mp4";
 constexpr char kPng[] = "image/png";
 constexpr char kText[] = "text/plain";
 
-void AddExportFormats(std::vector<Artifact>* artifacts) {
-  for (const ExportFormatInfo& format : kExportFormats) {
-    artifacts->push_back({.name = format.artifact,
-                          .stage = kind::kExport,
-                          .media_type = format.media_type,
-                          .is_result = true,
-                          .label = format.label});
-  }
-}
-
 std::vector<Artifact> MakeCatalogue() {
   using namespace artifact;
+  using namespace kind;
   std::vector<Artifact> artifacts = {
-      {kScene, kind::kImportScene, kJson},
-      {kImportFacts, kind::kImportScene, kJson},
-      {kSfmLog, kind::kImportScene, kText, true},
-      {kGivenViews, kind::kImportScene, kPng},
-      {kMovingRegions, kind::kImportScene, kPng},
-      {kGivenGeometry, kind::kImportScene, kBinary},
-      {kKeyView, kind::kSelectKeyView, kJson, true},
-      {kKeyViewGray, kind::kSelectKeyView, kPng, true},
-      {kKeyViewRanking, kind::kSelectKeyView, kJpeg, true},
-      {kKeyColor, kind::kColorizeKeyView, kPng},
-      {kKeyColorFacts, kind::kColorizeKeyView, kJson, true},
-      {kKeyColorRegions, kind::kColorizeKeyView, kJpeg, true},
-      {kKeyViewColored, kind::kColorizeKeyView, kPng, true},
-      {kKeyViews, kind::kColorizeKeyView, kBinary, true},  // each file as above
-      {kGeometry, kind::kReconstructGeometry, kBinary},
-      {kMemoryPlan, kind::kReconstructGeometry, kJson},
-      {kCarried, kind::kCarryColor, kPng},
-      {kCarryFacts, kind::kCarryColor, kJson},
-      {kAugmentationFacts, kind::kGenerateAugmentations, kJson},
-      {kAugmentations, kind::kGenerateAugmentations, kPng},
-      {kAugmentationSheet, kind::kGenerateAugmentations, kJpeg, true},
-      {kColorizer, kind::kPersonalize, kBinary, true},
-      {kViewsAb, kind::kColorizeViews, kPng},
-      {kProvenance, kind::kColorizeViews, kPng},
-      {kCorrectedAb, kind::kCorrectColors, kPng},
-      {kCorrectedProvenance, kind::kCorrectColors, kPng},
-      {kCorrections, kind::kCorrectColors, kJson, true},
-      {kPaint, kind::kCorrectColors, kPng, true},
-      {kModel, kind::kSolveChroma, kBinary, true}};
-  AddExportFormats(&artifacts);
-  const std::vector<Artifact> others = {{kViewPage, kind::kExport, kHtml, true, "in the browser"},
-                                        {kExportScores, kind::kExport, kJson},
-                                        {kRenders, kind::kRender, kPng, true},
-                                        {kFilm, kind::kRender, kMp4, true, "coloured film"},
-                                        {kFilms, kind::kRender, kMp4, true, "film of every camera"},
-                                        {kFilmFrames, kind::kRender, kPng, true, "coloured frames"},
-                                        {kMovie, kind::kRender, kMp4, true, "rendered movie"},
-                                        {kFrames, kind::kRender, kPng},
-                                        {kScores, kind::kEvaluate, kJson},
-                                        {kTruths, kind::kEvaluate, kJpeg},
-                                        {kColored2d, kind::kEvaluate, kJpeg},
-                                        {kReport, kind::kColorizeScene, kHtml, true, "report"},
-                                        {kMetrics, kind::kColorizeScene, kJson, true},
-                                        {kAllCurves, kind::kColorizeScene, kCsv, true},
-                                        {kPlan, kind::kColorizeScene, kJson, true},
+      {kScene, kImportScene, kJson},
+      {kImportFacts, kImportScene, kJson},
+      {kSfmLog, kImportScene, kText, true},
+      {kGivenViews, kImportScene, kPng},
+      {kMovingRegions, kImportScene, kPng},
+      {kGivenGeometry, kImportScene, kBinary},
+      {kKeyView, kSelectKeyView, kJson, true},
+      {kKeyViewGray, kSelectKeyView, kPng, true},
+      {kKeyViewRanking, kSelectKeyView, kJpeg, true},
+      {kKeyColor, kColorizeKeyView, kPng},
+      {kKeyColorFacts, kColorizeKeyView, kJson, true},
+      {kKeyColorRegions, kColorizeKeyView, kJpeg, true},
+      {kKeyViewColored, kColorizeKeyView, kPng, true},
+      {kKeyViews, kColorizeKeyView, kBinary, true},  // each file as above
+      {kGeometry, kReconstructGeometry, kBinary},
+      {kMemoryPlan, kReconstructGeometry, kJson},
+      {kCarried, kCarryColor, kPng},
+      {kCarryFacts, kCarryColor, kJson},
+      {kAugmentationFacts, kGenerateAugmentations, kJson},
+      {kAugmentations, kGenerateAugmentations, kPng},
+      {kAugmentationSheet, kGenerateAugmentations, kJpeg, true},
+      {kColorizer, kPersonalize, kBinary, true},
+      {kViewsAb, kColorizeViews, kPng},
+      {kProvenance, kColorizeViews, kPng},
+      {kCorrectedAb, kCorrectColors, kPng},
+      {kCorrectedProvenance, kCorrectColors, kPng},
+      {kCorrections, kCorrectColors, kJson, true},
+      {kPaint, kCorrectColors, kPng, true},
+      {kModel, kSolveChroma, kBinary, true}};
+  for (const ExportFormatInfo& format : kExportFormats) {
+    artifacts.push_back({format.artifact, kExport, format.media_type, true, format.label});
+  }
+  const std::vector<Artifact> others = {{kViewPage, kExport, kHtml, true, "in the browser"},
+                                        {kExportScores, kExport, kJson},
+                                        {kRenders, kRender, kPng, true},
+                                        {kFilm, kRender, kMp4, true, "coloured film"},
+                                        {kFilms, kRender, kMp4, true, "film of every camera"},
+                                        {kFilmFrames, kRender, kPng, true, "coloured frames"},
+                                        {kMovie, kRender, kMp4, true, "rendered movie"},
+                                        {kFrames, kRender, kPng},
+                                        {kScores, kEvaluate, kJson},
+                                        {kTruths, kEvaluate, kJpeg},
+                                        {kColored2d, kEvaluate, kJpeg},
+                                        {kReport, kColorizeScene, kHtml, true, "report"},
+                                        {kMetrics, kColorizeScene, kJson, true},
+                                        {kAllCurves, kColorizeScene, kCsv, true},
+                                        {kPlan, kColorizeScene, kJson, true},
                                         {kCurves, nullptr, kCsv}};
   artifacts.insert(artifacts.end(), others.begin(), others.end());
   return artifacts;

@@ -43,7 +43,7 @@ FileCounts Count(const std::vector<std::string>& files) {
       counts.frame_folders.insert(std::string_view(file).substr(0, file.rfind('/')));
     }
     counts.photos += is_picture && !IsMaskFile(file) ? 1 : 0;
-    counts.films += HasFilmExtension(file) ? 1 : 0;
+    counts.films += HasFilmExtension(file) && !IsMaskFile(file) ? 1 : 0;
     counts.splats += HasSplatExtension(file) ? 1 : 0;
     counts.has_transforms |= file.find('/') == std::string::npos && IsTransformsFile(file);
     counts.has_transforms_json |= file == kTransformsFile;
@@ -57,17 +57,21 @@ FileCounts Count(const std::vector<std::string>& files) {
 }  // namespace
 
 const std::vector<CaptureLayoutInfo>& CaptureLayouts() {
+  using Layout = CaptureLayout;
+  using Views = ViewSource;
+  using Poses = PoseSource;
+  using Kind = CaptureKind;
   static const std::vector<CaptureLayoutInfo> layouts = {
-      {CaptureLayout::kUnknown, "-", false, false},
-      {CaptureLayout::kPhotos, "photos", false, false},
-      {CaptureLayout::kColmap, "colmap", true, true},
-      {CaptureLayout::kTransforms, "transforms", true, false},
-      {CaptureLayout::kSplat, "splat", true, false},
-      {CaptureLayout::kFilm, "film", false, true},
-      {CaptureLayout::kNerfies, "nerfies", true, false},
-      {CaptureLayout::kPosesBounds, "poses_bounds", true, false},
-      {CaptureLayout::kFilms, "films", false, true},
-      {CaptureLayout::kPosedFilms, "posed_films", true, true}};
+      {Layout::kUnknown, "-", Views::kPhotos, Poses::kEstimated, Kind::kStatic, false},
+      {Layout::kPhotos, "photos", Views::kPhotos, Poses::kEstimated, Kind::kStatic, false},
+      {Layout::kColmap, "colmap", Views::kPhotos, Poses::kFile, Kind::kStatic, true},
+      {Layout::kTransforms, "transforms", Views::kPhotos, Poses::kFile, Kind::kStatic, false},
+      {Layout::kSplat, "splat", Views::kSplatRenders, Poses::kFile, Kind::kStatic, false},
+      {Layout::kFilm, "film", Views::kFrames, Poses::kOnRequest, Kind::kFilm, true},
+      {Layout::kNerfies, "nerfies", Views::kPhotos, Poses::kFile, Kind::kDynamic, false},
+      {Layout::kPosesBounds, "poses_bounds", Views::kPhotos, Poses::kFile, Kind::kStatic, false},
+      {Layout::kFilms, "films", Views::kFrames, Poses::kEstimated, Kind::kDynamic, true},
+      {Layout::kPosedFilms, "posed_films", Views::kFrames, Poses::kFile, Kind::kDynamic, true}};
   return layouts;
 }
 
@@ -102,10 +106,14 @@ CaptureLayout DetectCapture(const std::vector<std::string>& files) {
 }
 
 const std::vector<CaptureKindInfo>& CaptureKinds() {
-  static const std::vector<CaptureKindInfo> kinds = {{CaptureKind::kStatic, "static", false, true},
-                                                     {CaptureKind::kFilm, "film", false, false},
-                                                     {CaptureKind::kDynamic, "dynamic", true, true},
-                                                     {CaptureKind::kRelief, "relief", true, true}};
+  constexpr char kHasPoses[] =
+      "the scene has poses, and is coloured for all times; leave the range out, or colour the film "
+      "without poses";
+  static const std::vector<CaptureKindInfo> kinds = {
+      {CaptureKind::kStatic, "static", false, true, "the scene is no film; leave the range out"},
+      {CaptureKind::kFilm, "film", false, false, ""},
+      {CaptureKind::kDynamic, "dynamic", true, true, kHasPoses},
+      {CaptureKind::kRelief, "relief", true, true, kHasPoses}};
   return kinds;
 }
 

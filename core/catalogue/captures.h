@@ -24,10 +24,28 @@ enum class CaptureLayout {
   kPosedFilms = 9,
 };
 
+// Kind of scene that import makes of a capture.
+enum class CaptureKind {
+  kStatic,   // posed views of a place, without times
+  kFilm,     // frames of one camera without poses: coloured, not reconstructed
+  kDynamic,  // posed views with times
+  kRelief,   // frames of one standing camera with assumed depth (2.5D)
+};
+
+enum class ViewSource { kPhotos, kFrames, kSplatRenders };
+
+enum class PoseSource {
+  kFile,       // the capture holds them
+  kEstimated,  // by import
+  kOnRequest,  // estimated if import_scene.film_poses asks for it
+};
+
 struct CaptureLayoutInfo {
   CaptureLayout layout;
-  const char* name;        // in import.json and on the command line
-  bool has_poses;          // before import
+  const char* name;  // in import.json and on the command line
+  ViewSource views;
+  PoseSource poses;
+  CaptureKind kind;        // as far as it is known before import, without poses on request
   bool times_are_seconds;  // times of its frames; else they may be shares of the whole
 };
 
@@ -44,19 +62,13 @@ CaptureLayout LayoutOfName(std::string_view name);
 // nothing else fits.
 CaptureLayout DetectCapture(const std::vector<std::string>& files);
 
-// Kind of scene that import makes of a capture.
-enum class CaptureKind {
-  kStatic,   // posed views of a place, without times
-  kFilm,     // frames of one camera without poses: coloured, not reconstructed
-  kDynamic,  // posed views with times
-  kRelief,   // frames of one standing camera with assumed depth (2.5D)
-};
-
 struct CaptureKindInfo {
   CaptureKind kind;
   const char* name;       // in scene.json
   bool is_dynamic;        // posed views with times: what is reconstructed may move
   bool is_reconstructed;  // Gaussians are made of it
+  // Why no range of time can be recoloured, with the remedy; "" if it can be.
+  const char* why_no_time_range;
 };
 
 const std::vector<CaptureKindInfo>& CaptureKinds();

@@ -39,6 +39,7 @@ TEST(DetectCaptureTest, IgnoresAugmentFilesAndMasks) {
   EXPECT_EQ(DetectCapture({"film.mp4", "augment/a.png", "masks/a.png"}), CaptureLayout::kFilm);
   EXPECT_EQ(DetectCapture({"a.jpg", "augment/transforms.json"}), CaptureLayout::kPhotos);
   EXPECT_EQ(DetectCapture({"a.jpg", "film.mp4"}), CaptureLayout::kPhotos);
+  EXPECT_EQ(DetectCapture({"film.mp4", "masks/film.mp4"}), CaptureLayout::kFilm);
 }
 
 TEST(CaptureTablesTest, HaveOneRowForEachValueAndName) {

@@ -11,7 +11,9 @@ namespace {
 
 constexpr MetricTable kAgreement = MetricTable::kAgreement;
 constexpr MetricTable kSteadiness = MetricTable::kSteadiness;
-constexpr double kPercent = 100.0;
+constexpr MetricFormat kDecibels = {2, " dB"};
+constexpr MetricFormat kPercent = {0, " %", 100.0};
+constexpr MetricFormat kSeconds = {0, " s"};
 
 // Position in the catalogue, then position of the variant.
 std::tuple<size_t, size_t, std::string> Rank(const std::string& key) {
@@ -25,107 +27,47 @@ std::tuple<size_t, size_t, std::string> Rank(const std::string& key) {
 }  // namespace
 
 const std::vector<Metric>& MetricCatalogue() {
+  using enum Metric::Place;
   static const std::vector<Metric> catalogue = {
       // Of held-out views: core/metrics/view_scores.h.
-      {.key = "delta_e00_chroma",
-       .label = "colour error (CIEDE2000)",
-       .in_headline = true,
-       .in_summary = true,
-       .by_held_out = true},
-      {.key = "delta_e00_gray",
-       .label = "colour error if left grey",
-       .in_headline = true,
-       .in_summary = true},
-      {.key = "delta_e00", .label = "CIEDE2000, luminance included"},
-      {.key = "psnr_rgb",
-       .label = "PSNR of held-out views",
-       .unit = " dB",
-       .in_headline = true,
-       .in_summary = true,
-       .by_held_out = true},
-      {.key = "ssim_rgb", .label = "SSIM", .decimals = 4, .in_summary = true},
-      {.key = "psnr_l",
-       .label = "PSNR of luminance",
-       .unit = " dB",
-       .in_summary = true,
-       .by_held_out = true},
-      {.key = "ab_rmse", .label = "RMSE of a and b"},
-      {.key = "colorfulness", .label = "colourfulness", .decimals = 1},
-      {.key = "colorfulness_ratio", .label = "colourfulness, relative to the truth"},
+      {"delta_e00_chroma", "colour error (CIEDE2000)", {}, kInHeadline | kInSummary | kByHeldOut},
+      {"delta_e00_gray", "colour error if left grey", {}, kInHeadline | kInSummary},
+      {"delta_e00", "CIEDE2000, luminance included"},
+      {"psnr_rgb", "PSNR of held-out views", kDecibels, kInHeadline | kInSummary | kByHeldOut},
+      {"ssim_rgb", "SSIM", {4}, kInSummary},
+      {"psnr_l", "PSNR of luminance", kDecibels, kInSummary | kByHeldOut},
+      {"ab_rmse", "RMSE of a and b"},
+      {"colorfulness", "colourfulness", {1}},
+      {"colorfulness_ratio", "colourfulness, relative to the truth"},
       // Of held-out pixels by the source of their colour.
-      {.key = "delta_e00_seen", .label = "colour error where seen"},
-      {.key = "delta_e00_inferred", .label = "colour error where inferred"},
-      {.key = "delta_e00_guessed", .label = "colour error where guessed"},
-      {.key = "confidence_rank_correlation", .label = "rank correlation of confidence and error"},
+      {"delta_e00_seen", "colour error where seen"},
+      {"delta_e00_inferred", "colour error where inferred"},
+      {"delta_e00_guessed", "colour error where guessed"},
+      {"confidence_rank_correlation", "rank correlation of confidence and error"},
       // Agreement of views: core/metrics/consistency.h.
-      {.key = "me", .label = "ME", .decimals = 4, .table = kAgreement},
-      {.key = "me_de00", .label = "ME, CIEDE2000", .table = kAgreement},
-      {.key = "tc", .label = "TC", .decimals = 5, .table = kAgreement},
-      {.key = "tc_short",
-       .label = "TC, next view",
-       .decimals = 5,
-       .in_metrics = false,
-       .table = kAgreement},
-      {.key = "tc_long",
-       .label = "TC, 7 apart",
-       .decimals = 5,
-       .in_metrics = false,
-       .table = kAgreement},
-      {.key = "matches", .label = "matched pixels", .decimals = 0, .in_metrics = false},
-      {.key = "pairs", .label = "pairs of pictures", .decimals = 0, .in_metrics = false},
+      {"me", "ME", {4}, kInMetrics, kAgreement},
+      {"me_de00", "ME, CIEDE2000", {}, kInMetrics, kAgreement},
+      {"tc", "TC", {5}, kInMetrics, kAgreement},
+      {"tc_short", "TC, next view", {5}, kInScores, kAgreement},
+      {"tc_long", "TC, 7 apart", {5}, kInScores, kAgreement},
+      {"matches", "matched pixels", {0}, kInScores},
+      {"pairs", "pairs of pictures", {0}, kInScores},
       // Steadiness of films: core/metrics/temporal_consistency.h.
-      {.key = "tc_chroma", .label = "TC of chroma", .in_summary = true, .table = kSteadiness},
-      {.key = "chroma",
-       .label = "mean chroma",
-       .decimals = 1,
-       .in_metrics = false,
-       .table = kSteadiness},
-      {.key = "followed",
-       .label = "followed",
-       .decimals = 0,
-       .unit = " %",
-       .scale = kPercent,
-       .in_metrics = false,
-       .table = kSteadiness},
-      {.key = "cdc", .label = "CDC", .decimals = 5, .in_summary = true, .table = kSteadiness},
-      {.key = "cdc_1", .label = "CDC, 1 apart", .decimals = 5, .in_metrics = false},
-      {.key = "cdc_2", .label = "CDC, 2 apart", .decimals = 5, .in_metrics = false},
-      {.key = "cdc_4", .label = "CDC, 4 apart", .decimals = 5, .in_metrics = false},
+      {"tc_chroma", "TC of chroma", {}, kInSummary, kSteadiness},
+      {"chroma", "mean chroma", {1}, kInScores, kSteadiness},
+      {"followed", "followed", kPercent, kInScores, kSteadiness},
+      {"cdc", "CDC", {5}, kInSummary, kSteadiness},
+      {"cdc_1", "CDC, 1 apart", {5}, kInScores},
+      {"cdc_2", "CDC, 2 apart", {5}, kInScores},
+      {"cdc_4", "CDC, 4 apart", {5}, kInScores},
       // Sources of the colour.
-      {.key = "coverage",
-       .label = "covered by key views",
-       .decimals = 0,
-       .unit = " %",
-       .scale = kPercent},
-      {.key = "share_seen",
-       .label = "seen in a key view",
-       .decimals = 0,
-       .unit = " %",
-       .scale = kPercent,
-       .in_headline = true,
-       .in_summary = true},
-      {.key = "share_inferred",
-       .label = "inferred",
-       .decimals = 0,
-       .unit = " %",
-       .scale = kPercent},
-      {.key = "share_guessed",
-       .label = "guessed",
-       .decimals = 0,
-       .unit = " %",
-       .scale = kPercent,
-       .in_headline = true},
+      {"coverage", "covered by key views", kPercent},
+      {"share_seen", "seen in a key view", kPercent, kInHeadline | kInSummary},
+      {"share_inferred", "inferred", kPercent},
+      {"share_guessed", "guessed", kPercent, kInHeadline},
       // The work.
-      {.key = "gaussians",
-       .label = "Gaussians",
-       .decimals = 0,
-       .in_headline = true,
-       .in_summary = true},
-      {.key = "seconds_total",
-       .label = "computing time",
-       .decimals = 0,
-       .unit = " s",
-       .in_headline = true},
+      {"gaussians", "Gaussians", {0}, kInHeadline | kInSummary},
+      {"seconds_total", "computing time", kSeconds, kInHeadline},
   };
   return catalogue;
 }
@@ -156,9 +98,7 @@ FoundMetric FindMetric(std::string_view key) {
 }
 
 std::vector<std::string> InMetricOrder(std::vector<std::string> keys) {
-  std::sort(keys.begin(), keys.end(), [](const std::string& a, const std::string& b) {
-    return Rank(a) < Rank(b);
-  });
+  std::ranges::sort(keys, {}, Rank);
   return keys;
 }
 
@@ -180,7 +120,8 @@ std::string MetricLabel(std::string_view key) {
 std::string MetricText(std::string_view key, double value) {
   const Metric* metric = FindMetric(key).metric;
   if (metric == nullptr) return fmt::format("{:.6g}", value);
-  return fmt::format("{:.{}f}{}", metric->scale * value, metric->decimals, metric->unit);
+  const auto& [decimals, unit, scale] = metric->format;
+  return fmt::format("{:.{}f}{}", scale * value, decimals, unit);
 }
 
 }  // namespace color3d

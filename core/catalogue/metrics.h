@@ -13,19 +13,28 @@ namespace color3d {
 // A table of the report with one row for each kind of picture and one column for each metric.
 enum class MetricTable { kNone, kAgreement, kSteadiness };
 
-struct Metric {
-  const char* key;    // in scores.json and metrics.json
-  const char* label;  // for users
+struct MetricFormat {
   int decimals = 2;
   const char* unit = "";
   double scale = 1.0;  // factor from the stored to the shown value
-  // False: in scores.json only.
-  bool in_metrics = true;
-  bool in_headline = false;  // of the report
-  bool in_summary = false;   // printed by the client when a job is done
-  // metrics.json also has it for each way in which views are held out, with the suffix of the way.
-  bool by_held_out = false;
+};
+
+struct Metric {
+  // Places that show it beside scores.json. Every other place includes metrics.json.
+  enum Place : unsigned {
+    kInScores = 0,
+    kInMetrics = 1,
+    kInHeadline = 3,  // of the report
+    kInSummary = 5,   // printed by the client when a job is done
+    // metrics.json also has it for each way in which views are held out, with the way's suffix.
+    kByHeldOut = 9,
+  };
+  const char* key;    // in scores.json and metrics.json
+  const char* label;  // for users
+  MetricFormat format = {};
+  unsigned places = kInMetrics;
   MetricTable table = MetricTable::kNone;  // a column of this table
+  bool Is(Place place) const { return (places & place) == place; }
 };
 
 // The same metric of other pictures: its key has a suffix.

@@ -1,61 +1,51 @@
 #include "core/catalogue/pose_files.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <set>
+#include <tuple>
 #include <utility>
 
 #include "core/catalogue/scene_files.h"
 
 namespace color3d {
 namespace {
+namespace fs = std::filesystem;
 
-constexpr const char* kStems[] = {"cameras", "images", "points3D"};
-constexpr const char* kEndings[] = {".bin", ".txt"};
+constexpr std::string_view kStems[] = {"cameras", "images", "points3D"};
+constexpr std::string_view kEndings[] = {".bin", ".txt"};
 constexpr int kElsewhere = 3;
 
-std::pair<std::string, std::string> FolderAndName(const std::string& path) {
-  const size_t slash = path.rfind('/');
-  if (slash == std::string::npos) return {"", path};
-  return {path.substr(0, slash), path.substr(slash + 1)};
-}
-
-bool IsNumber(std::string_view part) {
-  return !part.empty() && part.find_first_not_of("0123456789") == part.npos;
-}
-
 // 0 to 2 for the places where programs put their model, the most usual first; else kElsewhere.
-int RankOf(const std::string& folder) {
-  static const std::set<std::string_view> kParts = {"sparse",
-                                                    "colmap",
-                                                    "colmap_sparse",
-                                                    "colmap_text",
-                                                    "text",
-                                                    "dense",
-                                                    "undistorted",
-                                                    "model",
-                                                    "models"};
+int RankOf(const fs::path& folder) {
+  static const std::set<fs::path> kParts = {"sparse",
+                                            "colmap",
+                                            "colmap_sparse",
+                                            "colmap_text",
+                                            "text",
+                                            "dense",
+                                            "undistorted",
+                                            "model",
+                                            "models"};
   if (folder.empty()) return 2;
-  std::string_view rest = folder;
-  bool is_first = true;
-  while (!rest.empty()) {
-    const size_t end = std::min(rest.find('/'), rest.size());
-    const std::string_view part = rest.substr(0, end);
-    if (!kParts.contains(part) && (is_first || !IsNumber(part))) return kElsewhere;
-    rest.remove_prefix(std::min(end + 1, rest.size()));
-    is_first = false;
+  for (auto part = folder.begin(); part != folder.end(); ++part) {
+    const bool is_number = part->string().find_first_not_of("0123456789") == std::string::npos;
+    if (!kParts.contains(*part) && (part == folder.begin() || !is_number)) return kElsewhere;
   }
-  return folder.starts_with("sparse") ? 0 : 1;
+  return folder.string().starts_with("sparse") ? 0 : 1;
 }
 
-ColmapPlace PlaceOf(const std::string& folder, const std::set<std::string>& names) {
+ColmapPlace MakeColmapPlace(const std::string& folder, const std::set<std::string>& names) {
   ColmapPlace place;
   place.folder = folder;
   const std::string prefix = folder.empty() ? "" : folder + "/";
-  for (const char* ending : kEndings) {
+  for (const std::string_view ending : kEndings) {
     std::vector<std::string> files;
-    for (const char* stem : kStems) {
-      const std::string name = std::string(stem) + ending;
+    for (const std::string_view stem : kStems) {
+      const std::string name = fmt::format("{}{}", stem, ending);
       if (names.contains(name)) files.push_back(prefix + name);
     }
     if (files.size() == std::size(kStems)) return {folder, files, true};
@@ -70,41 +60,36 @@ std::vector<ColmapPlace> ColmapPlaces(const std::vector<std::string>& files) {
   std::map<std::string, std::set<std::string>> folders;
   for (const std::string& file : files) {
     if (IsAugmentFile(file) || IsMaskFile(file) || IsFrameFile(file)) continue;
-    const auto [folder, name] = FolderAndName(file);
-    for (const char* stem : kStems) {
-      for (const char* ending : kEndings) {
-        if (name == std::string(stem) + ending) folders[folder].insert(name);
-      }
-    }
+    const fs::path path = file;
+    const std::string stem = path.stem().string();
+    const std::string ending = path.extension().string();
+    const bool is_part = std::ranges::find(kStems, stem) != std::end(kStems) &&
+                         std::ranges::find(kEndings, ending) != std::end(kEndings);
+    if (is_part) folders[path.parent_path().string()].insert(stem + ending);
   }
-  // By tier: whole and usual, whole, parts. A lonely images.txt is a list, no part of a model.
-  std::map<int, std::vector<std::pair<int, ColmapPlace>>> tiers;
+  // By tier (whole and usual, whole, parts), by rank, then "sparse/0" before "sparse".
+  std::map<std::tuple<int, int, std::string>, ColmapPlace> found;
   for (const auto& [folder, names] : folders) {
-    const int rank = RankOf(folder);
-    ColmapPlace place = PlaceOf(folder, names);
+    // A lonely images.txt is a list, no part of a model.
     const bool has_cameras = names.contains("cameras.bin") || names.contains("cameras.txt");
     if (!has_cameras && names.size() < 2) continue;
+    const int rank = RankOf(folder);
+    ColmapPlace place = MakeColmapPlace(folder, names);
     const int tier = !place.whole ? 2 : rank == kElsewhere ? 1 : 0;
-    tiers[tier].emplace_back(rank, std::move(place));
+    found[{tier, rank, folder + "/\x7f"}] = std::move(place);
   }
   std::vector<ColmapPlace> places;
-  if (tiers.empty()) return places;
-  auto& first = tiers.begin()->second;
-  // "sparse/0" before "sparse".
-  const auto key = [](const std::pair<int, ColmapPlace>& place) {
-    return std::pair(place.first, place.second.folder + "/\x7f");
-  };
-  std::sort(
-      first.begin(), first.end(), [&](const auto& x, const auto& y) { return key(x) < key(y); });
-  for (auto& [rank, place] : first) places.push_back(std::move(place));
+  for (auto& [order, place] : found) {
+    const int best_tier = std::get<0>(found.begin()->first);
+    if (std::get<0>(order) == best_tier) places.push_back(std::move(place));
+  }
   return places;
 }
 
 bool IsTransformsFile(std::string_view path) {
   const std::string_view name = path.substr(path.rfind('/') + 1);
   return name == kTransformsFile ||
-         std::find(std::begin(kBlenderFiles), std::end(kBlenderFiles), name) !=
-             std::end(kBlenderFiles);
+         std::ranges::find(kBlenderFiles, name) != std::end(kBlenderFiles);
 }
 
 }  // namespace color3d

@@ -11,13 +11,6 @@
 
 namespace color3d {
 
-// True for supported splats: .ply .sog .spz, any case.
-inline bool HasSplatExtension(std::string_view path) {
-  if (path.size() < 4) return false;
-  const std::string ending = LowerCase(path.substr(path.size() - 4));
-  return ending == ".ply" || ending == ".sog" || ending == ".spz";
-}
-
 inline constexpr std::string_view kFilmEndings[] = {".mp4",
                                                     ".m4v",
                                                     ".mov",
@@ -37,12 +30,16 @@ inline constexpr std::string_view kFilmEndings[] = {".mp4",
                                                     ".ogv",
                                                     ".wmv"};
 
-// True for extensions of supported films, any case.
-inline bool HasFilmExtension(std::string_view path) {
-  const std::string ending = LowerCase(path.substr(std::min(path.size(), path.find_last_of('.'))));
-  return std::find(std::begin(kFilmEndings), std::end(kFilmEndings), ending) !=
-         std::end(kFilmEndings);
+inline constexpr std::string_view kSplatEndings[] = {".ply", ".sog", ".spz"};
+
+// True if the extension is one of `endings`, any case.
+template <size_t kCount>
+bool HasExtension(std::string_view path, const std::string_view (&endings)[kCount]) {
+  const std::string own = LowerCase(path.substr(std::min(path.size(), path.find_last_of('.'))));
+  return std::ranges::find(endings, own) != std::end(endings);
 }
+inline bool HasFilmExtension(std::string_view path) { return HasExtension(path, kFilmEndings); }
+inline bool HasSplatExtension(std::string_view path) { return HasExtension(path, kSplatEndings); }
 
 // Colour pictures from the user for training the colorizer: no photos of the scene.
 inline bool IsAugmentFile(std::string_view path) { return path.starts_with("augment/"); }

@@ -24,5 +24,14 @@ TEST(SceneFilesTest, RecognizesFilmsByExtension) {
   }
 }
 
+TEST(SceneFilesTest, RecognizesSplatsByExtension) {
+  for (const char* splat : {"a.ply", "b.SOG", "dir.x/c.Spz", ".ply"}) {
+    EXPECT_TRUE(HasSplatExtension(splat)) << splat;
+  }
+  for (const char* other : {"ply", "aply", "a.ply/b", "a.plyx", "a.splat", ""}) {
+    EXPECT_FALSE(HasSplatExtension(other)) << other;
+  }
+}
+
 }  // namespace
 }  // namespace color3d

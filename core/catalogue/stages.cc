@@ -21,22 +21,23 @@ std::vector<Stage> WithArtifacts(std::vector<Stage> stages) {
 
 const std::vector<Stage>& StageCatalogue() {
   using namespace artifact;
+  using namespace kind;
   static const std::vector<Stage> catalogue = WithArtifacts({
-      {.kind = kind::kImportScene,
+      {.kind = kImportScene,
        .step = "structure_from_motion",
        .purpose = "the photos come without camera poses"},
-      {.kind = kind::kSelectKeyView,
+      {.kind = kSelectKeyView,
        .step = "key_view_selection",
        .purpose = "the key view is chosen among the views",
        .needs = {kScene},
        .reads = {kImportFacts, kGeometry},  // the latter of an earlier job
        .brings_prerequisites = true},
-      {.kind = kind::kColorizeKeyView,
+      {.kind = kColorizeKeyView,
        .step = "key_view_color",
        .purpose = "all colours of the scene come from its key views",
        .needs = {kScene, kKeyView},  // kKeyView for the first key view only
        .brings_prerequisites = true},
-      {.kind = kind::kReconstructGeometry,
+      {.kind = kReconstructGeometry,
        .step = "luminance_geometry",
        .purpose = "every scene needs geometry",
        .needs = {kScene},
@@ -44,18 +45,18 @@ const std::vector<Stage>& StageCatalogue() {
        .brings_prerequisites = true,
        .resumes = true,
        .keeps_time_limit = true},
-      {.kind = kind::kCarryColor,
+      {.kind = kCarryColor,
        .step = "carried_color",
        .purpose = "colours are carried to every view that sees the same surface",
        .needs = {kScene, kKeyView, kKeyColor, kGeometry},
        .reads = {kKeyViews},
        .resumes = true},
-      {.kind = kind::kGenerateAugmentations,
+      {.kind = kGenerateAugmentations,
        .step = "augmentations",
        .purpose = "the colorizer also learns from generated pictures",
        .needs = {kScene, kKeyView, kKeyColor},
        .reads = {kGeometry, kCarryFacts}},
-      {.kind = kind::kPersonalize,
+      {.kind = kPersonalize,
        .step = "personalization",
        .purpose = "surfaces that no key view shows get the colours of similar ones",
        .needs = {kScene, kKeyView, kKeyColor},
@@ -63,42 +64,42 @@ const std::vector<Stage>& StageCatalogue() {
        .runs_in_batch = true,
        .resumes = true,
        .keeps_time_limit = true},
-      {.kind = kind::kColorizeViews,
+      {.kind = kColorizeViews,
        .step = "view_colors",
        .purpose = "every view gets a colour at every pixel",
        .needs = {kScene, kColorizer},
        .reads = {kCarried, kCarryFacts, kGeometry},
        .resumes = true},
-      {.kind = kind::kCorrectColors,
+      {.kind = kCorrectColors,
        .step = "corrections",
        .purpose = "corrections were given",
        .needs = {kScene, kKeyView, kKeyColor, kColorizer, kViewsAb},
        .reads = {kGeometry, kProvenance, kKeyViews}},
-      {.kind = kind::kSolveChroma,
+      {.kind = kSolveChroma,
        .step = "chroma",
        .purpose = "a and b are fitted on the finished geometry",
        .needs = {kScene, kKeyView, kKeyColor, kViewsAb, kGeometry},
        .reads = {kProvenance, kCorrectedAb, kCorrectedProvenance},
        .resumes = true,
        .keeps_time_limit = true},
-      {.kind = kind::kExport,
+      {.kind = kExport,
        .step = "export",
        .purpose = "viewers read files of their own",
        .needs = {kScene, kModel},
        .reads = {kKeyView}},
-      {.kind = kind::kRender,
+      {.kind = kRender,
        .step = "render",
        .purpose = "the report shows rendered views",
        .needs = {kScene, kModel},
        // the reads: for films and dynamic scenes
        .reads = {kKeyView, kKeyColor, kViewsAb, kCorrectedAb, kImportFacts}},
-      {.kind = kind::kEvaluate,
+      {.kind = kEvaluate,
        .step = "evaluation",
        .purpose = "the views are compared with true colours or with each other",
        .needs = {kScene, kViewsAb, kModel},
        .reads = {kKeyView, kKeyColor, kProvenance, kCorrectedAb, kCorrectedProvenance}},
-      {.kind = kind::kColorizeScene},  // its report reads the artifacts of all others
-      {.kind = kind::kPersonalizeScenes},
+      {.kind = kColorizeScene},  // its report reads the artifacts of all others
+      {.kind = kPersonalizeScenes},
   });
   return catalogue;
 }
@@ -118,7 +119,7 @@ const Stage& StageOf(std::string_view kind) {
   return *stage;
 }
 
-const Stage* StageThatLeaves(std::string_view artifact) {
+const Stage* FindProducer(std::string_view artifact) {
   const Artifact* found = FindArtifact(artifact);
   return found != nullptr && found->stage != nullptr ? FindStage(found->stage) : nullptr;
 }

@@ -4,22 +4,20 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "core/base/image.h"
-#include "core/base/run_control.h"
 #include "core/color/relative_chroma.h"
-#include "core/encoder/encoder.h"
 
 namespace color3d {
 
 class Corrector;
-class SceneBatch;
 struct Correction;
+
+// Exceeds the number of stages of every encoder: Conv-Adapters in all of them.
+inline constexpr int kMaxAdapterStages = 8;
 
 // The defaults are those of the service's preset "fast".
 struct ColorizerOptions {
@@ -105,31 +103,5 @@ class Colorizer {
   // Colorizer file: versioned header, encoder digest, adapters, decoder, training curve.
   virtual std::string Serialize() const = 0;
 };
-
-// A scene of a batch that trains together (scene_batch.h).
-struct BatchPlace {
-  SceneBatch& batch;
-  std::string project;  // what fairness is between, e.g. the submitted job
-};
-
-// Trains a colorizer. `pictures`: the undistorted key view first (statistics, neighbors and
-// held-out augmentations are taken from it), then other pictures of the scene, of any size. Reports
-// "train_l1_ab" and "validation_delta_e00", the latter on augmentations of the key view that are
-// never trained on. Gradients are clipped; a non-finite loss restores the last good state, halves
-// the step and warns. Resumable. With a `place`, training takes turns with the other scenes of the
-// batch. The result does not depend on the batch or the number of threads, bit for bit. The
-// colorizer predicts on as many threads as the pool has.
-std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
-                                                std::vector<TrainingPicture> pictures,
-                                                const ColorizerOptions& options,
-                                                const RunControl& control,
-                                                const std::optional<BatchPlace>& place = {});
-
-// Reads a colorizer file. The colorizer predicts on `threads` threads; 0: one per core. Throws
-// Error{kInvalidArgument} if the file is damaged, kFailedPrecondition naming both digests if it was
-// trained on another encoder.
-std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
-                                               std::shared_ptr<const Encoder> encoder,
-                                               int threads = 0);
 
 }  // namespace color3d

@@ -1,8 +1,8 @@
-// Many scenes in one running batch (STILL.md "All-in-one"): each scene's thread trains with its
-// own options, checkpoints, clock and cancellation; here they share one frozen encoder and take
-// turns at the compute slots. A turn goes to the project that has computed least, then to the scene
-// of it that has. Scenes join and leave at any time, and fail alone. Nothing of a scene's
-// arithmetic depends on the others: it gives the same bytes alone and in company. Thread-safe.
+// Training of many scenes at once (STILL.md "All-in-one"): each scene trains on a thread of its
+// own, with its own options, checkpoints, clock and cancellation. The scenes share one frozen
+// encoder and take turns at the compute slots. A turn goes to the project with the least computing
+// time, and within it to the scene with the least. Scenes join and leave at any time, and fail
+// alone. The results of a scene are the same, byte for byte, alone and in a batch. Thread-safe.
 //
 // Measured on 2 cores against stacking scenes on the batch axis: an encoder pass over stacked crops
 // and grouped convolutions over stacked decoders were no faster than a call for each scene.
@@ -87,6 +87,12 @@ class SceneBatch {
       COLOR3D_GUARDED_BY(mutex_);  // of projects with members
   Mutex encoder_mutex_;
   std::map<std::string, std::weak_ptr<const Encoder>> encoders_ COLOR3D_GUARDED_BY(encoder_mutex_);
+};
+
+// The place of a scene that trains in a batch.
+struct BatchPlace {
+  SceneBatch& batch;
+  std::string project;  // unit of fairness, e.g. the submitted job
 };
 
 }  // namespace color3d

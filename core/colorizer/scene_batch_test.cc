@@ -1,4 +1,4 @@
-// Many scenes in one batch: fair turns, and results that do not depend on the neighbors.
+// Training of many scenes in one batch: fair turns, and results that do not depend on other scenes.
 #include "core/colorizer/scene_batch.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,8 @@
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
-#include "core/colorizer/scene_colorizers.h"
+#include "core/colorizer/personal/scene_colorizers.h"
+#include "core/colorizer/personal/train_colorizer.h"
 
 namespace color3d {
 namespace {
@@ -24,7 +25,7 @@ const std::shared_ptr<const Encoder>& TheEncoder() {
   return encoder;
 }
 
-// The same picture in every scene, its two colours permuted: a wrong route shows at once.
+// The same picture in every scene, with permuted colours, to detect wrong routes.
 TrainingPicture KeyOf(int scene) {
   constexpr float kColors[kScenes][2] = {{40.0f, 30.0f}, {-40.0f, -10.0f}, {0.0f, 60.0f}};
   TrainingPicture key{"key", Image(96, 64, 1), Image(96, 64, 2)};
@@ -77,7 +78,7 @@ struct CancelAfter : NullObserver {
 
 // In one batch: the scenes, a scene with a NaN, one that is cancelled and one whose checkpoint
 // store throws.
-TEST(SceneBatchTest, NeighborsEvenPoisonedOnesLeaveResultsUnchanged) {
+TEST(SceneBatchTest, ResultsDoNotDependOnOtherScenes) {
   SceneBatch batch(2);
   std::vector<std::shared_ptr<const Colorizer>> together(kScenes);
   std::atomic<int> failures{0};
@@ -142,8 +143,8 @@ TEST(SceneBatchTest, NeighborsEvenPoisonedOnesLeaveResultsUnchanged) {
   EXPECT_GT(LargestDifference(routed[0], routed[1]), 5.0f);
 }
 
-// Project "a" has five scenes, "b" one: b's gets about half of the time.
-TEST(SceneBatchTest, TurnsAreFairBetweenProjects) {
+// Project "a" has five scenes, "b" has one, which gets about half of the time.
+TEST(SceneBatchTest, SharesTurnsFairlyBetweenProjects) {
   SceneBatch batch(1);
   std::atomic<bool> stop{false};
   std::vector<std::atomic<int>> turns(6);
@@ -170,7 +171,7 @@ TEST(SceneBatchTest, TurnsAreFairBetweenProjects) {
   EXPECT_LT(of_a, 160);
 }
 
-TEST(SceneBatchTest, AWaitingSceneCanBeCancelled) {
+TEST(SceneBatchTest, CancelsWaitingScene) {
   SceneBatch batch(1);
   SceneBatch::Membership first(batch, "a"), second(batch, "a");
   const SceneBatch::Turn turn(first, {});
@@ -183,7 +184,7 @@ TEST(SceneBatchTest, AWaitingSceneCanBeCancelled) {
   canceller.join();
 }
 
-TEST(SceneBatchTest, TheEncoderIsLoadedOnceAndFreedWithItsLastUser) {
+TEST(SceneBatchTest, LoadsSharedEncoderOnce) {
   SceneBatch batch(1);
   int loads = 0;
   const auto load = [&] {

@@ -41,7 +41,7 @@ TEST(EncoderTest, DescribesPicturesOfAnySize) {
   EXPECT_THROW(encoder->Describe(Image()), Error);
 }
 
-TEST(EncoderTest, DeepFeaturesLieOnTheCoarseGrid) {
+TEST(EncoderTest, ComputesDeepFeaturesOnCoarseGrid) {
   const auto encoder = Encoder::Embedded();
   const Image features = encoder->DeepFeatures(RandomLuminance(768, 384, 1));
   EXPECT_EQ(features.width, 24);
@@ -49,7 +49,7 @@ TEST(EncoderTest, DeepFeaturesLieOnTheCoarseGrid) {
   EXPECT_EQ(encoder->DeepFeatures(RandomLuminance(1, 1, 1)).width, 1);
 }
 
-TEST(EncoderTest, ThreadsGetTheSameAnswer) {
+TEST(EncoderTest, GivesSameResultOnSeveralThreads) {
   const auto encoder = Encoder::Embedded();
   const Image picture = RandomLuminance(120, 80, 4);
   const std::vector<double> expected = encoder->Describe(picture);
@@ -64,7 +64,7 @@ TEST(EncoderTest, ThreadsGetTheSameAnswer) {
   }
 }
 
-TEST(EncoderTest, TakesTheConvNextOfADdcolor) {
+TEST(EncoderTest, ReadsConvNextOfDdcolor) {
   const ScratchFolder folder;
   const auto path = folder.path() / "ddcolor.safetensors";
   WriteFileAtomic(
@@ -77,7 +77,7 @@ TEST(EncoderTest, TakesTheConvNextOfADdcolor) {
   EXPECT_EQ(deep.height, 10);
 }
 
-TEST(EncoderTest, TakesAClip) {
+TEST(EncoderTest, ReadsClip) {
   const ScratchFolder folder;
   const auto path = folder.path() / "clip.safetensors";
   WriteFileAtomic(path, SerializeSafetensors(SyntheticClipWeights({}, 1), true));
@@ -91,7 +91,7 @@ TEST(EncoderTest, ListsKnownEncodersForOtherFiles) {
   EXPECT_THROW(Encoder::FromWeightFile(path), Error);
 }
 
-TEST(EncoderTest, ReadsAllFormatsAsTheSameEncoder) {
+TEST(EncoderTest, ReadsAllFormatsAsSameEncoder) {
   if (!std::filesystem::exists(Golden("ddcolor_mini.safetensors"))) GTEST_SKIP() << "no data";
   const auto expected = Encoder::FromWeightFile(Golden("ddcolor_mini.safetensors"))->digest();
   EXPECT_EQ(Encoder::FromWeightFile(Golden("ddcolor_mini_params.pth"))->digest(), expected);

@@ -23,4 +23,15 @@ Image ImageFromTensor(const torch::Tensor& tensor) {
   return image;
 }
 
+std::vector<float> TensorValues(const torch::Tensor& tensor) {
+  const torch::Tensor flat = tensor.contiguous();
+  return {flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel()};
+}
+
+torch::Tensor PadByReplication(const torch::Tensor& x, int multiple) {
+  const int64_t right = (multiple - x.size(3) % multiple) % multiple;
+  const int64_t bottom = (multiple - x.size(2) % multiple) % multiple;
+  return right > 0 || bottom > 0 ? torch::replication_pad2d(x, {0, right, 0, bottom}) : x;
+}
+
 }  // namespace color3d

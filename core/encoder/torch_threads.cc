@@ -17,14 +17,14 @@ SetBlasThreads FindSetBlasThreads() {
   return reinterpret_cast<SetBlasThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
 }
 
-int Present(int threads) {
+int ResolveThreads(int threads) {
   return threads > 0 ? threads : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
 }  // namespace
 
 void SetTorchThreads(int threads, int blas_threads) {
-  threads = Present(threads);
+  threads = ResolveThreads(threads);
   if (blas_threads == 0) blas_threads = threads;
   static const SetBlasThreads set_blas_threads = FindSetBlasThreads();
   static std::atomic<int> now = 0;

@@ -4,11 +4,11 @@
 
 namespace color3d {
 
-// 0: one per core. Callers that run an encoder on several threads set 1 on each.
-// `blas_threads`: 0: as many as `threads`, for large matrix products. Use 1 for networks, because
-// waiting threads of OpenBLAS spin and occupy the processors of torch (the automatic colourizer ran
-// at half the speed on two cores), and where results must not depend on the number of threads,
-// since the rounding of OpenBLAS does on some processors.
+// Sets both numbers. `threads`: 0: one per core; callers that run an encoder on several threads set
+// 1 on each. `blas_threads`: 0: as many as `threads`, for large matrix products. Use 1 for
+// networks, because waiting threads of OpenBLAS spin and occupy the processors of torch (the
+// automatic colourizer ran at half the speed on two cores), and where results must not depend on
+// the number of threads, since the rounding of OpenBLAS does on some processors.
 void SetTorchThreads(int threads, int blas_threads = 0);
 
 }  // namespace color3d

@@ -31,4 +31,30 @@ inline torch::Tensor TakeTensor(WeightReader& reader,
   return shape.size() == 4 ? tensor.contiguous(at::MemoryFormat::ChannelsLast) : tensor;
 }
 
+// Returns the stored size of an array along one dimension, or 0 if it has no such dimension.
+inline int64_t StoredSize(const WeightReader& reader, const std::string& name, size_t dimension) {
+  const std::vector<int64_t> shape = reader.ShapeOf(name);
+  return dimension < shape.size() ? shape[dimension] : 0;
+}
+
+// Weight and bias of a linear layer, a convolution or a norm.
+struct Layer {
+  torch::Tensor weight, bias;
+
+  torch::Tensor Linear(const torch::Tensor& x) const { return torch::linear(x, weight, bias); }
+  // Norm over the last dimension.
+  torch::Tensor Norm(const torch::Tensor& x) const {
+    constexpr double kEpsilon = 1e-5;
+    return torch::layer_norm(x, {x.size(-1)}, weight, bias, kEpsilon);
+  }
+};
+
+// Takes `name`weight of this shape and `name`bias of its first size.
+inline Layer TakeLayer(WeightReader& reader,
+                       const std::string& name,
+                       const std::vector<int64_t>& shape) {
+  return {TakeTensor(reader, name + "weight", shape),
+          TakeTensor(reader, name + "bias", {shape[0]})};
+}
+
 }  // namespace color3d

@@ -30,14 +30,14 @@ std::vector<int> AnchorsOf(double step_px, std::vector<int> shots, const AnchorO
   return AnchorFrames(frames, options, pool, cancel);
 }
 
-TEST(AnchorFrames, StillFramesNeedFew) {
+TEST(AnchorFramesTest, NeedsFewAnchorsWithoutMotion) {
   EXPECT_EQ(AnchorsOf(0.0, std::vector<int>(24, 0), {.most_frames = 12}),
             (std::vector<int>{5, 17}));
   EXPECT_EQ(AnchorsOf(0.0, {0}, {}), (std::vector<int>{0}));
   EXPECT_TRUE(AnchorsOf(0.0, {}, {}).empty());
 }
 
-TEST(AnchorFrames, NumberIsIndependentOfFrameRate) {
+TEST(AnchorFramesTest, NumberIsIndependentOfFrameRate) {
   // 4 and 2 px a frame of 160.
   const AnchorOptions options{.most_motion = 0.1, .most_frames = 100};
   const size_t slow = AnchorsOf(4.0, std::vector<int>(40, 0), options).size();
@@ -47,13 +47,13 @@ TEST(AnchorFrames, NumberIsIndependentOfFrameRate) {
   EXPECT_NEAR(static_cast<double>(fast), static_cast<double>(slow), 1.0);
 }
 
-TEST(AnchorFrames, EachShotHasAnchors) {
+TEST(AnchorFramesTest, GivesEachShotAnchors) {
   EXPECT_EQ(AnchorsOf(0.0, {0, 0, 0, 1, 1, 1, 2}, {}), (std::vector<int>{1, 4, 6}));
   // Frames of several cameras alternate.
   EXPECT_EQ(AnchorsOf(0.0, {0, 1, 0, 1, 0, 1}, {}), (std::vector<int>{2, 3}));
 }
 
-TEST(AnchorFrames, ZeroMotionMakesEachFrameAnAnchor) {
+TEST(AnchorFramesTest, ZeroMotionMakesEachFrameAnAnchor) {
   EXPECT_EQ(AnchorsOf(2.0, {0, 0, 0}, {.most_motion = 0.0}), (std::vector<int>{0, 1, 2}));
   EXPECT_THROW(AnchorsOf(0.0, {0}, {.most_frames = 0}), Error);
 }

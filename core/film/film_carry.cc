@@ -5,6 +5,7 @@
 #include <mutex>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
@@ -18,29 +19,11 @@ namespace color3d {
 namespace {
 
 constexpr int kWindowRadius = 3;
-constexpr float kLeastConfidence = 0.02f;
-
-Image Identity(int width, int height) {
-  Image place(width, height, 2);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      place.At(0, y, x) = static_cast<float>(x);
-      place.At(1, y, x) = static_cast<float>(y);
-    }
-  }
-  return place;
-}
-
-// Pixels of `flow` moved by it.
-Image Moved(const Image& flow) {
-  Image place = Identity(flow.width, flow.height);
-  for (size_t i = 0; i < place.data.size(); ++i) place.data[i] += flow.data[i];
-  return place;
-}
+constexpr float kMinConfidence = 0.02f;
 
 // Extends the track along the flow to the next frame and back.
 FilmTrack Step(const FilmTrack& track, const Image& there, const Image& back) {
-  FilmTrack further{SampledAt(track.in_key, Moved(back)), track.in_frame};
+  FilmTrack further{SampledAt(track.in_key, MovedPositions(back)), track.in_frame};
   const Image step = SampledAt(there, track.in_frame);
   for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
   return further;
@@ -79,19 +62,19 @@ void Register(const Image& picture,
               const Image& other,
               const Image& other_contrast,
               Image* place) {
-  constexpr float kMostPx = 6.0f;  // a longer flow is no drift
-  constexpr float kLeastGain = 0.02f;
+  constexpr float kMaxPx = 6.0f;  // a longer flow is no drift
+  constexpr float kMinGain = 0.02f;
   Image rest = DenseFlow(picture, SampledAt(other, *place));
   for (size_t i = 0; i < rest.PlaneSize(); ++i) {
     float& x = rest.Plane(0)[i];
     float& y = rest.Plane(1)[i];
-    if (x * x + y * y > kMostPx * kMostPx) x = y = 0.0f;
+    if (x * x + y * y > kMaxPx * kMaxPx) x = y = 0.0f;
   }
-  const Image registered = SampledAt(*place, Moved(rest));
+  const Image registered = SampledAt(*place, MovedPositions(std::move(rest)));
   const Image before = LocalDifference(contrast, SampledAt(other_contrast, *place));
   const Image after = LocalDifference(contrast, SampledAt(other_contrast, registered));
   for (size_t i = 0; i < before.data.size(); ++i) {
-    if (after.data[i] >= before.data[i] - kLeastGain) continue;
+    if (after.data[i] >= before.data[i] - kMinGain) continue;
     for (int c = 0; c < 2; ++c) place->Plane(c)[i] = registered.Plane(c)[i];
   }
 }
@@ -103,11 +86,11 @@ bool Inside(float x, float y, int width, int height) {
 
 // Confidence that the pixels of a picture lie at `place` in another one, 0..1. `back` leads from
 // there to the picture.
-Image ConfidenceOf(const Image& place,
-                   const Image& back,
-                   const Image& contrast,
-                   const Image& other_contrast,
-                   const FilmCarryOptions& options) {
+Image TrackConfidence(const Image& place,
+                      const Image& back,
+                      const Image& contrast,
+                      const Image& other_contrast,
+                      const FilmCarryOptions& options) {
   const Image unlike = LocalDifference(contrast, SampledAt(other_contrast, place));
   const Image returned = SampledAt(back, place);
   const int width = contrast.width, height = contrast.height;
@@ -128,17 +111,17 @@ Image ConfidenceOf(const Image& place,
   return confidence;
 }
 
-// Places of a picture's pixels in another one, with their confidence.
-struct Places {
+// Correspondences of a picture's pixels in another one, with their confidence.
+struct Correspondences {
   Image place;
   Image confidence;
 };
 
-void TakeWhereSurer(const Places& found, Places* followed) {
-  constexpr float kLeastGain = 0.3f;  // of confidence
+void ReplaceLessConfident(const Correspondences& found, Correspondences* followed) {
+  constexpr float kMinGain = 0.3f;  // of confidence
   for (size_t i = 0; i < found.confidence.data.size(); ++i) {
     if (found.confidence.data[i] <
-        std::max(kDecisiveConfidence, followed->confidence.data[i] + kLeastGain)) {
+        std::max(kDecisiveConfidence, followed->confidence.data[i] + kMinGain)) {
       continue;
     }
     followed->confidence.data[i] = found.confidence.data[i];
@@ -146,52 +129,54 @@ void TakeWhereSurer(const Places& found, Places* followed) {
   }
 }
 
-constexpr double kMuchLost = 0.1;
-constexpr double kFollowedEnough = 0.9;  // mean confidence from which features are not matched
+constexpr double kMaxLoss = 0.1;
+constexpr double kWellTracked = 0.9;  // mean confidence from which features are not matched
 
-double MeanOf(const Image& image) {
+double MeanValue(const Image& image) {
   const double sum = std::accumulate(image.data.begin(), image.data.end(), 0.0);
   return sum / static_cast<double>(image.data.size());
 }
 
 // Takes the tracks that features find, where they are more confident than flow.
-void TakeReappearing(const ReappearingRegions& again,
-                     const Image& frame,
-                     const Image& contrast,
-                     const Image& key_contrast,
-                     const FilmCarryOptions& options,
-                     const CancellationToken& cancel,
-                     FilmTrack* track) {
+void UseReappearingTracks(const ReappearingRegions& regions,
+                          const Image& frame,
+                          const Image& contrast,
+                          const Image& key_contrast,
+                          const FilmCarryOptions& options,
+                          const CancellationToken& cancel,
+                          FilmTrack* track) {
   const auto in_key = [&](const FilmTrack& t) {
-    return Places{t.in_key, ConfidenceOf(t.in_key, t.in_frame, contrast, key_contrast, options)};
+    return Correspondences{t.in_key,
+                           TrackConfidence(t.in_key, t.in_frame, contrast, key_contrast, options)};
   };
   const auto in_frame = [&](const FilmTrack& t) {
-    return Places{t.in_frame, ConfidenceOf(t.in_frame, t.in_key, key_contrast, contrast, options)};
+    return Correspondences{t.in_frame,
+                           TrackConfidence(t.in_frame, t.in_key, key_contrast, contrast, options)};
   };
-  Places of_frame = in_key(*track);
-  if (MeanOf(of_frame.confidence) > kFollowedEnough) return;
-  Places of_key = in_frame(*track);
-  for (const FilmTrack& other : again.TracksTo(frame, cancel)) {
+  Correspondences of_frame = in_key(*track);
+  if (MeanValue(of_frame.confidence) > kWellTracked) return;
+  Correspondences of_key = in_frame(*track);
+  for (const FilmTrack& other : regions.TracksTo(frame, cancel)) {
     cancel.ThrowIfCancelled();
-    TakeWhereSurer(in_key(other), &of_frame);
-    TakeWhereSurer(in_frame(other), &of_key);
+    ReplaceLessConfident(in_key(other), &of_frame);
+    ReplaceLessConfident(in_frame(other), &of_key);
   }
   *track = {std::move(of_frame.place), std::move(of_key.place)};
 }
 
-CarriedColor ColorOf(const FilmKey& key,
-                     const Image& key_contrast,
-                     const Image& contrast,
-                     const FilmTrack& track,
-                     const FilmCarryOptions& options) {
+CarriedColor SampleKeyColor(const FilmKey& key,
+                            const Image& key_contrast,
+                            const Image& contrast,
+                            const FilmTrack& track,
+                            const FilmCarryOptions& options) {
   CarriedColor color{SampledAt(key.color.ab, track.in_key),
                      SampledAt(key.color.confidence, track.in_key)};
   const Image followed =
-      ConfidenceOf(track.in_key, track.in_frame, contrast, key_contrast, options);
+      TrackConfidence(track.in_key, track.in_frame, contrast, key_contrast, options);
   for (size_t i = 0; i < followed.data.size(); ++i) {
     float& confidence = color.confidence.data[i];
     confidence *= followed.data[i];
-    if (confidence > kLeastConfidence) continue;
+    if (confidence > kMinConfidence) continue;
     confidence = 0.0f;
     for (int c = 0; c < color.ab.channels; ++c) color.ab.Plane(c)[i] = 0.0f;
   }
@@ -230,18 +215,18 @@ class Walker {
         moved_(walk.before.moved),
         wanted_(walk.before.wanted),
         track_(walk.before.track) {
-    if (options.correct_after < 1.0) again_.emplace(*key_);
+    if (options.correct_after < 1.0) regions_.emplace(*key_);
     if (track_) {
       frame_ = walk.before.frame;
       luminance_ = frames.luminance(frame_);
     } else {
-      const Image start = Identity(key_->width, key_->height);
-      wanted_ = MeanOf(walk.key->color.confidence) - kMuchLost;
+      const Image start = MovedPositions(Image(key_->width, key_->height, 2));
+      wanted_ = MeanValue(walk.key->color.confidence) - kMaxLoss;
       track_ = std::make_shared<const FilmTrack>(FilmTrack{start, start});
     }
   }
 
-  CarriedColor GoTo(int frame) {
+  CarriedColor CarryTo(int frame) {
     cancel_.ThrowIfCancelled();
     const auto next = frames_.luminance(frame);
     const Image contrast = LocalContrast(*next);
@@ -250,19 +235,19 @@ class Walker {
     FilmTrack track =
         forward ? Step(*track_, flow->forth, flow->back) : Step(*track_, flow->back, flow->forth);
     const auto color = [&] {
-      return ColorOf(*walk_.key, key_contrast_, contrast, track, options_);
+      return SampleKeyColor(*walk_.key, key_contrast_, contrast, track, options_);
     };
     CarriedColor carried = color();
-    if (again_) {
+    if (regions_) {
       moved_ += MotionOf(flow->back);
       const bool in_turn = moved_ >= options_.correct_after;
-      if (in_turn || MeanOf(carried.confidence) < wanted_) {
+      if (in_turn || MeanValue(carried.confidence) < wanted_) {
         Correct(*next, contrast, &track);
         carried = color();
       }
       if (in_turn) {
         moved_ = 0.0;
-        wanted_ = MeanOf(carried.confidence) - kMuchLost;
+        wanted_ = MeanValue(carried.confidence) - kMaxLoss;
       }
     }
     frame_ = frame;
@@ -271,7 +256,7 @@ class Walker {
     return carried;
   }
 
-  FilmWalk Where() const {
+  FilmWalk State() const {
     const bool ends = frame_ == walk_.frames.back();
     return {walk_.key->frame, walk_.direction, frame_, moved_, wanted_, ends ? nullptr : track_};
   }
@@ -292,7 +277,7 @@ class Walker {
     cancel_.ThrowIfCancelled();
     Register(*key_, key_contrast_, next, contrast, &track->in_frame);
     cancel_.ThrowIfCancelled();
-    TakeReappearing(*again_, next, contrast, key_contrast_, options_, cancel_, track);
+    UseReappearingTracks(*regions_, next, contrast, key_contrast_, options_, cancel_, track);
   }
 
   const Walk& walk_;
@@ -301,7 +286,7 @@ class Walker {
   const CancellationToken& cancel_;
   const std::shared_ptr<const Image> key_;
   const Image key_contrast_;
-  std::optional<ReappearingRegions> again_;
+  std::optional<ReappearingRegions> regions_;
   int frame_;
   std::shared_ptr<const Image> luminance_;  // of the frame
   double moved_;
@@ -321,10 +306,10 @@ void DropFinished(const std::vector<FilmWalk>& walks, Walk* walk) {
   }
 }
 
-std::vector<Walk> WalksOf(const FilmFrames& frames,
-                          const std::vector<FilmKey>& keys,
-                          bool with_second,
-                          const std::vector<FilmWalk>& done) {
+std::vector<Walk> PlanWalks(const FilmFrames& frames,
+                            const std::vector<FilmKey>& keys,
+                            bool with_second,
+                            const std::vector<FilmWalk>& done) {
   const int count = static_cast<int>(frames.shot.size());
   std::vector<int> key_frames;
   for (const FilmKey& key : keys) key_frames.push_back(key.frame);
@@ -377,16 +362,16 @@ std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames,
 }
 
 CarriedColor CarryIntoReappearing(const FilmKey& key,
-                                  const ReappearingRegions& again,
+                                  const ReappearingRegions& regions,
                                   const Image& frame,
                                   const FilmCarryOptions& options,
                                   const CancellationToken& cancel) {
-  constexpr float kNowhere = -1e4f;
-  const Image contrast = LocalContrast(frame), key_contrast = LocalContrast(again.key());
-  const Image nowhere(frame.width, frame.height, 2, kNowhere);
-  FilmTrack track{nowhere, nowhere};
-  TakeReappearing(again, frame, contrast, key_contrast, options, cancel, &track);
-  return ColorOf(key, key_contrast, contrast, track, options);
+  constexpr float kOutside = -1e4f;
+  const Image contrast = LocalContrast(frame), key_contrast = LocalContrast(regions.key());
+  const Image outside(frame.width, frame.height, 2, kOutside);
+  FilmTrack track{outside, outside};
+  UseReappearingTracks(regions, frame, contrast, key_contrast, options, cancel, &track);
+  return SampleKeyColor(key, key_contrast, contrast, track, options);
 }
 
 void FilmCarryOptions::Validate() const {
@@ -407,11 +392,13 @@ void CarryAlongFilm(const FilmFrames& frames,
   options.Validate();
   for (size_t i = 0; i < keys.size(); ++i) {
     if (keys[i].frame < 0 || keys[i].frame >= static_cast<int>(frames.shot.size())) {
-      throw InvalidArgument("key frame {} is none of {}", keys[i].frame, frames.shot.size());
+      throw InvalidArgument("key frame {} is out of range; the film has {} frames",
+                            keys[i].frame,
+                            frames.shot.size());
     }
     for (size_t k = 0; k < i; ++k) {
       if (keys[k].frame == keys[i].frame) {
-        throw InvalidArgument("the frame {} is a key frame twice", keys[i].frame);
+        throw InvalidArgument("frame {} is given as key frame twice", keys[i].frame);
       }
     }
   }
@@ -422,15 +409,15 @@ void CarryAlongFilm(const FilmFrames& frames,
     Walker walker(*walk, frames, options, cancel);
     for (size_t i = 0; i < count; ++i) {
       const int frame = walk->frames[i];
-      const CarriedColor color = walker.GoTo(frame);
+      const CarriedColor color = walker.CarryTo(frame);
       const std::lock_guard lock(handing_over);
-      if (resume.on_walk) resume.on_walk(walker.Where());
+      if (resume.on_walk) resume.on_walk(walker.State());
       to(frame, color);
     }
-    walk->before = walker.Where();
+    walk->before = walker.State();
     walk->Drop(count);
   };
-  std::vector<Walk> walks = WalksOf(frames, keys, on_second != nullptr, resume.walks);
+  std::vector<Walk> walks = PlanWalks(frames, keys, on_second != nullptr, resume.walks);
   const auto count = static_cast<int64_t>(walks.size());
   pool.ForEach(count, [&](int64_t i, int) { go(walks[i].nearest, on_frame, &walks[i]); });
   pool.ForEach(count, [&](int64_t i, int) { go(walks[i].frames.size(), on_second, &walks[i]); });

@@ -42,7 +42,7 @@ struct FlowPair {
 
 struct FilmFrames {
   std::vector<int> shot;  // of each frame; colours are carried within a shot only
-  // L in 0..100, 1 channel, all of one size. Called from several threads at once.
+  // L in 0..100, 1 channel, equal sizes. Called from several threads at once.
   std::function<std::shared_ptr<const Image>(int frame)> luminance;
   // Flow between a frame and the next one of its shot if it is known already. May be empty. Called
   // from several threads at once.
@@ -53,17 +53,17 @@ struct FilmFrames {
 
 // State of a walk away from a key frame.
 struct FilmWalk {
-  int key = 0;                             // frame
-  int direction = 1;                       // 1 or -1
-  int frame = 0;                           // the last one that on_frame has had
-  double moved = 0.0;                      // motion since the last registration
-  double wanted = 0.0;                     // mean confidence below which it is registered anyway
+  int key = 0;          // frame
+  int direction = 1;    // 1 or -1
+  int frame = 0;        // last frame passed to on_frame
+  double moved = 0.0;   // motion since the last registration
+  double wanted = 0.0;  // mean confidence below which tracks are registered again
   std::shared_ptr<const FilmTrack> track;  // to `frame`; null at the walk's end
 };
 
 // For resuming interrupted work.
 struct FilmResume {
-  std::vector<FilmWalk> walks;  // the last ones of on_walk; they go on behind their frame
+  std::vector<FilmWalk> walks;  // last ones of on_walk; they continue after their frame
   // Called before on_frame with the same frame, under the same lock. May be empty.
   std::function<void(const FilmWalk& walk)> on_walk;
 };
@@ -73,12 +73,13 @@ struct NearKeyFrames {
   int nearest = -1;
   int second = -1;
 };
-// For each frame, among the frames `keys`; the earlier in the list of two at the same distance.
+// Returns, for each frame, the nearest of the frames `keys`; of two at the same distance, the first
+// in the list.
 std::vector<NearKeyFrames> NearestKeyFrames(const FilmFrames& frames, const std::vector<int>& keys);
 
-// Carries a key frame's colours into a frame that no walk reaches, as behind a cut, to the regions
-// that local features find again; confidence is 0 elsewhere. `regions`: of the key frame. `frame`:
-// as FilmFrames::luminance. Throws Error{kCancelled}.
+// Carries a key frame's colours into a frame that no walk reaches, e.g. after a cut: to the regions
+// of the key frame that local features find there. Confidence is 0 elsewhere. `regions`: of the key
+// frame. `frame`: as FilmFrames::luminance. Throws Error{kCancelled}.
 CarriedColor CarryIntoReappearing(const FilmKey& key,
                                   const ReappearingRegions& regions,
                                   const Image& frame,

@@ -104,7 +104,7 @@ Deviation ErrorOf(const CarriedColor& color, const Image& truth) {
   return {weight > 0.0 ? sum / weight : 0.0, covered / static_cast<double>(truth.PlaneSize())};
 }
 
-TEST(FilmCarry, FollowsCameraWithoutDrift) {
+TEST(FilmCarryTest, FollowsCameraWithoutDrift) {
   const Scenery scenery{.pan_px = 1.5, .zoom = 0.004};
   const auto colors = Carry(scenery, std::vector<int>(31, 0), {KeyOf(scenery, 15)});
   ASSERT_EQ(colors.size(), 31u);
@@ -115,7 +115,7 @@ TEST(FilmCarry, FollowsCameraWithoutDrift) {
   }
 }
 
-TEST(FilmCarry, TakesNearestKeyFrameOfShot) {
+TEST(FilmCarryTest, UsesNearestKeyFrameOfShot) {
   const Scenery scenery{.pan_px = 0.0};
   FilmKey red = KeyOf(scenery, 2), green = KeyOf(scenery, 9);
   red.color.ab = Image(kWidth, kHeight, 2, 40.0f);
@@ -132,7 +132,7 @@ TEST(FilmCarry, TakesNearestKeyFrameOfShot) {
   for (const int frame : {6, 7, 8, 9, 10, 11}) EXPECT_NEAR(color(frame), -40.0f, 1e-3) << frame;
 }
 
-TEST(FilmCarry, AdditionalKeyFrameChangesNearerFramesOnly) {
+TEST(FilmCarryTest, AdditionalKeyFrameChangesNearerFramesOnly) {
   const Scenery scenery{.pan_px = 1.5};
   FilmKey later = KeyOf(scenery, 16);
   for (float& v : later.color.ab.data) v = -v;
@@ -140,7 +140,8 @@ TEST(FilmCarry, AdditionalKeyFrameChangesNearerFramesOnly) {
   const auto before = Carry(scenery, shots, {KeyOf(scenery, 4)});
   const auto after = Carry(scenery, shots, {KeyOf(scenery, 4), later});
   for (int i = 0; i < 21; ++i) {
-    EXPECT_EQ(before.at(i).ab.data == after.at(i).ab.data, i <= 10) << i;  // 10: as far from both
+    EXPECT_EQ(before.at(i).ab.data == after.at(i).ab.data, i <= 10)
+        << i;  // 10 is at the same distance from both
     EXPECT_EQ(before.at(i).confidence.data == after.at(i).confidence.data, i <= 10) << i;
   }
   // Never a mean of both.
@@ -149,7 +150,7 @@ TEST(FilmCarry, AdditionalKeyFrameChangesNearerFramesOnly) {
   EXPECT_LT(ErrorOf(after.at(13), opposite).weighted, 1.5);
 }
 
-TEST(FilmCarry, NearestMeansNearestInTime) {
+TEST(FilmCarryTest, MeasuresDistanceInTime) {
   FilmFrames frames{{0, 0, 0, 0, 0, 1, 0}, {}};
   const auto owners = [&] {
     std::vector<int> nearest, second;
@@ -161,13 +162,13 @@ TEST(FilmCarry, NearestMeansNearestInTime) {
   };
   EXPECT_EQ(owners().first, (std::vector<int>{0, 0, 2, 2, 6, -1, 6}));
   EXPECT_EQ(owners().second, (std::vector<int>{2, 2, 0, 6, 2, -1, 2})) << "6 was given first";
-  frames.time_s = {0.0, 0.4, 0.5, 0.6, 0.7, 0.8, 2.4};  // most of it stands still
+  frames.time_s = {0.0, 0.4, 0.5, 0.6, 0.7, 0.8, 2.4};  // the first frames are close in time
   EXPECT_EQ(owners().first, (std::vector<int>{0, 2, 2, 2, 2, -1, 6}));
   EXPECT_EQ(owners().second, (std::vector<int>{2, 0, 0, 0, 0, -1, 2}));
 }
 
 // The left end is seen in the first key frame only, the right end in the last one.
-TEST(FilmCarry, PassesSecondKeyFrameAfterNearest) {
+TEST(FilmCarryTest, PassesSecondKeyFrameLast) {
   const Scenery scenery{.pan_px = 5.0};
   const std::vector<FilmKey> keys = {KeyOf(scenery, 2), KeyOf(scenery, 9)};
   const FilmFrames frames{std::vector<int>(12, 0), [&](int frame) {
@@ -215,7 +216,7 @@ TEST(FilmCarry, PassesSecondKeyFrameAfterNearest) {
   }
 }
 
-TEST(FilmCarry, LostPixelsHaveNoConfidence) {
+TEST(FilmCarryTest, GivesLostPixelsNoConfidence) {
   const Scenery fast{.pan_px = 90.0};
   const auto colors = Carry(fast, std::vector<int>(6, 0), {KeyOf(fast, 0)});
   EXPECT_LT(ErrorOf(colors.at(5), fast.Ab(5)).coverage, 0.3);
@@ -237,8 +238,8 @@ TEST(FilmCarry, LostPixelsHaveNoConfidence) {
                  });
 }
 
-// Flow from frame to frame loses everything behind a board that passes.
-TEST(FilmCarry, FindsReappearingRegions) {
+// A blank frame interrupts the optical flow.
+TEST(FilmCarryTest, FindsReappearingRegions) {
   const Scenery scenery{.pan_px = 3.0};
   const FilmFrames frames{std::vector<int>(5, 0), [&](int frame) {
                             Image l = scenery.Luminance(frame);
@@ -256,7 +257,7 @@ TEST(FilmCarry, FindsReappearingRegions) {
       });
 }
 
-TEST(FilmCarry, ResumedWalksGiveTheSameBits) {
+TEST(FilmCarryTest, ResumesWithSameBits) {
   const Scenery scenery{.pan_px = 1.5};
   const std::vector<FilmKey> keys = {KeyOf(scenery, 3), KeyOf(scenery, 9)};
   const std::vector<int> shots(14, 0);
@@ -309,7 +310,7 @@ TEST(FilmCarry, ResumedWalksGiveTheSameBits) {
   EXPECT_TRUE(read.empty());
 }
 
-TEST(FilmCarry, TakesSmallFilmsAndRefusesWrongKeys) {
+TEST(FilmCarryTest, AcceptsShortFilmsAndRefusesBadKeys) {
   const Scenery still{.pan_px = 0.0};
   EXPECT_EQ(Carry(still, {0}, {KeyOf(still, 0)}).size(), 1u);
   EXPECT_THROW(Carry(still, {0, 0}, {KeyOf(still, 2)}), Error);

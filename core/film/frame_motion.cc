@@ -19,4 +19,14 @@ double MotionOf(const Image& flow) {
   return *fast / std::max(flow.width, flow.height);
 }
 
+Image MovedPositions(Image flow) {
+  for (int y = 0; y < flow.height; ++y) {
+    for (int x = 0; x < flow.width; ++x) {
+      flow.At(0, y, x) += static_cast<float>(x);
+      flow.At(1, y, x) += static_cast<float>(y);
+    }
+  }
+  return flow;
+}
+
 }  // namespace color3d

@@ -21,22 +21,22 @@ namespace color3d {
 namespace {
 
 constexpr int kDistances[] = {1, 2, 4, 8};
-constexpr float kSureCyclePx = 1.0f;   // forward-backward error
-constexpr float kLeastTexture = 0.4f;  // mean gradient of samples, L per px
+constexpr float kMaxCyclePx = 1.0f;  // forward-backward error
+constexpr float kMinTexture = 0.4f;  // mean gradient of samples, L per px
 constexpr int kSampleStepPx = 6;
-constexpr size_t kLeastSamples = 100;
+constexpr size_t kMinSamples = 100;
 constexpr double kStillPx = 0.3;
-constexpr double kLeastMotionPx = 1.0;
+constexpr double kMinMotionPx = 1.0;
 constexpr double kNoiseFactor = 4.0 * 1.4826;  // four standard deviations, from a median
 // A homography that explains nearly as much as a fundamental matrix is preferred, since the matrix
 // may explain moving objects, too.
 constexpr double kTurnShare = 0.9;
 
 struct Flow {
-  Image there;              // px
-  std::vector<char> sure;   // per pixel
-  std::vector<int> sample;  // indices of sure pixels with texture, on a grid
-  Image texture;            // 1 channel, L per px
+  Image there;                 // px
+  std::vector<char> reliable;  // per pixel
+  std::vector<int> sample;     // indices of reliable pixels with texture, on a grid
+  Image texture;               // 1 channel, L per px
 };
 
 // Mean length of the gradient over 7 px.
@@ -53,7 +53,7 @@ Image Texture(const Image& luminance) {
 }
 
 // Reliable flow of `from`. `there`: from it to the other frame; `back`: from that one.
-Flow SureFlow(const Image& from, const Image& there, const Image& back) {
+Flow ReliableFlow(const Image& from, const Image& there, const Image& back) {
   Flow flow{there, std::vector<char>(from.PlaneSize(), 0), {}, Texture(from)};
   for (int y = 0; y < from.height; ++y) {
     for (int x = 0; x < from.width; ++x) {
@@ -62,53 +62,41 @@ Flow SureFlow(const Image& from, const Image& there, const Image& back) {
       if (tx < 0 || ty < 0 || tx > from.width - 1 || ty > from.height - 1) continue;
       const float cycle =
           std::hypot(u + SampleBilinear(back, 0, tx, ty), v + SampleBilinear(back, 1, tx, ty));
-      if (!(cycle < kSureCyclePx)) continue;
+      if (!(cycle < kMaxCyclePx)) continue;
       const int at = y * from.width + x;
-      flow.sure[at] = 1;
+      flow.reliable[at] = 1;
       const bool on_grid =
           x % kSampleStepPx == kSampleStepPx / 2 && y % kSampleStepPx == kSampleStepPx / 2;
-      if (on_grid && flow.texture.data[at] > kLeastTexture) flow.sample.push_back(at);
+      if (on_grid && flow.texture.data[at] > kMinTexture) flow.sample.push_back(at);
     }
   }
   return flow;
 }
 
 // A model of the camera's motion between two frames.
-class CameraModel {
- public:
-  static CameraModel Of(const cv::Matx33d& matrix, CameraMotion motion) { return {matrix, motion}; }
-  static CameraModel Still() { return {cv::Matx33d::eye(), CameraMotion::kStill}; }
+struct CameraModel {
+  cv::Matx33d matrix;
+  CameraMotion motion;
 
-  CameraMotion motion() const { return motion_; }
-  // Distance in px between the pixel's place and the model's: from the homography's place, or
-  // Sampson's distance from the epipolar lines.
-  double Residual(double x, double y, double tx, double ty) const {
+  // Distance in px between the position to which `flow` moves pixel `at` and the model's: the
+  // homography's position, or Sampson's distance from the epipolar lines.
+  double Residual(const Image& flow, int at) const {
+    const double x = at % flow.width, y = at / flow.width;
+    const double tx = x + flow.Plane(0)[at], ty = y + flow.Plane(1)[at];
     const cv::Vec3d p(x, y, 1.0), q(tx, ty, 1.0);
-    const cv::Vec3d l = matrix_ * p;
-    if (motion_ != CameraMotion::kMoved) {
+    const cv::Vec3d l = matrix * p;
+    if (motion != CameraMotion::kMoved) {
       return std::abs(l[2]) < 1e-9 ? 1e3 : std::hypot(l[0] / l[2] - tx, l[1] / l[2] - ty);
     }
-    const cv::Vec3d m = matrix_.t() * q;
+    const cv::Vec3d m = matrix.t() * q;
     const double slope = l[0] * l[0] + l[1] * l[1] + m[0] * m[0] + m[1] * m[1];
     return std::abs(q.dot(l)) / std::sqrt(slope + 1e-18);
   }
-
- private:
-  CameraModel(const cv::Matx33d& matrix, CameraMotion motion) : matrix_(matrix), motion_(motion) {}
-
-  cv::Matx33d matrix_;
-  CameraMotion motion_;
 };
 
-std::vector<double> ResidualsOf(const CameraModel& account, const Flow& flow) {
+std::vector<double> SampleResiduals(const CameraModel& model, const Flow& flow) {
   std::vector<double> residuals;
-  residuals.reserve(flow.sample.size());
-  const int width = flow.there.width;
-  for (const int at : flow.sample) {
-    const double x = at % width, y = at / width;
-    residuals.push_back(
-        account.Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]));
-  }
+  for (const int at : flow.sample) residuals.push_back(model.Residual(flow.there, at));
   return residuals;
 }
 
@@ -132,19 +120,19 @@ std::optional<CameraModel> Explain(const Flow& flow) {
     constexpr int kIterations = 2000;
     constexpr double kConfidence = 0.999;
     const cv::Mat h = cv::findHomography(
-        from, to, cv::USAC_MAGSAC, kLeastMotionPx, cv::noArray(), kIterations, kConfidence);
-    if (h.rows == 3) turn = CameraModel::Of(cv::Matx33d(h), CameraMotion::kTurn);
+        from, to, cv::USAC_MAGSAC, kMinMotionPx, cv::noArray(), kIterations, kConfidence);
+    if (h.rows == 3) turn = {cv::Matx33d(h), CameraMotion::kTurn};
     // Least median of squares takes the matrix that explains the larger half best. A count of
     // inliers could prefer one that explains moving objects, too.
     const cv::Mat f = cv::findFundamentalMat(
-        from, to, cv::FM_LMEDS, kLeastMotionPx, kConfidence, kIterations, cv::noArray());
-    if (f.rows == 3) moved = CameraModel::Of(cv::Matx33d(f), CameraMotion::kMoved);
+        from, to, cv::FM_LMEDS, kMinMotionPx, kConfidence, kIterations, cv::noArray());
+    if (f.rows == 3) moved = {cv::Matx33d(f), CameraMotion::kMoved};
   } catch (const cv::Exception& e) {
-    throw Error(ErrorCode::kInternal, "the motion of the camera failed: {}", e.err);
+    throw Error(ErrorCode::kInternal, "estimating the motion of the camera failed: {}", e.err);
   }
   if (!turn || !moved) return moved ? moved : turn;
-  const double by_turn = ShareBelow(ResidualsOf(*turn, flow), kLeastMotionPx);
-  const double by_move = ShareBelow(ResidualsOf(*moved, flow), kLeastMotionPx);
+  const double by_turn = ShareBelow(SampleResiduals(*turn, flow), kMinMotionPx);
+  const double by_move = ShareBelow(SampleResiduals(*moved, flow), kMinMotionPx);
   return by_turn >= kTurnShare * by_move ? turn : moved;
 }
 
@@ -165,26 +153,22 @@ double MedianTexture(const Flow& flow) {
 PairResidual Compare(const Image& from, const Image& there, const Image& back) {
   PairResidual result;
   result.excess = Image(from.width, from.height, 1, -1.0f);
-  const Flow flow = SureFlow(from, there, back);
-  if (flow.sample.size() < kLeastSamples) return result;
+  const Flow flow = ReliableFlow(from, there, back);
+  if (flow.sample.size() < kMinSamples) return result;
   result.background_px = MedianLength(flow);
-  const std::optional<CameraModel> account =
-      result.background_px < kStillPx ? CameraModel::Still() : Explain(flow);
-  if (!account) return result;
-  result.motion = account->motion();
-  const double noise_px = kNoiseFactor * Median(ResidualsOf(*account, flow));
+  const std::optional<CameraModel> model =
+      result.background_px < kStillPx ? CameraModel{cv::Matx33d::eye(), CameraMotion::kStill}
+                                      : Explain(flow);
+  if (!model) return result;
+  result.motion = model->motion;
+  const double noise_px = kNoiseFactor * Median(SampleResiduals(*model, flow));
   const double texture = MedianTexture(flow);
-  for (int y = 0; y < from.height; ++y) {
-    for (int x = 0; x < from.width; ++x) {
-      const size_t at = static_cast<size_t>(y) * from.width + x;
-      if (!flow.sure[at]) continue;
-      const double residual =
-          account->Residual(x, y, x + flow.there.Plane(0)[at], y + flow.there.Plane(1)[at]);
-      // The error of flow is inversely proportional to the gradient.
-      const double plain = texture / std::max(flow.texture.data[at], 0.05f * kLeastTexture);
-      result.excess.data[at] =
-          static_cast<float>(residual / std::max(kLeastMotionPx, noise_px * std::max(1.0, plain)));
-    }
+  for (int at = 0; at < static_cast<int>(flow.reliable.size()); ++at) {
+    if (!flow.reliable[at]) continue;
+    // The error of flow is inversely proportional to the gradient.
+    const double plain = texture / std::max(flow.texture.data[at], 0.05f * kMinTexture);
+    result.excess.data[at] = static_cast<float>(
+        model->Residual(flow.there, at) / std::max(kMinMotionPx, noise_px * std::max(1.0, plain)));
   }
   return result;
 }
@@ -219,13 +203,10 @@ void FillHoles(cv::Mat* regions) {
 }
 
 // Regions by majority vote, without specks and holes, dilated over the soft edges of the flow.
-Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
+Image VotedRegions(const Votes& votes, int least_votes, int width, int height) {
   cv::Mat moving(height, width, CV_8U);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const size_t i = static_cast<size_t>(y) * width + x;
-      moving.at<uchar>(y, x) = votes.all[i] >= least_votes && 2 * votes.moving[i] > votes.all[i];
-    }
+  for (size_t i = 0; i < votes.all.size(); ++i) {
+    moving.data[i] = votes.all[i] >= least_votes && 2 * votes.moving[i] > votes.all[i];
   }
   const auto disc = [](int side) {
     return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(side, side));
@@ -236,9 +217,7 @@ Image RegionsOf(const Votes& votes, int least_votes, int width, int height) {
   cv::dilate(moving, moving, disc(2 * unit + 1));
   FillHoles(&moving);
   Image image(width, height, 1);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) image.At(0, y, x) = moving.at<uchar>(y, x) ? 1.0f : 0.0f;
-  }
+  moving.convertTo(cv::Mat(height, width, CV_32F, image.data.data()), CV_32F);
   return image;
 }
 
@@ -251,7 +230,7 @@ int NeighborCount(int frame, int count) {
 }
 
 // Pairs of the frames from `begin` to `end` with the neighbours after them.
-std::vector<std::pair<int, int>> PairsFrom(int begin, int end, int count) {
+std::vector<std::pair<int, int>> NeighborPairs(int begin, int end, int count) {
   std::vector<std::pair<int, int>> pairs;
   for (int frame = begin; frame < end; ++frame) {
     for (const int distance : kDistances) {
@@ -290,8 +269,8 @@ ShotMotion MotionOfCamera(const ShotFrames& frames,
   pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
     const auto from = frames.luminance(pairs[i].first), to = frames.luminance(pairs[i].second);
-    const Flow flow = SureFlow(*from, DenseFlow(*from, *to), DenseFlow(*to, *from));
-    if (flow.sample.size() >= kLeastSamples) shift[i] = MedianLength(flow);
+    const Flow flow = ReliableFlow(*from, DenseFlow(*from, *to), DenseFlow(*to, *from));
+    if (flow.sample.size() >= kMinSamples) shift[i] = MedianLength(flow);
   });
   std::erase_if(shift, [](double px) { return px < 0.0; });
   ShotMotion motion;
@@ -313,7 +292,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
   std::vector<double> share(frames.count, 0.0);
   for (int begin = 0; begin < frames.count; begin += kAtOnce) {
     const int end = std::min(begin + kAtOnce, frames.count);
-    const std::vector<std::pair<int, int>> pairs = PairsFrom(begin, end, frames.count);
+    const std::vector<std::pair<int, int>> pairs = NeighborPairs(begin, end, frames.count);
     // One pair of flows gives votes for both frames.
     pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
       cancel.ThrowIfCancelled();
@@ -330,11 +309,11 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
     pool.ForEach(end - begin, [&](int64_t i, int) {
       const int frame = begin + static_cast<int>(i);
       const auto picture = frames.luminance(frame);
-      Votes told = std::exchange(votes[frame], {});
-      told.moving.resize(picture->PlaneSize());
-      told.all.resize(picture->PlaneSize());
+      Votes frame_votes = std::exchange(votes[frame], {});
+      frame_votes.moving.resize(picture->PlaneSize());
+      frame_votes.all.resize(picture->PlaneSize());
       const int least = std::clamp(NeighborCount(frame, frames.count), 1, 2);
-      const Image moving = RegionsOf(told, least, picture->width, picture->height);
+      const Image moving = VotedRegions(frame_votes, least, picture->width, picture->height);
       double sum = 0.0;
       for (const float v : moving.data) sum += v;
       share[frame] = sum / static_cast<double>(moving.data.size());
@@ -349,7 +328,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
 }
 
 double FootRow(const Image& moving) {
-  constexpr double kLeastShare = 0.003;
+  constexpr double kMinShare = 0.003;
   cv::Mat is_moving(moving.height, moving.width, CV_8U);
   std::transform(moving.data.begin(), moving.data.end(), is_moving.begin<uint8_t>(), [](float v) {
     return v > 0.5f ? uint8_t{1} : uint8_t{0};
@@ -364,7 +343,7 @@ double FootRow(const Image& moving) {
     foot = statistics.at<int>(i, cv::CC_STAT_TOP) + statistics.at<int>(i, cv::CC_STAT_HEIGHT);
   }
   const double share = largest / static_cast<double>(moving.PlaneSize());
-  return share < kLeastShare ? -1.0 : foot / static_cast<double>(moving.height);
+  return share < kMinShare ? -1.0 : foot / static_cast<double>(moving.height);
 }
 
 }  // namespace color3d

@@ -85,7 +85,7 @@ double AgreementWithTruth(const Found& found, const Film& film) {
   return both / either;
 }
 
-TEST(MovingRegions, FindsMovingObjectBeforeMovingCamera) {
+TEST(MovingRegionsTest, FindsObjectSeenByMovingCamera) {
   const Film film;
   const Found found = Find(film);
   EXPECT_GT(AgreementWithTruth(found, film), 0.6);
@@ -94,18 +94,18 @@ TEST(MovingRegions, FindsMovingObjectBeforeMovingCamera) {
   EXPECT_NEAR(found.motion.moving_share, 0.08, 0.04);
 }
 
-TEST(MovingRegions, FindsMovingObjectInGrain) {
+TEST(MovingRegionsTest, FindsMovingObjectInGrain) {
   const Film film{.noise = 3.0};
   EXPECT_GT(AgreementWithTruth(Find(film), film), 0.6);
 }
 
-TEST(MovingRegions, FindsNothingInStaticScene) {
+TEST(MovingRegionsTest, FindsNothingInStaticScene) {
   const Found found = Find({.board_step = 0.0});
   EXPECT_LT(found.motion.moving_share, 0.01);
   EXPECT_FALSE(found.motion.camera_stands_still);
 }
 
-TEST(MovingRegions, DetectsStillCamera) {
+TEST(MovingRegionsTest, DetectsStillCamera) {
   const Film film{.step = 0.0, .noise = 1.0};
   const Found found = Find(film);
   EXPECT_TRUE(found.motion.camera_stands_still);
@@ -113,7 +113,7 @@ TEST(MovingRegions, DetectsStillCamera) {
   EXPECT_GT(AgreementWithTruth(found, film), 0.6);
 }
 
-TEST(MovingRegions, TurningCameraIsNotStill) {
+TEST(MovingRegionsTest, DistinguishesTurningFromStillCamera) {
   const Film film{.step = 0.0, .turn = {0.002, 0.01, 0.0}};
   const Found found = Find(film);
   EXPECT_FALSE(found.motion.camera_stands_still);
@@ -121,7 +121,7 @@ TEST(MovingRegions, TurningCameraIsNotStill) {
 }
 
 // Each pair of frames is measured once, in blocks of frames from the beginning of the shot.
-TEST(MovingRegions, DoNotDependOnThreadsOrFirstFrame) {
+TEST(MovingRegionsTest, DoesNotDependOnThreadsOrFirstFrame) {
   const Film film{.step = 0.0, .noise = 1.0};
   constexpr int kLater = 3, kCount = 24, kFarthest = 8;
   const Found found = Find(film, 0, kCount, 1), later = Find(film, kLater, kCount, 3);
@@ -131,7 +131,7 @@ TEST(MovingRegions, DoNotDependOnThreadsOrFirstFrame) {
   EXPECT_GT(found.motion.moving_share, 0.01);
 }
 
-TEST(MovingRegions, ModelsOfTwoFrames) {
+TEST(MovingRegionsTest, ClassifiesCameraMotion) {
   const Film still{.step = 0.0}, turning{.step = 0.0, .turn = {0.0, 0.01, 0.0}}, moving;
   EXPECT_EQ(CompareFrames(still.Luminance(3), still.Luminance(5)).motion, CameraMotion::kStill);
   EXPECT_EQ(CompareFrames(turning.Luminance(3), turning.Luminance(5)).motion, CameraMotion::kTurn);
@@ -142,7 +142,7 @@ TEST(MovingRegions, ModelsOfTwoFrames) {
   EXPECT_THROW(CompareFrames(Image(320, 240, 1), Image(300, 240, 1)), Error);
 }
 
-TEST(MovingRegions, FlatAndSingleFramesGiveNothing) {
+TEST(MovingRegionsTest, FindsNothingInFlatOrSingleFrames) {
   ThreadPool pool(2);
   for (const int count : {0, 1, 5}) {
     int handed_over = 0;
@@ -158,7 +158,7 @@ TEST(MovingRegions, FlatAndSingleFramesGiveNothing) {
   }
 }
 
-TEST(MovingRegions, CanBeCancelled) {
+TEST(MovingRegionsTest, CanBeCancelled) {
   ThreadPool pool(2);
   CancellationToken cancel;
   cancel.Cancel();
@@ -168,7 +168,7 @@ TEST(MovingRegions, CanBeCancelled) {
       Error);
 }
 
-TEST(FootRow, IsTheLowestRowOfTheLargestRegion) {
+TEST(FootRowTest, IsLowestRowOfLargestRegion) {
   Image moving(100, 50, 1);
   EXPECT_LT(FootRow(moving), 0.0);
   moving.At(0, 49, 3) = 1.0f;  // a speck

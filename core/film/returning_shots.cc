@@ -10,11 +10,11 @@
 namespace color3d {
 namespace {
 
-constexpr double kLeastFound = 0.15;  // share of the frame
+constexpr double kMinFound = 0.15;  // share of the frame
 
 }  // namespace
 
-std::vector<int> MiddlesWithoutKey(const std::vector<int>& shot, const std::vector<int>& keys) {
+std::vector<int> UnkeyedShotMiddles(const std::vector<int>& shot, const std::vector<int>& keys) {
   std::map<int, std::vector<int>> shots;
   for (size_t i = 0; i < shot.size(); ++i) shots[shot[i]].push_back(static_cast<int>(i));
   for (const int key : keys) shots.erase(shot[key]);
@@ -53,7 +53,7 @@ std::optional<FilmKey> ReturningShots::KeyAt(int frame) const {
     colors[i] = CarryIntoReappearing(keys_[i], *regions_[i], *luminance, options_, cancel_);
   });
   std::optional<FilmKey> found;
-  double most = kLeastFound;
+  double most = kMinFound;
   for (CarriedColor& color : colors) {
     const double share = Coverage(color, kDecisiveConfidence);
     if (share <= most) continue;

@@ -50,7 +50,7 @@ class ReturningShotsTest : public ::testing::Test {
   }
   const Place one_{1}, other_{2};
   mutable std::array<std::atomic<int>, 9> reads_{};  // of each frame
-  // A place, another place, the first one again, and a flash.
+  // Shots of a place, another place, the first place again, and a flash.
   const FilmFrames frames_{{0, 0, 0, 1, 1, 2, 2, 2, 3}, [this](int frame) {
                              ++reads_[frame];
                              const bool elsewhere = frame == 3 || frame == 4;
@@ -60,7 +60,7 @@ class ReturningShotsTest : public ::testing::Test {
   CancellationToken cancel_;
 };
 
-TEST_F(ReturningShotsTest, ReturningPlaceTakesItsColors) {
+TEST_F(ReturningShotsTest, ReusesColorsOfReturningPlace) {
   const auto found = Find(6, {KeyAt(3, -30.0f), KeyAt(1, 30.0f)});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->frame, 6);
@@ -68,7 +68,7 @@ TEST_F(ReturningShotsTest, ReturningPlaceTakesItsColors) {
   const Image& a = found->color.ab;
   EXPECT_NEAR(a.At(0, kHeight / 2, 60), 30.0f, 0.1f);
   EXPECT_EQ(found->color.confidence.At(0, kHeight / 2, a.width - 2), 0.0f)
-      << "what the key frame does not show";
+      << "not visible in the key frame";
 }
 
 TEST_F(ReturningShotsTest, DoesNotMatchOtherPlaces) {
@@ -87,11 +87,11 @@ TEST_F(ReturningShotsTest, ComputesFeaturesOncePerKeyFrame) {
   EXPECT_EQ(reads_[1], 1);
 }
 
-TEST(ReturningShots, LooksAtShotsWithoutKeyFrameOnly) {
+TEST(MiddlesWithoutKeyTest, ListsShotsWithoutKeyFrame) {
   const std::vector<int> shot = {0, 0, 0, 1, 1, 5, 2, 5, 5, 7};
-  EXPECT_EQ(MiddlesWithoutKey(shot, {1}), (std::vector<int>{4, 7}));
-  EXPECT_EQ(MiddlesWithoutKey(shot, {1, 8}), (std::vector<int>{4}));
-  EXPECT_TRUE(MiddlesWithoutKey(shot, {1, 3, 5}).empty());
+  EXPECT_EQ(UnkeyedShotMiddles(shot, {1}), (std::vector<int>{4, 7}));
+  EXPECT_EQ(UnkeyedShotMiddles(shot, {1, 8}), (std::vector<int>{4}));
+  EXPECT_TRUE(UnkeyedShotMiddles(shot, {1, 3, 5}).empty());
 }
 
 }  // namespace

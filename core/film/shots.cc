@@ -16,9 +16,9 @@ constexpr int kMaxShiftPx = 5;           // between thumbnails, in a fast pan
 constexpr double kCutUnlikeness = 0.55;
 constexpr double kCutOverUsual = 2.5;
 constexpr int kUsualFrames = 6;  // to either side
-constexpr int kMostAlien = 2;    // successive torn frames
+constexpr int kMaxAlien = 2;     // successive torn frames
 
-Image Normalised(const Image& image) {
+Image Normalized(const Image& image) {
   const TonesOfPicture tones(image);
   Image out = image;
   const double scale = 1.0 / std::max(kBlankDeviation, tones.deviation);
@@ -39,8 +39,8 @@ double Difference(const Image& one, const Image& other, int dx, int dy) {
   return sum / (static_cast<double>(x1 - x0) * (y1 - y0));
 }
 
-// Unlikeness of two normalised pictures.
-double UnlikenessOf(const Image& one, const Image& other) {
+// ShotDissimilarity of two normalised pictures.
+double UnlikenessOfNormalized(const Image& one, const Image& other) {
   double best = 1e9;
   const int limit_x = std::min(kMaxShiftPx, one.width / 4),
             limit_y = std::min(kMaxShiftPx, one.height / 4);
@@ -65,12 +65,12 @@ double Usual(const std::vector<double>& steps, int k) {
 
 }  // namespace
 
-double Unlikeness(const Image& one, const Image& other) {
+double ShotDissimilarity(const Image& one, const Image& other) {
   if (one.channels != 1 || other.channels != 1 || one.width != other.width ||
       one.height != other.height || one.Empty()) {
-    throw InvalidArgument("shots are found in pictures of one channel and one size");
+    throw InvalidArgument("the frames of a film must have one channel and equal sizes");
   }
-  return UnlikenessOf(Normalised(one), Normalised(other));
+  return UnlikenessOfNormalized(Normalized(one), Normalized(other));
 }
 
 FilmShots FindShots(const std::vector<Image>& thumbnails) {
@@ -79,23 +79,23 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   result.fault.assign(count, FrameFault::kNone);
   result.shot.assign(count, 0);
   std::vector<int> kept;  // frames that are not blank
-  std::vector<Image> normalised;
+  std::vector<Image> normalized;
   for (int i = 0; i < count; ++i) {
     const Image& image = thumbnails[i];
     if (image.channels != 1 || image.width != thumbnails[0].width ||
         image.height != thumbnails[0].height || image.Empty()) {
-      throw InvalidArgument("shots are found in pictures of one channel and one size");
+      throw InvalidArgument("the frames of a film must have one channel and equal sizes");
     }
     if (TonesOfPicture(image).deviation < kBlankDeviation) {
       result.fault[i] = FrameFault::kBlank;
     } else {
       kept.push_back(i);
-      normalised.push_back(Normalised(image));
+      normalized.push_back(Normalized(image));
     }
   }
   std::vector<double> steps;  // between kept frames k and k + 1
   for (size_t k = 0; k + 1 < kept.size(); ++k) {
-    steps.push_back(UnlikenessOf(normalised[k], normalised[k + 1]));
+    steps.push_back(UnlikenessOfNormalized(normalized[k], normalized[k + 1]));
   }
   const auto is_cut = [&](int k) {
     return steps[k] > kCutUnlikeness && steps[k] > kCutOverUsual * Usual(steps, k);
@@ -105,9 +105,10 @@ FilmShots FindShots(const std::vector<Image>& thumbnails) {
   std::vector<bool> cut(steps.size(), false);
   for (int k = 0; k < count_of_steps; ++k) cut[k] = is_cut(k);
   for (int k = 0; k < count_of_steps; ++k) {
-    for (int aliens = 1; cut[k] && aliens <= kMostAlien && k + aliens < count_of_steps; ++aliens) {
+    for (int aliens = 1; cut[k] && aliens <= kMaxAlien && k + aliens < count_of_steps; ++aliens) {
       if (!cut[k + aliens]) continue;
-      if (UnlikenessOf(normalised[k], normalised[k + aliens + 1]) > kCutUnlikeness) continue;
+      if (UnlikenessOfNormalized(normalized[k], normalized[k + aliens + 1]) > kCutUnlikeness)
+        continue;
       for (int i = 1; i <= aliens; ++i) result.fault[kept[k + i]] = FrameFault::kAlien;
       std::fill_n(cut.begin() + k, aliens + 1, false);
     }

@@ -16,7 +16,7 @@ namespace {
 
 using testing::ElementsAre;
 
-// Another place for each `seed`. `shift`: of the camera, px; `gain`: exposure.
+// A different place for each `seed`. `shift`: of the camera, px; `gain`: exposure.
 Image Place(int seed, double shift, double gain = 1.0) {
   Image image(64, 40, 1);
   for (int y = 0; y < image.height; ++y) {
@@ -33,7 +33,7 @@ Image Place(int seed, double shift, double gain = 1.0) {
   return image;
 }
 
-TEST(Shots, FindsCutsAndIgnoresMotion) {
+TEST(ShotsTest, FindsCutsAndIgnoresMotion) {
   std::vector<Image> frames;
   for (int i = 0; i < 10; ++i) frames.push_back(Place(1, 1.5 * i));
   for (int i = 0; i < 7; ++i) frames.push_back(Place(2, -2.5 * i));
@@ -49,7 +49,7 @@ TEST(Shots, FindsCutsAndIgnoresMotion) {
   EXPECT_THAT(shots.cuts, ElementsAre(10, 17, 18));
 }
 
-TEST(Shots, FaultyFramesDoNotCutShots) {
+TEST(ShotsTest, KeepsShotsAcrossFaultyFrames) {
   std::vector<Image> frames;
   for (int i = 0; i < 12; ++i) frames.push_back(Place(1, i, 1.0 + 0.2 * (i % 2)));  // it flickers
   frames[3] = Image(64, 40, 1, 0.5f);
@@ -66,8 +66,8 @@ TEST(Shots, FaultyFramesDoNotCutShots) {
   EXPECT_EQ(shots.shot[8], 3);
 }
 
-TEST(Shots, TwoTornFramesDoNotCutShots) {
-  for (const int second : {9, 10}) {  // torn alike, or each in its own way
+TEST(ShotsTest, KeepsShotsAcrossTwoTornFrames) {
+  for (const int second : {9, 10}) {  // two equal or different torn frames
     std::vector<Image> frames;
     for (int i = 0; i < 14; ++i) frames.push_back(Place(1, i));
     frames[5] = Place(9, 0);
@@ -80,7 +80,7 @@ TEST(Shots, TwoTornFramesDoNotCutShots) {
   }
 }
 
-TEST(Shots, FindsShortShots) {
+TEST(ShotsTest, FindsShortShots) {
   std::vector<Image> frames;
   for (int i = 0; i < 8; ++i) frames.push_back(Place(1, i));
   for (int i = 0; i < 2; ++i) frames.push_back(Place(9, i));
@@ -90,7 +90,7 @@ TEST(Shots, FindsShortShots) {
   EXPECT_THAT(shots.fault, testing::Each(FrameFault::kNone));
 }
 
-TEST(Shots, TakesFewFramesAndRefusesBadOnes) {
+TEST(ShotsTest, AcceptsFewFramesAndRefusesBadOnes) {
   EXPECT_EQ(FindShots({}).count, 0);
   EXPECT_EQ(FindShots({Place(1, 0)}).count, 1);
   EXPECT_EQ(FindShots({Image(64, 40, 1, 0.0f)}).count, 1);
@@ -100,7 +100,7 @@ TEST(Shots, TakesFewFramesAndRefusesBadOnes) {
 }
 
 // Real films; cuts were counted by eye.
-TEST(Shots, RealFilms) {
+TEST(ShotsTest, CountsCutsOfRealFilms) {
   const std::filesystem::path data = std::filesystem::path(COLOR3D_SHARED_DATA);
   if (!std::filesystem::exists(data / "video")) GTEST_SKIP() << "no films";
   const auto look = [](const Image& srgb) {

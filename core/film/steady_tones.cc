@@ -16,10 +16,10 @@
 namespace color3d {
 namespace {
 
-constexpr int kTones = 17;            // of a curve
-constexpr int kReach = 12;            // frames to either side
-constexpr int kKnots = 15;            // of a step: quantiles of the matched pixels
-constexpr double kLeastShare = 0.15;  // of the pixels that must be matched
+constexpr int kTones = 17;          // of a curve
+constexpr int kReach = 12;          // frames to either side
+constexpr int kKnots = 15;          // of a step: quantiles of the matched pixels
+constexpr double kMinShare = 0.15;  // of the pixels that must be matched
 constexpr double kCyclePx = 1.0;
 constexpr double kSteadyL = 0.2;  // jumps within the error of measurement
 
@@ -97,8 +97,7 @@ std::optional<ToneStep> StepBetween(const Image& one, const Image& next) {
   std::vector<float> of_one, of_next;
   CollectPairs(one, next, there, back, &of_one, &of_next);
   CollectPairs(next, one, back, there, &of_next, &of_one);
-  if (static_cast<double>(of_one.size()) <
-      2.0 * kLeastShare * static_cast<double>(one.PlaneSize())) {
+  if (static_cast<double>(of_one.size()) < 2.0 * kMinShare * static_cast<double>(one.PlaneSize())) {
     return std::nullopt;
   }
   return ToneStep{Quantiles(std::move(of_one)), Quantiles(std::move(of_next))};
@@ -153,7 +152,7 @@ double LineAtZero(const std::vector<double>& offsets, const std::vector<double>&
 }
 
 // Curve of the frame at `at` of a shot. steps[k] leads from its frame k to k + 1.
-ToneCurve CurveOf(const std::vector<std::optional<ToneStep>>& steps, int at) {
+ToneCurve FitCurve(const std::vector<std::optional<ToneStep>>& steps, int at) {
   const int count = static_cast<int>(steps.size()) + 1;
   const int first = std::max(0, at - kReach), last = std::min(count - 1, at + kReach);
   std::vector<double> offsets;
@@ -178,7 +177,7 @@ ToneCurve CurveOf(const std::vector<std::optional<ToneStep>>& steps, int at) {
   return curve;
 }
 
-float Under(const ToneCurve& curve, double tone) {
+float MappedTone(const ToneCurve& curve, double tone) {
   if (curve.empty()) return static_cast<float>(tone);
   const double place = std::clamp(tone, 0.0, 100.0) / 100.0 * (kTones - 1);
   const int below = std::min(static_cast<int>(place), kTones - 2);
@@ -192,13 +191,14 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
                             ThreadPool& pool,
                             const CancellationToken& cancel) {
   if (shot.size() != pictures.size()) {
-    throw InvalidArgument("there are {} frames, but shots of {}", pictures.size(), shot.size());
+    throw InvalidArgument(
+        "there are {} frames, but shot numbers of {}", pictures.size(), shot.size());
   }
   std::map<int, std::vector<int>> frames_of_shot;
   for (size_t i = 0; i < pictures.size(); ++i) {
     if (pictures[i].channels != 1 || pictures[i].Empty() ||
         pictures[i].width != pictures[0].width || pictures[i].height != pictures[0].height) {
-      throw InvalidArgument("exposure is compared in pictures of one channel and one size");
+      throw InvalidArgument("the frames of a film must have one channel and equal sizes");
     }
     frames_of_shot[shot[i]].push_back(static_cast<int>(i));
   }
@@ -218,7 +218,7 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
     if (Jumps(steps) >= kSteadyL) {
       pool.ForEach(count, [&](int64_t k, int) {
         cancel.ThrowIfCancelled();
-        result.curves[frames[k]] = CurveOf(steps, static_cast<int>(k));
+        result.curves[frames[k]] = FitCurve(steps, static_cast<int>(k));
       });
     }
     for (int64_t k = 0; k + 1 < count; ++k) {
@@ -226,8 +226,8 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
       for (int i = 0; i < kKnots; ++i) {
         const double from = steps[k]->from[i], to = steps[k]->to[i];
         before += std::abs(to - from);
-        after += std::abs(Under(result.curves[frames[k + 1]], to) -
-                          Under(result.curves[frames[k]], from));
+        after += std::abs(MappedTone(result.curves[frames[k + 1]], to) -
+                          MappedTone(result.curves[frames[k]], from));
         ++compared;
       }
     }
@@ -239,9 +239,9 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
   return result;
 }
 
-Image Toned(Image luminance, const ToneCurve& curve) {
+Image ApplyToneCurve(Image luminance, const ToneCurve& curve) {
   if (curve.empty()) return luminance;
-  for (float& v : luminance.data) v = Under(curve, v);
+  for (float& v : luminance.data) v = MappedTone(curve, v);
   return luminance;
 }
 

@@ -66,7 +66,7 @@ SteadyTones Find(const std::vector<Image>& pictures, std::vector<int> shots = {}
 double FlickerOf(const std::vector<Exposure>& exposures, const std::vector<ToneCurve>& curves) {
   const auto seen = [&](size_t frame, float tone) {
     Image pixel(1, 1, 1, exposures[frame].Of(tone));
-    return static_cast<double>(Toned(pixel, curves[frame]).data[0]);
+    return static_cast<double>(ApplyToneCurve(pixel, curves[frame]).data[0]);
   };
   double sum = 0.0;
   int count = 0;
@@ -78,7 +78,7 @@ double FlickerOf(const std::vector<Exposure>& exposures, const std::vector<ToneC
   return sum / count;
 }
 
-TEST(SteadyTones, ReducesFlickerToAFifth) {
+TEST(SteadyTonesTest, ReducesFlickerToAFifth) {
   constexpr int kFrames = 40;
   for (const double pan_px : {0.0, 1.5}) {
     const std::vector<Exposure> exposures = Flicker(kFrames);
@@ -101,14 +101,14 @@ TEST(SteadyTones, ReducesFlickerToAFifth) {
   }
 }
 
-TEST(SteadyTones, KeepsSteadyFilms) {
+TEST(SteadyTonesTest, KeepsSteadyFilms) {
   for (const double pan_px : {0.0, 1.5, 4.0}) {
     std::vector<Image> pictures;
     for (int i = 0; i < 30; ++i) pictures.push_back(Scenery(i, pan_px));
     const SteadyTones tones = Find(pictures);
     double worst = 0.0;
     for (int i = 0; i < 30; ++i) {
-      const Image steady = Toned(pictures[i], tones.curves[i]);
+      const Image steady = ApplyToneCurve(pictures[i], tones.curves[i]);
       for (size_t p = 0; p < steady.data.size(); ++p) {
         worst = std::max<double>(worst, std::abs(steady.data[p] - pictures[i].data[p]));
       }
@@ -118,18 +118,18 @@ TEST(SteadyTones, KeepsSteadyFilms) {
   }
 }
 
-TEST(SteadyTones, KeepsSlowFades) {
+TEST(SteadyTonesTest, KeepsSlowFades) {
   std::vector<Image> pictures;
   for (int i = 0; i < 30; ++i) {
     pictures.push_back(Exposed(Scenery(i, 0.5), {0.6 + 0.4 * i / 29.0, 0.0}));
   }
   const SteadyTones tones = Find(pictures);
   for (const int i : {0, 1, 10, 15, 28, 29}) {
-    EXPECT_NEAR(Toned(Image(1, 1, 1, 50.0f), tones.curves[i]).data[0], 50.0, 1.0) << i;
+    EXPECT_NEAR(ApplyToneCurve(Image(1, 1, 1, 50.0f), tones.curves[i]).data[0], 50.0, 1.0) << i;
   }
 }
 
-TEST(SteadyTones, TreatsShotsApartAndKeepsFewFrames) {
+TEST(SteadyTonesTest, TreatsShotsSeparately) {
   std::vector<Image> pictures;
   std::vector<int> shots;
   for (int i = 0; i < 20; ++i) {
@@ -140,7 +140,7 @@ TEST(SteadyTones, TreatsShotsApartAndKeepsFewFrames) {
   shots.push_back(2);
   const SteadyTones tones = Find(pictures, shots);
   for (const int i : {8, 9, 10, 11}) {
-    EXPECT_NEAR(Toned(Image(1, 1, 1, 30.0f), tones.curves[i]).data[0], 30.0, 0.5) << i;
+    EXPECT_NEAR(ApplyToneCurve(Image(1, 1, 1, 30.0f), tones.curves[i]).data[0], 30.0, 0.5) << i;
   }
   EXPECT_TRUE(tones.curves[20].empty());
   EXPECT_TRUE(Find({Scenery(0, 0.0), Scenery(1, 0.0)}).curves[0].empty());
@@ -149,7 +149,7 @@ TEST(SteadyTones, TreatsShotsApartAndKeepsFewFrames) {
   EXPECT_THROW(Find({Image(8, 8, 1), Image(8, 9, 1)}), Error);
 }
 
-TEST(SteadyTones, RealFilms) {
+TEST(SteadyTonesTest, HalvesFlickerOfRealFilms) {
   const std::filesystem::path historic = std::filesystem::path(COLOR3D_SHARED_DATA) / "historic";
   if (!std::filesystem::exists(historic)) GTEST_SKIP() << "no films";
   for (const char* film : {"film_001", "film_002", "film_003"}) {
@@ -170,7 +170,7 @@ TEST(SteadyTones, RealFilms) {
   }
 }
 
-TEST(SteadyTones, GivesFiniteCurvesForFlatFrames) {
+TEST(SteadyTonesTest, GivesFiniteCurvesForFlatFrames) {
   std::vector<Image> pictures;
   for (int i = 0; i < 8; ++i) pictures.push_back(Image(kWidth, kHeight, 1, i % 2 ? 100.0f : 0.0f));
   const SteadyTones tones = Find(pictures);

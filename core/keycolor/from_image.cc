@@ -7,6 +7,7 @@
 #include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/picture_checks.h"
 
 namespace color3d {
@@ -36,10 +37,7 @@ Image WithoutAlpha(const Image& colored) {
 }  // namespace
 
 PaintedColor KeyColorFromImage(const Image& luminance, const Image& colored) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, but has {}",
-                          luminance.channels);
-  }
+  RequireLuminance(luminance, "the colouring of the key view");
   if (colored.width != luminance.width || colored.height != luminance.height) {
     throw InvalidArgument(
         "the coloured picture is {} px, but the key view {}; save it at the size of the key view",
@@ -50,10 +48,8 @@ PaintedColor KeyColorFromImage(const Image& luminance, const Image& colored) {
     throw InvalidArgument("the coloured picture has no colour ({} channels, 3 are needed)",
                           colored.channels);
   }
-  for (float value : colored.data) {
-    if (!std::isfinite(value)) {
-      throw InvalidArgument("the coloured picture has a value that is not finite");
-    }
+  if (!IsFinite(colored)) {
+    throw InvalidArgument("the coloured picture has a value that is not finite");
   }
   PaintedColor color;
   color.painted = OpaquePart(colored);

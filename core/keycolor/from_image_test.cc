@@ -37,7 +37,7 @@ std::string MessageOf(const Image& luminance, const Image& colored) {
   return "";
 }
 
-TEST(KeyColorFromImageTest, ReturnsTheChroma) {
+TEST(KeyColorFromImageTest, ReturnsChroma) {
   const Image lab = MakeLab(60, 40);
   const auto [ab, painted] = KeyColorFromImage(LuminanceOfLab(lab), SrgbFromLab(lab));
   EXPECT_TRUE(painted.Empty());
@@ -89,7 +89,7 @@ TEST(KeyColorFromImageTest, RefusesUnrelatedPicture) {
   for (float& value : other.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
   EXPECT_NE(MessageOf(other, SrgbFromLab(lab)).find("does not resemble the key view"),
             std::string::npos);
-  // A negative of the picture is another picture, too.
+  // A negative does not correlate either.
   Image negative = LuminanceOfLab(lab);
   for (float& value : negative.data) value = 100.0f - value;
   EXPECT_NE(MessageOf(negative, SrgbFromLab(lab)), "");
@@ -103,7 +103,7 @@ TEST(KeyColorFromImageTest, AcceptsFlatPictures) {
   EXPECT_NE(MessageOf(structured, colored), "");
 }
 
-TEST(KeyColorFromImageTest, NonFiniteValuesAreRefused) {
+TEST(KeyColorFromImageTest, RefusesNonFiniteValues) {
   const Image lab = MakeLab(20, 20);
   Image colored = SrgbFromLab(lab);
   colored.data[3] = std::numeric_limits<float>::quiet_NaN();

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/picture_checks.h"
 
 namespace color3d {
@@ -25,11 +26,7 @@ void CheckPicture(const Image& picture, const char* what, const Image& original)
                           SizeText(picture),
                           SizeText(original));
   }
-  for (float value : picture.data) {
-    if (!std::isfinite(value)) {
-      throw InvalidArgument("{} has a value that is not finite", what);
-    }
-  }
+  if (!IsFinite(picture)) throw InvalidArgument("{} has a value that is not finite", what);
 }
 
 // Returns 1 where colour may change.

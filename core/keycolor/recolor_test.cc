@@ -42,7 +42,7 @@ std::string MessageOf(const Image& original, const Image& edited, const Image* m
   return "";
 }
 
-TEST(RecolorTest, ChangesOnlyInsideTheMask) {
+TEST(RecolorTest, ChangesOnlyInsideMask) {
   const Image original = SrgbFromLab(MakeLab(10, 10));
   const Image edited = SrgbFromLab(MakeLab(-15, 5));
   const Image mask = WhiteFrom(20);
@@ -77,7 +77,7 @@ TEST(RecolorTest, AcceptsEditThatRemovesColor) {
 TEST(RecolorTest, RefusesEditWithoutChange) {
   const Image original = SrgbFromLab(MakeLab(10, 10));
   EXPECT_NE(MessageOf(original, original, nullptr).find("nothing would change"), std::string::npos);
-  // It changes colour, but outside of the mask only.
+  // An edit outside the mask only.
   Image edited = MakeLab(10, 10);
   for (int y = 0; y < 30; ++y) edited.At(1, y, 3) = -20.0f;
   const Image mask = WhiteFrom(20);

@@ -72,8 +72,8 @@ Projection FitProjection(const std::vector<const ViewFeatures*>& views, int cell
   mean /= count;
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(channels, channels);
   for (const ViewFeatures* view : views) {
-    const Eigen::MatrixXd centred = Cells(*view, taken).cast<double>().colwise() - mean;
-    covariance.selfadjointView<Eigen::Lower>().rankUpdate(centred);
+    const Eigen::MatrixXd centered = Cells(*view, taken).cast<double>().colwise() - mean;
+    covariance.selfadjointView<Eigen::Lower>().rankUpdate(centered);
   }
   covariance = Eigen::MatrixXd(covariance.selfadjointView<Eigen::Lower>()) / count;
   // A constant channel has no information and must not be amplified.

@@ -44,7 +44,7 @@ std::vector<double> Distances(const std::vector<ViewFeatures>& views) {
   return Distances(views, std::vector<bool>(views.size(), true));
 }
 
-// Straight from the definition, float64, all cells and all channels.
+// By the definition, in float64, for all cells and channels.
 std::vector<double> DirectDistances(const std::vector<Image>& views) {
   const int channels = views[0].channels;
   std::vector<double> mean(channels, 0.0), deviation(channels, 0.0);
@@ -83,7 +83,7 @@ std::vector<double> DirectDistances(const std::vector<Image>& views) {
   return result;
 }
 
-TEST(FeatureDistancesTest, AgreesWithTheDefinition) {
+TEST(FeatureDistancesTest, AgreesWithDefinition) {
   const std::vector<Image> views{
       RandomGrid(5, 4, 6, 1), RandomGrid(3, 7, 6, 2), RandomGrid(4, 4, 6, 3)};
   const auto distances = Distances(Packed(views));
@@ -91,7 +91,7 @@ TEST(FeatureDistancesTest, AgreesWithTheDefinition) {
   for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(distances[i], direct[i], 2e-3);
 }
 
-TEST(FeatureDistancesTest, ViewExplainsViewThatItContains) {
+TEST(FeatureDistancesTest, IsZeroForContainedView) {
   const Image small = RandomGrid(4, 4, 5, 1);
   Image large(4, 8, 5);
   const Image extra = RandomGrid(4, 4, 5, 2);
@@ -134,8 +134,8 @@ TEST(FeatureDistancesTest, RefusesBadShapesAndStopsWhenCancelled) {
   EXPECT_THROW(Distances({Packed(Image(2, 2, 3))}, {true}, cancel), Error);
 }
 
-// Fewer cells of each view, yet the same view must win: view 7 holds a piece of every other one.
-TEST(FeatureDistancesTest, ThinningKeepsTheWinner) {
+// View 7 contains a part of every other view and must win with few cells per view, too.
+TEST(FeatureDistancesTest, KeepsBestViewWhenSubsampled) {
   for (int count : {20, 400}) {
     std::vector<Image> grids;
     for (int i = 0; i < count; ++i) {
@@ -182,7 +182,7 @@ TEST(ViewFeaturesTest, RoundTripsAndRefusesTruncatedBytes) {
   EXPECT_FALSE(ParseViewFeatures(bytes + "x"));
 }
 
-// Every beginning of the cells is spread over the picture.
+// Every prefix of the cells is spread over the picture.
 TEST(ViewFeaturesTest, SpreadsFewCellsEvenly) {
   Image grid(24, 18, 2);
   for (int y = 0; y < 18; ++y) {

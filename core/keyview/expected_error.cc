@@ -114,8 +114,7 @@ ChosenKeyViews ChooseKeyViews(const SeenSamples& seen,
       std::count(allowed.begin(), allowed.end(), true) + (first >= 0 && !allowed.at(first) ? 1 : 0);
   if (count > possible) {
     throw InvalidArgument(
-        "{} key views are asked for, but only {} views can be one (training views that show "
-        "something); ask for fewer",
+        "{} key views were requested, but only {} training views are fit to be one; request fewer",
         count,
         possible);
   }

@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 
 const std::vector<bool> kAll(6, true);
 
-// Six views around something: each shows its own samples and, of its neighbours', half.
+// Six views around an object: each shows its own samples and half of those of its neighbours.
 SeenSamples Ring() {
   SeenSamples seen(6, 8);
   for (int view = 0; view < 6; ++view) {
@@ -27,7 +27,7 @@ SeenSamples Ring() {
   return seen;
 }
 
-TEST(KeyViews, SpreadOverARingOfCameras) {
+TEST(ChooseKeyViewsTest, SpreadsOverRingOfCameras) {
   const ChosenKeyViews two = ChooseKeyViews(Ring(), {}, kAll, 2);
   EXPECT_THAT(two.views, ElementsAre(0, testing::AnyOf(2, 3, 4)));
   EXPECT_LT(two.error[1], two.error[0]);
@@ -35,12 +35,12 @@ TEST(KeyViews, SpreadOverARingOfCameras) {
   EXPECT_EQ(three.views[0], 1) << "as given";
   std::vector<int> sorted = three.views;
   std::sort(sorted.begin(), sorted.end());
-  EXPECT_THAT(sorted, ElementsAre(1, 3, 5)) << "every view is shown";
+  EXPECT_THAT(sorted, ElementsAre(1, 3, 5)) << "all samples of every view are visible";
   EXPECT_NEAR(three.error[2], kErrorSeen, 1e-9);
 }
 
-TEST(KeyViews, PreferViewsWithUnusualContent) {
-  // Nothing is known of places; view 5 looks like nothing else.
+TEST(ChooseKeyViewsTest, PrefersViewsWithUnusualContent) {
+  // Without positions; view 5 differs from all others.
   NearestDistances distances;
   for (int view = 0; view < 6; ++view) {
     distances.owner.push_back(view);
@@ -55,7 +55,7 @@ TEST(KeyViews, PreferViewsWithUnusualContent) {
   EXPECT_THAT(chosen.views, testing::UnorderedElementsAre(5, testing::Lt(5)));
 }
 
-TEST(KeyViews, RespectAllowedViewsAndRefuseTooMany) {
+TEST(ChooseKeyViewsTest, RespectsAllowedViews) {
   std::vector<bool> allowed = kAll;
   allowed[0] = allowed[3] = false;
   const ChosenKeyViews four = ChooseKeyViews(Ring(), {}, allowed, 4);
@@ -64,11 +64,11 @@ TEST(KeyViews, RespectAllowedViewsAndRefuseTooMany) {
     ChooseKeyViews(Ring(), {}, allowed, 5);
     FAIL();
   } catch (const Error& e) {
-    EXPECT_THAT(e.what(), HasSubstr("5 key views are asked for, but only 4"));
+    EXPECT_THAT(e.what(), HasSubstr("5 key views were requested, but only 4"));
   }
 }
 
-TEST(KeyViews, EachOneLowersTheExpectedError) {
+TEST(ChooseKeyViewsTest, LowersExpectedErrorWithEachView) {
   Random random(5);
   SeenSamples seen(12, 16);
   for (int by = 0; by < 12; ++by) {
@@ -82,13 +82,13 @@ TEST(KeyViews, EachOneLowersTheExpectedError) {
   for (size_t i = 1; i < chosen.error.size(); ++i) EXPECT_LT(chosen.error[i], chosen.error[i - 1]);
 }
 
-TEST(NextKeyView, IsBestViewThatIsNoKeyView) {
+TEST(NextKeyViewTest, ReturnsBestOtherView) {
   const auto next = NextKeyView(Ring(), {}, {0});
   ASSERT_TRUE(next.has_value());
   EXPECT_THAT(next->view, testing::AnyOf(2, 3, 4)) << "not a neighbour";
   EXPECT_NEAR(next->error_now, ExpectedError(Ring(), {}, {0}), 1e-9);
   EXPECT_NEAR(next->error_with, ExpectedError(Ring(), {}, {0, next->view}), 1e-9);
-  EXPECT_FALSE(NextKeyView(Ring(), {}, {0, 2, 4}).has_value()) << "all is shown";
+  EXPECT_FALSE(NextKeyView(Ring(), {}, {0, 2, 4}).has_value()) << "all samples are visible";
   EXPECT_FALSE(NextKeyView(SeenSamples(1, 0), {}, {0}).has_value());
 }
 

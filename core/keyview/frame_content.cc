@@ -68,7 +68,7 @@ double MeanLaplacian(const Image& image) {
 }
 
 // 1 - E[(difference of neighbours)^2] / (2 variance).
-double NeighbourCorrelation(const Image& image, double variance) {
+double NeighborCorrelation(const Image& image, double variance) {
   double sum = 0.0;
   double count = 0.0;
   for (int y = 0; y < image.height; ++y) {
@@ -82,7 +82,7 @@ double NeighbourCorrelation(const Image& image, double variance) {
 }
 
 template <typename Field>
-double MedianOf(const std::vector<FrameContent>& frames, Field field) {
+double MedianField(const std::vector<FrameContent>& frames, Field field) {
   std::vector<double> values;
   for (const FrameContent& frame : frames) values.push_back(frame.*field);
   return Median(std::move(values));
@@ -94,15 +94,15 @@ struct MedianContent {
   double structure = 0.0;
 };
 MedianContent Medians(const std::vector<FrameContent>& frames) {
-  return {MedianOf(frames, &FrameContent::detail), MedianOf(frames, &FrameContent::structure)};
+  return {MedianField(frames, &FrameContent::detail),
+          MedianField(frames, &FrameContent::structure)};
 }
 
 }  // namespace
 
 FrameContent MeasureFrameContent(const Image& luminance) {
   if (luminance.Empty() || luminance.channels != 1) {
-    throw InvalidArgument("a frame must be a picture of 1 channel, this one has {}",
-                          luminance.channels);
+    throw InvalidArgument("a frame must have 1 channel, but has {}", luminance.channels);
   }
   Image finite = luminance;
   for (float& value : finite.data) value = std::isfinite(value) ? value : 0.0f;
@@ -110,7 +110,7 @@ FrameContent MeasureFrameContent(const Image& luminance) {
   return {std::sqrt(whole.variance),
           MeanLaplacian(finite),
           StructuredShare(finite),
-          NeighbourCorrelation(finite, whole.variance)};
+          NeighborCorrelation(finite, whole.variance)};
 }
 
 std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames,
@@ -127,7 +127,7 @@ std::vector<std::string> UnfitFrames(const std::vector<FrameContent>& frames,
     own.structure = std::max(own.structure, 0.5 * all.structure);
     own.detail = std::max(own.detail, 0.5 * all.detail);
   }
-  const double correlation = MedianOf(frames, &FrameContent::correlation);
+  const double correlation = MedianField(frames, &FrameContent::correlation);
   size_t unfit = 0;
   for (size_t i = 0; i < frames.size(); ++i) {
     const FrameContent& frame = frames[i];

@@ -12,7 +12,7 @@
 namespace color3d {
 namespace {
 
-// Something like a photograph: blobs of many sizes. `seed` moves them.
+// Resembles a photograph: waves of many lengths, with phases by `seed`.
 Image Scenery(uint64_t seed, int width = 384, int height = 288) {
   Random random(seed);
   Image image(width, height, 1, 50.0f);
@@ -73,7 +73,7 @@ std::string ReasonFor(const Image& image, int others) {
   return UnfitFrames(frames).back();
 }
 
-TEST(UnfitFramesTest, NamesEachDefectBesideTwoGoodViews) {
+TEST(UnfitFramesTest, NamesEachDefect) {
   Image half = Scenery(3);
   for (int y = 0; y < half.height; ++y) {
     for (int x = 0; x < half.width / 2; ++x) half.At(0, y, x) = 0.0f;
@@ -103,7 +103,8 @@ TEST(UnfitFramesTest, ComparesFramesWithinShot) {
   EXPECT_EQ(unfit[12], "blurred");
   EXPECT_EQ(unfit[13], "much of it is empty");
   EXPECT_EQ(unfit[15], "blank");
-  EXPECT_EQ(UnfitFrames(frames)[9], "much of it is empty") << "beside the others of one shot";
+  EXPECT_EQ(UnfitFrames(frames)[9], "much of it is empty")
+      << "compared with all frames as one shot";
 }
 
 TEST(UnfitFramesTest, KeepsAllFramesWhenAllAreUnfit) {

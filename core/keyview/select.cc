@@ -60,7 +60,7 @@ Matrix UnitRows(const std::vector<std::vector<double>>& descriptors,
   return rows;
 }
 
-std::vector<int> IndicesOf(const std::vector<bool>& kept) {
+std::vector<int> KeptIndices(const std::vector<bool>& kept) {
   std::vector<int> indices;
   for (size_t i = 0; i < kept.size(); ++i) {
     if (kept[i]) indices.push_back(static_cast<int>(i));
@@ -209,12 +209,11 @@ GuardedViews GuardViews(const std::vector<std::vector<double>>& descriptors,
   options.Validate();
   CheckLengths(descriptors);
   if (!groups.empty() && groups.size() != descriptors.size()) {
-    throw InvalidArgument("groups are given for {} views, descriptors are there for {}",
-                          groups.size(),
-                          descriptors.size());
+    throw InvalidArgument(
+        "there are groups for {} views, but descriptors for {}", groups.size(), descriptors.size());
   }
   if (!unfit.empty() && unfit.size() != descriptors.size()) {
-    throw InvalidArgument("frames were examined for {} views, descriptors are there for {}",
+    throw InvalidArgument("there are frame checks for {} views, but descriptors for {}",
                           unfit.size(),
                           descriptors.size());
   }
@@ -243,7 +242,7 @@ std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& des
                                      ThreadPool& pool) {
   options.Validate();
   CheckLengths(descriptors);
-  const std::vector<int> indices = IndicesOf(kept);
+  const std::vector<int> indices = KeptIndices(kept);
   const Matrix cosines = Cosines(UnitRows(descriptors, indices), pool);
   std::vector<double> entropies(descriptors.size(), 0.0);
   pool.ForEach(static_cast<int64_t>(indices.size()), [&](int64_t i, int) {
@@ -255,7 +254,7 @@ std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& des
 KeyViewSelection RankViews(GuardedViews guarded, const std::vector<double>& scores) {
   if (scores.size() != guarded.views.size()) {
     throw InvalidArgument(
-        "there are scores for {} of {} views", scores.size(), guarded.views.size());
+        "there are scores for {} views, but {} views", scores.size(), guarded.views.size());
   }
   std::vector<double> kept_scores;
   for (RankedView& view : guarded.views) {

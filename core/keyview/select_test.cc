@@ -40,7 +40,7 @@ KeyViewSelection SelectByEntropy(const Matrix& features, const KeyViewOptions& o
   return RankViews(std::move(guarded), scores);
 }
 
-// The formula as METHOD.md writes it, step by step.
+// The formula of STILL.md, step by step.
 std::vector<double> DirectEntropies(const Matrix& features, double temperature, bool exclude_self) {
   const size_t n = features.size();
   Matrix unit = features;
@@ -68,7 +68,7 @@ std::vector<double> DirectEntropies(const Matrix& features, double temperature, 
   return entropies;
 }
 
-TEST(SelectKeyViewTest, EntropyAgreesWithTheDirectFormula) {
+TEST(SelectKeyViewTest, EntropyAgreesWithDirectFormula) {
   for (uint64_t seed = 1; seed <= 5; ++seed) {
     for (bool exclude_self : {false, true}) {
       for (double temperature : {1.0, 0.1}) {
@@ -105,14 +105,14 @@ TEST(SelectKeyViewTest, IgnoresScaleOfDescriptors) {
   }
 }
 
-TEST(SelectKeyViewTest, TinyTemperatureIsFinite) {
+TEST(SelectKeyViewTest, StaysFiniteAtTinyTemperature) {
   KeyViewOptions options = Entropy();
   options.temperature = 1e-6;
   const KeyViewSelection selection = SelectByEntropy(RandomFeatures(8, 4, 2), options);
   for (const RankedView& view : selection.ranking) EXPECT_TRUE(std::isfinite(view.score));
 }
 
-TEST(SelectKeyViewTest, DuplicatesTieToTheLowestIndex) {
+TEST(SelectKeyViewTest, PrefersLowestIndexAmongDuplicates) {
   const Matrix features(7, std::vector<double>{0.3, 0.5, 0.1});
   const KeyViewSelection selection = SelectByEntropy(features, {});
   EXPECT_EQ(selection.index, 0);
@@ -161,7 +161,7 @@ Matrix ChainWithOutlier(int views, int outlier) {
   for (double& value : common) value = random.NextNormal();
   for (int i = 0; i < views; ++i) {
     for (int d = 0; d < dims; ++d) {
-      // A bump that moves along the chain on top of what all views share.
+      // A bump that moves along the chain, added to features that all views share.
       const double position = (i + 0.5) / views * dims;
       const double bump = 4.0 * std::exp(-std::pow((d - position) / 60.0, 2));
       features[i][d] = i == outlier ? random.NextNormal() : common[d] + bump;
@@ -173,7 +173,7 @@ Matrix ChainWithOutlier(int views, int outlier) {
 TEST(SelectKeyViewTest, OutlierGuardExcludesOutlier) {
   const Matrix features = ChainWithOutlier(100, 37);
   const KeyViewSelection unguarded = SelectByEntropy(features, Entropy());
-  EXPECT_EQ(unguarded.index, 37) << "the formula's weakness that the guard is for";
+  EXPECT_EQ(unguarded.index, 37) << "the guard compensates for this weakness of the formula";
   KeyViewOptions options = Entropy();
   options.outlier_guard = true;
   const KeyViewSelection guarded = SelectByEntropy(features, options);
@@ -186,7 +186,7 @@ TEST(SelectKeyViewTest, OutlierGuardExcludesOutlier) {
   EXPECT_EQ(guarded.ranking[0].set_aside, "");
 }
 
-// The frame must neither win nor change what the others score.
+// An excluded frame neither wins nor changes the scores of the others.
 TEST(SelectKeyViewTest, ExcludedViewDoesNotChangeOtherScores) {
   Matrix features = RandomFeatures(12, 5, 4);
   const KeyViewSelection before = SelectByEntropy(features, {});
@@ -205,28 +205,28 @@ TEST(SelectKeyViewTest, ExcludedViewDoesNotChangeOtherScores) {
   }
 }
 
-TEST(SelectKeyViewTest, KeepsAllFramesWhenEveryOneIsUnfit) {
+TEST(SelectKeyViewTest, KeepsAllFramesWhenAllAreUnfit) {
   const Matrix features = RandomFeatures(3, 4, 8);
   const GuardedViews guarded = GuardViews(features, {"blank", "blank", "blank"}, {});
   EXPECT_EQ(guarded.Kept(), std::vector<bool>(3, true));
 }
 
 TEST(SelectKeyViewTest, ComparesViewsWithinGroup) {
-  Matrix features;  // of two shots, the second with a frame that is unlike its others
+  Matrix features;  // of two shots, the second with an outlier
   for (int i = 0; i < 12; ++i) features.push_back({1.0, 0.01 * (i % 3), 0.0});
   for (int i = 0; i < 5; ++i) features.push_back({0.0, 1.0, 0.01 * (i % 2)});
   features.push_back({0.0, 0.5, -1.0});
   std::vector<int> shots(12, 4);
   shots.resize(features.size(), 7);
   const std::vector<bool> alone = GuardViews(features, {}, {}).Kept();
-  EXPECT_EQ(std::count(alone.begin() + 12, alone.end(), true), 0) << "the shorter shot is unlike";
+  EXPECT_EQ(std::count(alone.begin() + 12, alone.end(), true), 0) << "the shorter shot differs";
   const std::vector<bool> kept = GuardViews(features, {}, {}, shots).Kept();
   EXPECT_EQ(std::count(kept.begin(), kept.end() - 1, true), 17);
   EXPECT_FALSE(kept.back());
   EXPECT_THROW(GuardViews(features, {}, {}, {1, 2}), Error);
 }
 
-TEST(SelectKeyViewTest, MarginIsRelativeToTheMedian) {
+TEST(SelectKeyViewTest, MeasuresMarginRelativeToMedian) {
   GuardedViews guarded = GuardViews(RandomFeatures(5, 4, 8), {}, {.outlier_guard = false});
   const KeyViewSelection selection = RankViews(guarded, {1.0, 9.0, 7.0, 3.0, 5.0});
   EXPECT_EQ(selection.index, 1);
@@ -246,7 +246,7 @@ TEST(SelectKeyViewTest, RefusesBadOptionsAndShapes) {
 }
 
 // Bars: 300 views in less than 10 ms (with room for a busy machine), 2000 in seconds.
-TEST(SelectKeyViewTest, EntropyOfManyViewsIsQuick) {
+TEST(SelectKeyViewTest, ComputesManyEntropiesQuickly) {
   const auto seconds = [](int views) {
     const Matrix features = RandomFeatures(views, 384, 5);
     const std::vector<bool> kept(features.size(), true);

@@ -24,7 +24,7 @@ int64_t StrideFor(const std::vector<std::vector<int>>& tracks) {
 void CheckTrack(const std::vector<int>& track, size_t views) {
   for (int view : track) {
     if (view >= 0 && static_cast<size_t>(view) < views) continue;
-    throw InvalidArgument("a track names view {}, the scene has {}", view, views);
+    throw InvalidArgument("a track refers to view {}, but the scene has {} views", view, views);
   }
 }
 
@@ -58,8 +58,8 @@ std::vector<double> TrackCoverage(const std::vector<std::vector<int>>& tracks,
   return scores;
 }
 
-std::string WhyTracksAreNoUse(const std::vector<std::vector<int>>& tracks,
-                              const std::vector<bool>& kept) {
+std::string UnusableTracksReason(const std::vector<std::vector<int>>& tracks,
+                                 const std::vector<bool>& kept) {
   std::vector<double> points(kept.size(), 0.0);
   for (const auto& track : tracks) {
     CheckTrack(track, kept.size());

@@ -17,7 +17,7 @@ std::vector<double> TrackCoverage(const std::vector<std::vector<int>>& tracks,
 
 // Returns the reason why tracks are unusable (too few points in too many views), or an empty
 // string.
-std::string WhyTracksAreNoUse(const std::vector<std::vector<int>>& tracks,
-                              const std::vector<bool>& kept);
+std::string UnusableTracksReason(const std::vector<std::vector<int>>& tracks,
+                                 const std::vector<bool>& kept);
 
 }  // namespace color3d

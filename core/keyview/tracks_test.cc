@@ -12,7 +12,7 @@ namespace {
 
 using Tracks = std::vector<std::vector<int>>;
 
-TEST(TrackCoverageTest, AgreesWithTheDefinition) {
+TEST(TrackCoverageTest, AgreesWithDefinition) {
   // Points: 3 in views 0 and 1, 1 in 1 and 2, 2 in 2 alone.
   const Tracks tracks{{0, 1}, {0, 1}, {0, 1}, {1, 2}, {2}, {2}};
   const std::vector<double> scores = TrackCoverage(tracks, {true, true, true});
@@ -28,8 +28,9 @@ TEST(TrackCoverageTest, IgnoresExcludedViews) {
   EXPECT_EQ(scores[1], 0.0);
 }
 
-// Along a path, each point seen from a window of views, the middle shares with the most.
-TEST(TrackCoverageTest, PrefersMiddleOfAPath) {
+// Along a path, each point is seen by a window of views, so that the middle view shares most
+// points.
+TEST(TrackCoverageTest, PrefersMiddleOfPath) {
   Tracks tracks;
   for (int start = -4; start < 31; ++start) {
     for (int copy = 0; copy < 30; ++copy) {
@@ -46,16 +47,16 @@ TEST(TrackCoverageTest, PrefersMiddleOfAPath) {
 
 TEST(TrackCoverageTest, ReportsUnusableTracks) {
   const std::vector<bool> kept(4, true);
-  EXPECT_NE(WhyTracksAreNoUse({}, kept), "");
-  EXPECT_EQ(WhyTracksAreNoUse(Tracks(20, {0, 1, 2}), kept), "");
-  EXPECT_NE(WhyTracksAreNoUse(Tracks(19, {0, 1, 2}), kept), "");
-  EXPECT_NE(WhyTracksAreNoUse(Tracks(100, {2}), kept), "");
+  EXPECT_NE(UnusableTracksReason({}, kept), "");
+  EXPECT_EQ(UnusableTracksReason(Tracks(20, {0, 1, 2}), kept), "");
+  EXPECT_NE(UnusableTracksReason(Tracks(19, {0, 1, 2}), kept), "");
+  EXPECT_NE(UnusableTracksReason(Tracks(100, {2}), kept), "");
   EXPECT_THROW(TrackCoverage({{0, 4}}, kept), Error);
   EXPECT_THROW(TrackCoverage({{-1}}, kept), Error);
 }
 
-// 2000 views, 200 000 points that a tenth of them see: thinned out, not hours.
-TEST(TrackCoverageTest, LongTracksOfManyViewsTakeSeconds) {
+// 50,000 points, each seen by 200 of 2000 views.
+TEST(TrackCoverageTest, HandlesLongTracksOfManyViews) {
   Tracks tracks(50'000);
   for (size_t p = 0; p < tracks.size(); ++p) {
     for (int view = static_cast<int>(p % 1800); tracks[p].size() < 200; ++view) {

@@ -17,7 +17,7 @@ CellBank RandomBank() {
 }
 
 // By the definition, in float64.
-TEST(CellMatchesTest, NearestCellsVote) {
+TEST(CellMatchesTest, LetsNearestCellsVote) {
   const CellBank bank = RandomBank();
   const torch::Tensor queries = torch::rand({200, 16});
   const torch::Tensor all =
@@ -46,7 +46,7 @@ TEST(CellMatchesTest, NearestCellsVote) {
   }
 }
 
-// Seven cells of one hue, five of another, all alike to the query.
+// Seven cells of one hue and five of another, all at equal distance from the query.
 TEST(CellMatchesTest, MedianChoosesBetweenTwoHues) {
   CellBank bank{torch::zeros({12, 8}), torch::zeros({12, 2}), torch::ones({12})};
   for (int64_t i = 0; i < 12; ++i) bank.colors[i][i < 7 ? 0 : 1] = 60.0;
@@ -56,7 +56,7 @@ TEST(CellMatchesTest, MedianChoosesBetweenTwoHues) {
   const CellMatches median = MatchCells({query}, bank, {.median_steps = 50});
   EXPECT_GT(median.ab[0][0].item<float>(), 55.0f);
   EXPECT_LT(median.ab[0][1].item<float>(), 5.0f);
-  // The spread is that of the voters, whatever the answer.
+  // The variance is that of the voters in both cases.
   EXPECT_EQ(median.variance[0].item<float>(), mean.variance[0].item<float>());
 }
 
@@ -75,7 +75,7 @@ TEST(CellMatchesTest, CellsWithoutWeightGiveGray) {
   EXPECT_FALSE(matches.bank_distance.defined());
 }
 
-// [n,4] of random places, of which every third is not known.
+// Random positions [n,4], every third unknown.
 torch::Tensor RandomPlaces(int64_t count) {
   torch::Tensor places = torch::rand({count, 4}) * 4.0 - 2.0;
   for (int64_t i = 0; i < count; ++i) places[i][3] = i % 3 == 2 ? 0.0 : 1.0;
@@ -107,7 +107,7 @@ TEST(CellMatchesTest, PrefersCellsNearInSpace) {
   EXPECT_GT(moved, 50);
 }
 
-TEST(CellMatchesTest, UnknownPositionsChangeNothing) {
+TEST(CellMatchesTest, IgnoresUnknownPositions) {
   CellBank bank = RandomBank();
   CellQueries queries{torch::rand({50, 16}), RandomPlaces(50)};
   const VoteOptions options{.position_weight = 1.0};

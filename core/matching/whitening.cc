@@ -65,9 +65,9 @@ Whitening::Projection Fit(const torch::Tensor& samples,
   const torch::Tensor x = samples.to(torch::kFloat64);
   const torch::Tensor mean = x.mean(0);
   const torch::Tensor inverse_deviation = (x.var(0, /*unbiased=*/false) + kVarianceFloor).rsqrt();
-  const torch::Tensor standardised = (x - mean) * inverse_deviation;
+  const torch::Tensor standardized = (x - mean) * inverse_deviation;
   const torch::Tensor covariance =
-      torch::mm(standardised.t(), standardised) / static_cast<double>(x.size(0));
+      torch::mm(standardized.t(), standardized) / static_cast<double>(x.size(0));
   dims = std::min<int64_t>(dims, x.size(1));
   const torch::Tensor directions =
       noise.defined()
@@ -81,7 +81,7 @@ Whitening::Projection Fit(const torch::Tensor& samples,
   return projection;
 }
 
-int64_t ColumnsOf(const std::vector<Whitening::Projection>& projections) {
+int64_t PaddedColumns(const std::vector<Whitening::Projection>& projections) {
   int64_t columns = 0;
   for (const Whitening::Projection& projection : projections) columns += projection.matrix.size(1);
   return (columns + kVectorColumns - 1) / kVectorColumns * kVectorColumns;
@@ -100,11 +100,11 @@ Whitening::Whitening(const std::vector<torch::Tensor>& blocks,
     const torch::Tensor noise = view_noise.empty() ? torch::Tensor() : view_noise[i];
     projections_.push_back(Fit(blocks[i], options.dims_per_block, share, noise));
   }
-  columns_ = ColumnsOf(projections_);
+  columns_ = PaddedColumns(projections_);
 }
 
 Whitening::Whitening(std::vector<Projection> projections)
-    : projections_(std::move(projections)), columns_(ColumnsOf(projections_)) {}
+    : projections_(std::move(projections)), columns_(PaddedColumns(projections_)) {}
 
 torch::Tensor Whitening::Apply(const std::vector<torch::Tensor>& blocks) const {
   std::vector<torch::Tensor> parts;

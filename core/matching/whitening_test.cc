@@ -20,7 +20,7 @@ class WhiteningTest : public testing::Test {
   WhiteningTest() { torch::manual_seed(3); }
 };
 
-TEST_F(WhiteningTest, EachBlockHasItsShareOfTheDistance) {
+TEST_F(WhiteningTest, GivesEachBlockItsShareOfDistance) {
   const auto blocks = Blocks();
   const std::vector<torch::Tensor> noise{torch::eye(6, torch::kFloat64) * 0.3,
                                          torch::eye(2, torch::kFloat64)};
@@ -30,7 +30,7 @@ TEST_F(WhiteningTest, EachBlockHasItsShareOfTheDistance) {
   for (const auto& view_noise : {std::vector<torch::Tensor>(), noise}) {
     const Whitening whitening(blocks, kStridePx, options, view_noise);
     const torch::Tensor variance = whitening.Apply(blocks).var(0, /*unbiased=*/false);
-    // The floor of the eigenvalues takes a little.
+    // The floor of the eigenvalues reduces it a little.
     EXPECT_NEAR(variance.slice(0, 0, 6).sum().item<double>(), 0.25, 0.02);
     EXPECT_NEAR(variance.slice(0, 6, 8).sum().item<double>(), 2.0, 0.05);
   }
@@ -43,9 +43,9 @@ TEST_F(WhiteningTest, MeasuresDistancesInUnitsOfNoise) {
   const torch::Tensor noise = torch::mm(mixing, mixing.t()) + 0.5 * torch::eye(6, torch::kFloat64);
   const Whitening whitening(blocks, kStridePx, {}, {noise, torch::eye(2, torch::kFloat64)});
   const torch::Tensor deviation = blocks[0].to(torch::kFloat64).var(0, /*unbiased=*/false).sqrt();
-  const torch::Tensor standardised = noise / torch::outer(deviation, deviation);
+  const torch::Tensor standardized = noise / torch::outer(deviation, deviation);
   const torch::Tensor softened =
-      standardised + 0.005 * standardised.diagonal().mean() * torch::eye(6, torch::kFloat64);
+      standardized + 0.005 * standardized.diagonal().mean() * torch::eye(6, torch::kFloat64);
   const torch::Tensor inverse = torch::inverse(softened);
   std::vector<double> ratios;
   for (int64_t i = 0; i < 20; ++i) {
@@ -58,8 +58,8 @@ TEST_F(WhiteningTest, MeasuresDistancesInUnitsOfNoise) {
   for (const double ratio : ratios) EXPECT_NEAR(ratio / ratios.front(), 1.0, 1e-4);
 }
 
-TEST_F(WhiteningTest, KeepsDirectionsAboveTheNoise) {
-  // The first channel varies most, but as much from view to view as from place to place.
+TEST_F(WhiteningTest, KeepsDirectionsAboveNoise) {
+  // The first channel varies most, but as much between views as between places.
   const torch::Tensor tap = torch::randn({kCells, 3}) * torch::tensor({10.0f, 1.0f, 1.0f});
   const torch::Tensor noise = torch::diag(torch::tensor({100.0, 1.0, 0.01}, torch::kFloat64));
   WhiteningOptions options;

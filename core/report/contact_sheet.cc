@@ -40,7 +40,7 @@ struct Grid {
   int Y(int i) const { return i / columns * RowHeight(); }
 };
 
-Grid GridOf(const std::vector<SheetView>& views, int columns) {
+Grid LayOutGrid(const std::vector<SheetView>& views, int columns) {
   // Wide pictures need less height than their width.
   double tallest = 0.5;
   for (const SheetView& view : views) {
@@ -133,8 +133,8 @@ Image DrawContactSheet(const ContactSheet& sheet) {
       static_cast<int>(std::ceil(std::sqrt(1.6 * static_cast<double>(sheet.ranked.size())))),
       kMinColumns,
       kMaxColumns);
-  const Grid ranked = GridOf(sheet.ranked, columns);
-  const Grid aside = GridOf(sheet.set_aside, kAsideColumns);
+  const Grid ranked = LayOutGrid(sheet.ranked, columns);
+  const Grid aside = LayOutGrid(sheet.set_aside, kAsideColumns);
   const int line = kTextPx + kGapPx;
   SheetPainter painter(2 * kMarginPx + kTitlePx + line + 2 * kGapPx + ranked.Height() + line +
                        (sheet.set_aside.empty() ? 0 : 2 * line + aside.Height()));

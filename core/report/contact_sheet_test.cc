@@ -36,7 +36,7 @@ TEST(ContactSheetTest, DrawsAnyNumberOfViewsOfAnyShape) {
   }
 }
 
-TEST(ContactSheetTest, FramesNothingIfNothingIsChosen) {
+TEST(ContactSheetTest, DrawsNoFrameWithoutChosenView) {
   const ContactSheet sheet{"", "", {View("a", 1, 1), View("b", 3000, 1)}, 0, {}, 0};
   EXPECT_EQ(CountOrange(DrawContactSheet(sheet)), 0);
   EXPECT_THROW(DrawContactSheet({}), Error);

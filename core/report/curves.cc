@@ -17,7 +17,7 @@ std::string NumberText(double value) {
   return std::string(buffer, end);
 }
 
-double NumberFrom(std::string_view text, int line) {
+double ParseNumber(std::string_view text, int line) {
   double value = 0.0;
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
   if (result.ec != std::errc() || result.ptr != text.data() + text.size()) {
@@ -35,7 +35,7 @@ constexpr size_t kPrefix = sizeof(double) + sizeof(uint64_t);
 }
 
 // Seconds and the length of the CSV. Requires: `bytes` has at least kPrefix bytes.
-std::pair<double, uint64_t> PrefixOf(std::string_view bytes, const std::string& stage) {
+std::pair<double, uint64_t> ParsePrefix(std::string_view bytes, const std::string& stage) {
   double seconds = 0.0;
   uint64_t length = 0;
   std::memcpy(&seconds, bytes.data(), sizeof(seconds));
@@ -78,10 +78,10 @@ std::vector<CurvePoint> CurvesFromCsv(std::string_view csv) {
     }
     CurvePoint point;
     point.stage = fields[0];
-    point.seconds = NumberFrom(fields[1], line_number);
-    point.iteration = static_cast<int64_t>(NumberFrom(fields[2], line_number));
+    point.seconds = ParseNumber(fields[1], line_number);
+    point.iteration = static_cast<int64_t>(ParseNumber(fields[2], line_number));
     point.error_name = fields[3];
-    point.value = NumberFrom(fields[4], line_number);
+    point.value = ParseNumber(fields[4], line_number);
     points.push_back(std::move(point));
   }
   return points;
@@ -139,7 +139,7 @@ void CurveRecorder::Save(const std::string& state) { checkpoints_.Save(Facts() +
 std::optional<std::string> CurveRecorder::Load() {
   std::optional<std::string> bytes = checkpoints_.Load();
   if (!bytes || bytes->size() < kPrefix) return std::nullopt;
-  const auto [seconds, length] = PrefixOf(*bytes, stage_);
+  const auto [seconds, length] = ParsePrefix(*bytes, stage_);
   TakeFacts(seconds, std::string_view(*bytes).substr(kPrefix, length));
   return bytes->substr(kPrefix + length);
 }
@@ -172,7 +172,7 @@ bool CurveRecorder::LoadTo(const std::filesystem::path& file) {
     in.read(facts.data(), static_cast<std::streamsize>(length));
     if (!in) ThrowDamaged(stage_);
   }
-  const auto [seconds, csv_length] = PrefixOf(facts, stage_);
+  const auto [seconds, csv_length] = ParsePrefix(facts, stage_);
   TakeFacts(seconds, std::string_view(facts).substr(kPrefix, csv_length));
   std::filesystem::resize_file(file, size - sizeof(length) - length);
   return true;

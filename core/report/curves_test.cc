@@ -20,7 +20,7 @@ class MemoryCheckpoints : public CheckpointStore {
   std::optional<std::string> saved_;
 };
 
-TEST(Curves, CsvRoundTrip) {
+TEST(CurvesTest, ReadsWrittenCsv) {
   const std::vector<CurvePoint> points{{"geometry", 0.1, 10, "train_l1_l", 1e-7},
                                        {"geometry", 12.75, 1000000, "heldout_psnr_l_db", 22.5}};
   const auto back = CurvesFromCsv(CurvesToCsv(points));
@@ -32,14 +32,14 @@ TEST(Curves, CsvRoundTrip) {
   EXPECT_THROW(CurvesFromCsv("a,x,1,e,2\n"), Error);
 }
 
-TEST(CurveRecorder, ResumesPointsAndClock) {
+TEST(CurveRecorderTest, ResumesPointsAndClock) {
   MemoryCheckpoints checkpoints;
   NullObserver outer;
   {
     CurveRecorder first("stage", outer, checkpoints);
     EXPECT_FALSE(first.Load().has_value());
     first.OnError(1, "error", 3.0);
-    first.OnError(2, "error", std::numeric_limits<double>::quiet_NaN());  // never recorded
+    first.OnError(2, "error", std::numeric_limits<double>::quiet_NaN());  // not recorded
     first.Save("trainer state");
   }
   CurveRecorder second("stage", outer, checkpoints);
@@ -52,7 +52,7 @@ TEST(CurveRecorder, ResumesPointsAndClock) {
   EXPECT_GE(points[1].seconds, points[0].seconds);
 }
 
-TEST(CurveRecorder, ResumesStatesInFiles) {
+TEST(CurveRecorderTest, ResumesStatesInFiles) {
   MemoryCheckpoints checkpoints;
   NullObserver outer;
   const ScratchFolder scratch;
@@ -79,7 +79,7 @@ TEST(CurveRecorder, ResumesStatesInFiles) {
   EXPECT_FALSE(fresh.LoadTo(file));
 }
 
-TEST(CurveRecorder, RefusesADamagedCheckpoint) {
+TEST(CurveRecorderTest, RefusesDamagedCheckpoint) {
   MemoryCheckpoints checkpoints;
   NullObserver outer;
   checkpoints.Save(std::string(16, '\xff'));

@@ -1,10 +1,10 @@
 // Opens a report in headless Chromium at the widths of a phone and a desktop, light and dark, and
-// tells what is to be seen, as JSON on stdout.
+// prints measurements as JSON on stdout.
 //   node look_at_report.mjs CHROMIUM PAGE [SCREENSHOTS]
-// errors: of the console; requests: other than for what is inside of the page; looks: for each look
-// the page's width beyond the window (px), the time of the first paint (ms), the background, how
-// much of the picture before is shown after the slider went to 20 %, and pictures without a text.
-// With a third argument every look leaves PNG files there.
+// errors: messages of the console. requests: requests to other files or hosts. looks: for each width
+// and scheme, the page's width beyond the window (px), the time of the first paint (ms), the
+// background, the visible part of the picture before with the slider at 20 %, and the number of
+// pictures without alternative text. With SCREENSHOTS, each look is saved there as PNG files.
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 

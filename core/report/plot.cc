@@ -1,8 +1,9 @@
 #include "core/report/plot.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <map>
 
 namespace color3d {
@@ -16,12 +17,6 @@ constexpr double kTop = 28.0;
 constexpr double kBottom = 34.0;
 constexpr int kColors = 6;
 constexpr size_t kColumns = 4;  // of a file
-
-std::string Format(const char* format, double value) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof(buffer), format, value);
-  return buffer;
-}
 
 // Returns 1, 2 or 5 times a power of ten, for at most about four intervals.
 double TickStep(double span) {
@@ -92,8 +87,10 @@ std::string Markers(const PlotSeries& series,
   if (series.points.size() > kMaxMarkers) return svg;
   for (const CurvePoint& p : series.points) {
     if (log_seconds && !(p.seconds > 0.0)) continue;
-    svg += "<circle class=\"" + color + "\" r=\"2\" cx=\"" + Format("%.1f", x_axis.Px(p.seconds)) +
-           "\" cy=\"" + Format("%.1f", y_axis.Px(p.value)) + "\"/>";
+    svg += fmt::format("<circle class=\"{}\" r=\"2\" cx=\"{:.1f}\" cy=\"{:.1f}\"/>",
+                       color,
+                       x_axis.Px(p.seconds),
+                       y_axis.Px(p.value));
   }
   return svg;
 }
@@ -112,20 +109,31 @@ bool LegendAtTop(const Plot& plot, const Axis& y_axis) {
 
 std::string TextAt(
     double x, double y, const char* anchor, const char* style, const std::string& t) {
-  return std::string("<text class=\"") + style + "\" text-anchor=\"" + anchor + "\" x=\"" +
-         Format("%.1f", x) + "\" y=\"" + Format("%.1f", y) + "\">" + t + "</text>";
+  return fmt::format("<text class=\"{}\" text-anchor=\"{}\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>",
+                     style,
+                     anchor,
+                     x,
+                     y,
+                     t);
+}
+
+std::string Line(const std::string& color, double x1, double x2, double y) {
+  return fmt::format(
+      "<line class=\"{0}\" x1=\"{1:.1f}\" x2=\"{2:.1f}\" y1=\"{3:.1f}\" y2=\"{3:.1f}\"/>",
+      color,
+      x1,
+      x2,
+      y);
 }
 
 std::string Grid(const Axis& x_axis, const Axis& y_axis) {
   std::string svg;
   for (const double v : y_axis.ticks()) {
-    const std::string y = Format("%.1f", y_axis.Px(v));
-    svg += "<line class=\"g\" x1=\"" + Format("%.1f", kLeft) + "\" x2=\"" +
-           Format("%.1f", kWidth - kRight) + "\" y1=\"" + y + "\" y2=\"" + y + "\"/>" +
-           TextAt(kLeft - 5, y_axis.Px(v) + 3.5, "end", "n", Format("%.4g", v));
+    svg += Line("g", kLeft, kWidth - kRight, y_axis.Px(v)) +
+           TextAt(kLeft - 5, y_axis.Px(v) + 3.5, "end", "n", fmt::format("{:.4g}", v));
   }
   for (const double v : x_axis.ticks()) {
-    svg += TextAt(x_axis.Px(v), kHeight - kBottom + 14, "middle", "n", Format("%.4g", v));
+    svg += TextAt(x_axis.Px(v), kHeight - kBottom + 14, "middle", "n", fmt::format("{:.4g}", v));
   }
   return svg + TextAt(kWidth - kRight, kHeight - 6, "end", "n", "seconds");
 }
@@ -150,51 +158,38 @@ std::string PlotElements(const Plot& plot) {
   svg += Grid(x_axis, y_axis);
   const bool legend_at_top = LegendAtTop(plot, y_axis);
   for (size_t i = 0; i < plot.series.size(); ++i) {
-    const std::string color = std::string("c c") + std::to_string(i % kColors);
-    svg += "<polyline class=\"" + color + "\" points=\"";
+    const std::string color = fmt::format("c c{}", i % kColors);
+    svg += fmt::format("<polyline class=\"{}\" points=\"", color);
     for (const CurvePoint& p : plot.series[i].points) {
       if (!shown(p)) continue;
-      svg += Format("%.1f", x_axis.Px(p.seconds)) + "," + Format("%.1f", y_axis.Px(p.value)) + " ";
+      svg += fmt::format("{:.1f},{:.1f} ", x_axis.Px(p.seconds), y_axis.Px(p.value));
     }
     svg += "\"/>" + Markers(plot.series[i], color, x_axis, y_axis, plot.log_seconds);
     if (plot.series.size() == 1) continue;
     const double row = 14.0 * static_cast<double>(i);
     const double y = legend_at_top ? kTop + 10.0 + row : kHeight - kBottom - 8.0 - row;
-    svg += "<line class=\"" + color + "\" x1=\"" + Format("%.1f", kWidth - kRight - 18) +
-           "\" x2=\"" + Format("%.1f", kWidth - kRight) + "\" y1=\"" + Format("%.1f", y - 3.5) +
-           "\" y2=\"" + Format("%.1f", y - 3.5) + "\"/>" +
+    svg += Line(color, kWidth - kRight - 18, kWidth - kRight, y - 3.5) +
            TextAt(kWidth - kRight - 22, y, "end", "n", EscapeHtml(plot.series[i].name));
   }
   return svg;
 }
 
 std::string ViewBox(double width, double height) {
-  return "viewBox=\"0 0 " + Format("%.0f", width) + " " + Format("%.0f", height) + "\"";
+  return fmt::format("viewBox=\"0 0 {:.0f} {:.0f}\"", width, height);
 }
 
 }  // namespace
 
 std::string EscapeHtml(const std::string& text) {
+  constexpr std::string_view kSpecial = "&<>\"'";
+  constexpr const char* kEntities[] = {"&amp;", "&lt;", "&gt;", "&quot;", "&#39;"};
   std::string escaped;
-  for (char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += c;
+  for (const char c : text) {
+    const size_t special = kSpecial.find(c);
+    if (special == std::string_view::npos) {
+      escaped += c;
+    } else {
+      escaped += kEntities[special];
     }
   }
   return escaped;
@@ -211,10 +206,11 @@ std::string PlotsSvg(const std::vector<CurvePoint>& points) {
   std::string svg;
   for (const std::string& title : order) {
     if (groups[title].size() < 2) continue;
-    svg += "<svg class=\"plot\" role=\"img\" aria-label=\"" + EscapeHtml(title) + "\" " +
-           ViewBox(kWidth, kHeight) + ">" +
-           PlotElements({title, {{"", groups[title]}}, false, title.ends_with("residual")}) +
-           "</svg>";
+    svg += fmt::format(
+        "<svg class=\"plot\" role=\"img\" aria-label=\"{}\" {}>{}</svg>",
+        EscapeHtml(title),
+        ViewBox(kWidth, kHeight),
+        PlotElements({title, {{"", groups[title]}}, false, title.ends_with("residual")}));
   }
   return svg;
 }
@@ -232,9 +228,10 @@ std::string FigureSvg(const std::vector<Plot>& plots) {
                     ".c3{stroke:#b9770e}.c4{stroke:#6c3483}.c5{stroke:#333}"
                     "</style><rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>";
   for (size_t i = 0; i < plots.size(); ++i) {
-    svg += "<g transform=\"translate(" + Format("%.0f", kWidth * static_cast<double>(i % columns)) +
-           "," + Format("%.0f", kHeight * static_cast<double>(i / columns)) + ")\">" +
-           PlotElements(plots[i]) + "</g>";
+    svg += fmt::format("<g transform=\"translate({:.0f},{:.0f})\">{}</g>",
+                       kWidth * static_cast<double>(i % columns),
+                       kHeight * static_cast<double>(i / columns),
+                       PlotElements(plots[i]));
   }
   return svg + "</svg>\n";
 }

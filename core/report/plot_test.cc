@@ -5,7 +5,7 @@
 namespace color3d {
 namespace {
 
-TEST(Plot, FigureDrawsEverySeriesOnItsAxes) {
+TEST(PlotTest, DrawsEverySeries) {
   Plot plot{"fox & friends", {{"fast", {}}, {"best", {}}}, /*log_seconds=*/true};
   plot.series[0].points = {{"", 0.0, 0, "", 9.0}, {"", 2.0, 10, "", 22.0}, {"", 9.0, 50, "", 26.0}};
   plot.series[1].points = {{"", 40.0, 100, "", 27.0}};
@@ -14,13 +14,13 @@ TEST(Plot, FigureDrawsEverySeriesOnItsAxes) {
   EXPECT_NE(svg.find(">best<"), std::string::npos);
   EXPECT_EQ(svg.find("nan"), std::string::npos);
   EXPECT_EQ(svg.find("inf"), std::string::npos);
-  // 0 s has no place on a logarithmic axis: two points are left of the first line.
+  // A logarithmic axis has no 0 s: two points of the first line remain.
   const size_t begin = svg.find("points=\"") + 8;
   const std::string first = svg.substr(begin, svg.find('/', begin) - begin);
   EXPECT_EQ(std::count(first.begin(), first.end(), ','), 2);
 }
 
-TEST(Plot, ShowsSinglePointsAndPlacesTheLegend) {
+TEST(PlotTest, ShowsSinglePointsAndPlacesLegend) {
   Plot falling{"error", {{"x", {{"", 1.0, 0, "", 9.0}, {"", 9.0, 0, "", 1.0}}}, {"y", {}}}};
   falling.series[1].points = {{"", 5.0, 0, "", 2.0}};
   const std::string low = FigureSvg({falling});
@@ -36,7 +36,7 @@ TEST(Plot, ShowsSinglePointsAndPlacesTheLegend) {
   EXPECT_GT(legend_y(FigureSvg({falling})), 120.0);
 }
 
-TEST(Plot, ResidualsHaveALogarithmicAxis) {
+TEST(PlotTest, DrawsResidualsOnLogarithmicAxis) {
   const std::vector<CurvePoint> points{{"key", 1.0, 1, "relative_residual", 0.1},
                                        {"key", 2.0, 2, "relative_residual", 0.0001}};
   EXPECT_NE(PlotsSvg(points).find(">0.001<"), std::string::npos);

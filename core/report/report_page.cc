@@ -1,7 +1,8 @@
 #include "core/report/report_page.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <cstdio>
 
 #include "core/base/text/base64.h"
 #include "core/report/page_style.h"
@@ -10,21 +11,19 @@
 namespace color3d {
 namespace {
 
-std::string Number(double value) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof(buffer), "%.4g", value);
-  return buffer;
-}
+std::string Number(double value) { return fmt::format("{:.4g}", value); }
 
 std::string DataUrl(const std::string& bytes) {
   const bool png = bytes.size() > 1 && bytes[1] == 'P';
-  return std::string("data:image/") + (png ? "png" : "jpeg") + ";base64," + Base64(bytes);
+  return fmt::format("data:image/{};base64,{}", png ? "png" : "jpeg", Base64(bytes));
 }
 
 std::string PictureHtml(const ReportPicture& picture) {
-  return "<figure><img loading=\"lazy\" decoding=\"async\" alt=\"" + EscapeHtml(picture.caption) +
-         "\" src=\"" + DataUrl(picture.bytes) + "\"><figcaption>" + EscapeHtml(picture.caption) +
-         "</figcaption></figure>";
+  return fmt::format(
+      "<figure><img loading=\"lazy\" decoding=\"async\" alt=\"{0}\" src=\"{1}\">"
+      "<figcaption>{0}</figcaption></figure>",
+      EscapeHtml(picture.caption),
+      DataUrl(picture.bytes));
 }
 
 std::string RowHtml(const ReportRow& row) {
@@ -57,8 +56,7 @@ bool CanBeCompared(const ReportView& view) {
 }
 
 std::string Dimensions(const ReportView::Picture& picture) {
-  return " width=\"" + std::to_string(picture.width) + "\" height=\"" +
-         std::to_string(picture.height) + "\"";
+  return fmt::format(" width=\"{}\" height=\"{}\"", picture.width, picture.height);
 }
 
 // Holds the pictures shown first; the script takes the others from ViewsHtml.
@@ -70,21 +68,27 @@ std::string SliderHtml(const std::vector<ReportView>& views) {
       *std::find_if(first->pictures.begin(), first->pictures.end(), [](const auto& picture) {
         return picture.role != "render";
       });
-  std::string html =
+  std::string html = fmt::format(
       "<section aria-label=\"Before and after\"><div class=\"compare\" id=\"compare\" "
-      "style=\"--at:50%;--shape:" +
-      std::to_string(render.width) + "/" + std::to_string(render.height) + "\"><img alt=\"" +
-      EscapeHtml(render.caption) + "\"" + Dimensions(render) + " src=\"" + DataUrl(render.bytes) +
-      "\"><img class=\"over\" alt=\"" + EscapeHtml(before.caption) + "\"" + Dimensions(before) +
-      " src=\"" + DataUrl(before.bytes) + "\"><div class=\"bar\"></div><span class=\"l\">" +
-      EscapeHtml(before.short_name) + "</span><span class=\"r\">" + EscapeHtml(render.short_name) +
-      "</span></div><div class=\"controls\" id=\"controls\" hidden><label>Before and after"
+      "style=\"--at:50%;--shape:{}/{}\"><img alt=\"{}\"{} src=\"{}\">"
+      "<img class=\"over\" alt=\"{}\"{} src=\"{}\"><div class=\"bar\"></div>"
+      "<span class=\"l\">{}</span><span class=\"r\">{}</span></div>"
+      "<div class=\"controls\" id=\"controls\" hidden><label>Before and after"
       "<input type=\"range\" id=\"at\" min=\"0\" max=\"100\" value=\"50\"></label>"
-      "<label>View<select id=\"view\">";
+      "<label>View<select id=\"view\">",
+      render.width,
+      render.height,
+      EscapeHtml(render.caption),
+      Dimensions(render),
+      DataUrl(render.bytes),
+      EscapeHtml(before.caption),
+      Dimensions(before),
+      DataUrl(before.bytes),
+      EscapeHtml(before.short_name),
+      EscapeHtml(render.short_name));
   for (size_t i = 0; i < views.size(); ++i) {
     if (!CanBeCompared(views[i])) continue;
-    html +=
-        "<option value=\"" + std::to_string(i) + "\">" + EscapeHtml(views[i].name) + "</option>";
+    html += fmt::format("<option value=\"{}\">{}</option>", i, EscapeHtml(views[i].name));
   }
   return html + "</select></label><label>Compare with<select id=\"pair\"><option value=\"" +
          before.role + "\"></option></select></label></div></section>";
@@ -92,17 +96,22 @@ std::string SliderHtml(const std::vector<ReportView>& views) {
 
 std::string ViewsHtml(const std::vector<ReportView>& views) {
   if (views.empty()) return "";
-  std::string html = ChapterStart("Views") + "<details><summary>All " +
-                     std::to_string(views.size()) + " views side by side</summary>";
+  std::string html =
+      ChapterStart("Views") +
+      fmt::format("<details><summary>All {} views side by side</summary>", views.size());
   for (size_t i = 0; i < views.size(); ++i) {
-    html += "<article id=\"view-" + std::to_string(i) + "\"><h3>" + EscapeHtml(views[i].name) +
-            "</h3><div class=\"row\">";
+    html += fmt::format(
+        "<article id=\"view-{}\"><h3>{}</h3><div class=\"row\">", i, EscapeHtml(views[i].name));
     for (const ReportView::Picture& picture : views[i].pictures) {
-      html += "<figure><img loading=\"lazy\" decoding=\"async\" data-role=\"" + picture.role +
-              "\" data-short=\"" + EscapeHtml(picture.short_name) + "\"" + Dimensions(picture) +
-              " alt=\"" + EscapeHtml(picture.caption + ", " + views[i].name) + "\" src=\"" +
-              DataUrl(picture.bytes) + "\"><figcaption>" + EscapeHtml(picture.caption) +
-              "</figcaption></figure>";
+      html += fmt::format(
+          "<figure><img loading=\"lazy\" decoding=\"async\" data-role=\"{}\" data-short=\"{}\"{} "
+          "alt=\"{}\" src=\"{}\"><figcaption>{}</figcaption></figure>",
+          picture.role,
+          EscapeHtml(picture.short_name),
+          Dimensions(picture),
+          EscapeHtml(picture.caption + ", " + views[i].name),
+          DataUrl(picture.bytes),
+          EscapeHtml(picture.caption));
     }
     html += "</div></article>";
   }
@@ -113,9 +122,9 @@ std::string KeyViewHtml(const std::string& title, const ReportKeyView& key) {
   std::string html = ChapterStart(title) + Paragraphs(key.notes);
   html += RowHtml(key.pictures);
   if (!key.color_facts.empty()) {
-    html += "<h3>Its colour</h3><div class=\"box\"><table>";
+    html += "<h3>Colour</h3><div class=\"box\"><table>";
     for (const auto& [name, text] : key.color_facts) {
-      html += "<tr><td>" + EscapeHtml(name) + "</td><td>" + EscapeHtml(text) + "</td></tr>";
+      html += fmt::format("<tr><td>{}</td><td>{}</td></tr>", EscapeHtml(name), EscapeHtml(text));
     }
     html += "</table></div>";
   }
@@ -151,8 +160,8 @@ std::string SectionHtml(const ReportSection& section) {
   if (!section.legend.empty()) {
     html += "<ul class=\"legend\">";
     for (const ReportShade& shade : section.legend) {
-      html += "<li><i class=\"" + shade.kind + "\"></i><span>" + EscapeHtml(shade.text) +
-              "</span></li>";
+      html += fmt::format(
+          "<li><i class=\"{}\"></i><span>{}</span></li>", shade.kind, EscapeHtml(shade.text));
     }
     html += "</ul>";
   }
@@ -169,15 +178,12 @@ std::string SectionHtml(const ReportSection& section) {
 
 std::string Seconds(double seconds) { return seconds > 0.0 ? Number(seconds) : std::string(); }
 
-// Steps left out come first: no other chapter shows them.
+// Steps left out come first, since no other chapter shows them.
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
   double saved = 0.0;
   for (const PlanStep& step : plan) saved += step.needed ? 0.0 : step.estimated_seconds;
-  std::string html = ChapterStart("What the plan left out");
-  char text[120];
-  std::snprintf(
-      text, sizeof(text), "That saved about %.1f s, as far as it can be estimated before.", saved);
-  if (saved >= 0.05) html += Paragraphs({text});
+  std::string html = ChapterStart("Steps left out");
+  if (saved >= 0.05) html += fmt::format("<p>Estimated time saved: {:.1f} s.</p>", saved);
   ReportTable left_out{{"step", "saved, s"}, {}};
   ReportTable done{{"step", "estimate, s", "measured, s"}, {}};
   for (const PlanStep& step : plan) {
@@ -191,7 +197,8 @@ std::string PlanHtml(const std::vector<PlanStep>& plan) {
   }
   if (!left_out.rows.empty()) html += TableHtml(left_out);
   if (!done.rows.empty()) {
-    html += "<details><summary>What it did, and why</summary>" + TableHtml(done) + "</details>";
+    html += "<details><summary>Steps carried out, with reasons</summary>" + TableHtml(done) +
+            "</details>";
   }
   return html + "</section>";
 }
@@ -206,21 +213,20 @@ std::string StagesHtml(const std::vector<ReportStage>& stages) {
   std::string html = ChapterStart("Seconds by stage") +
                      "<div class=\"box\"><table><tr><th scope=\"col\">stage</th>"
                      "<th scope=\"col\" class=\"v\">seconds</th><td></td></tr>";
-  char row[96];
   for (const ReportStage& stage : stages) {
     std::string name = stage.name;
     std::replace(name.begin(), name.end(), '_', ' ');
-    html += "<tr><td>" + EscapeHtml(name);
-    std::snprintf(row, sizeof(row), "</td><td class=\"v\">%.1f</td><td>", stage.seconds);
-    html += row;
-    std::snprintf(row,
-                  sizeof(row),
-                  "<meter aria-hidden=\"true\" value=\"%.3f\"></meter></td></tr>",
-                  stage.seconds / longest);
-    html += row;
+    html += fmt::format(
+        "<tr><td>{}</td><td class=\"v\">{:.1f}</td><td>"
+        "<meter aria-hidden=\"true\" value=\"{:.3f}\"></meter></td></tr>",
+        EscapeHtml(name),
+        stage.seconds,
+        stage.seconds / longest);
   }
-  std::snprintf(row, sizeof(row), "<tr><th scope=\"row\">all</th><td class=\"v\">%.1f</td>", total);
-  return html + row + "<td></td></tr></table></div></section>";
+  return html + fmt::format(
+                    "<tr><th scope=\"row\">all</th><td class=\"v\">{:.1f}</td><td></td></tr>"
+                    "</table></div></section>",
+                    total);
 }
 
 std::string FiguresHtml(const std::vector<std::pair<std::string, double>>& metrics) {
@@ -233,7 +239,7 @@ std::string FiguresHtml(const std::vector<std::pair<std::string, double>>& metri
 
 std::string RepeatHtml(const ReportData& data) {
   if (data.facts.empty() && data.repeat.empty()) return "";
-  std::string html = ChapterStart("To repeat it");
+  std::string html = ChapterStart("Reproduction");
   html += Paragraphs(data.repeat_notes);
   if (!data.repeat.empty()) {
     html += "<pre>";
@@ -243,9 +249,11 @@ std::string RepeatHtml(const ReportData& data) {
   if (data.facts.empty()) return html + "</section>";
   html += "<div class=\"box\"><table>";
   for (const auto& [name, text] : data.facts) {
-    html += "<tr><th scope=\"row\">" + EscapeHtml(name) +
-            "</th><td style=\"overflow-wrap:anywhere;min-width:9rem\">" + EscapeHtml(text) +
-            "</td></tr>";
+    html += fmt::format(
+        "<tr><th scope=\"row\">{}</th>"
+        "<td style=\"overflow-wrap:anywhere;min-width:9rem\">{}</td></tr>",
+        EscapeHtml(name),
+        EscapeHtml(text));
   }
   return html + "</table></div></section>";
 }
@@ -254,7 +262,7 @@ std::string HeadlineHtml(const ReportData& data) {
   if (data.headline.empty()) return "";
   std::string html = "<dl class=\"figures\">";
   for (const auto& [name, text] : data.headline) {
-    html += "<div><dt>" + EscapeHtml(name) + "</dt><dd>" + EscapeHtml(text) + "</dd></div>";
+    html += fmt::format("<div><dt>{}</dt><dd>{}</dd></div>", EscapeHtml(name), EscapeHtml(text));
   }
   return html + "</dl>";
 }
@@ -262,16 +270,18 @@ std::string HeadlineHtml(const ReportData& data) {
 }  // namespace
 
 std::string RenderReport(const ReportData& data) {
-  std::string html =
+  std::string html = fmt::format(
       "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
-      "<link rel=\"icon\" href=\"data:,\"><title>" +
-      EscapeHtml(data.title) + "</title><style>" + kReportStyle + "</style></head><body><header>";
-  html += "<h1>" + EscapeHtml(data.title) + "</h1><p>" + EscapeHtml(data.summary) +
-          "</p></header><main>" + SliderHtml(data.views);
+      "<link rel=\"icon\" href=\"data:,\"><title>{0}</title><style>{1}</style></head><body><header>"
+      "<h1>{0}</h1><p>{2}</p></header><main>{3}",
+      EscapeHtml(data.title),
+      kReportStyle,
+      EscapeHtml(data.summary),
+      SliderHtml(data.views));
   if (!data.view_page.empty()) {
-    html += "<p><a class=\"go\" href=\"" + EscapeHtml(data.view_page) +
-            "\">Look at the scene in 3D</a></p>";
+    html += fmt::format("<p><a class=\"go\" href=\"{}\">Look at the scene in 3D</a></p>",
+                        EscapeHtml(data.view_page));
   }
   html += HeadlineHtml(data);
   for (const std::string& warning : data.warnings) {

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-TEST(Report, EscapesTextAndPlotsConstantCurves) {
+TEST(ReportPageTest, EscapesTextAndPlotsConstantCurves) {
   ReportData data;
   data.title = "<script>";
   data.views = {
@@ -21,7 +21,7 @@ TEST(Report, EscapesTextAndPlotsConstantCurves) {
   EXPECT_NE(html.find("polyline"), std::string::npos);
 }
 
-TEST(Report, SectionsShowTheirParts) {
+TEST(ReportPageTest, ShowsPartsOfSections) {
   ReportData data;
   data.sections.push_back(
       {"Where <colour> comes from",
@@ -36,12 +36,12 @@ TEST(Report, SectionsShowTheirParts) {
   EXPECT_NE(html.find("61 % seen &amp; verified."), std::string::npos);
   EXPECT_NE(html.find("<tr><td>a&lt;b.jpg</td><td class=\"v\">0.61</td></tr>"), std::string::npos);
   EXPECT_NE(html.find("personalize: heldout_l1"), std::string::npos);
-  EXPECT_EQ(PlotsSvg({{"evaluate", 1.0, 0, "delta_e00", 2.0}}), "") << "one point is no curve";
+  EXPECT_EQ(PlotsSvg({{"evaluate", 1.0, 0, "delta_e00", 2.0}}), "") << "single points are left out";
   EXPECT_NE(html.find("data:image/png"), std::string::npos);
   EXPECT_TRUE(html.find("<h2>Empty one</h2></section></main></body>") != std::string::npos) << html;
 }
 
-TEST(Report, SliderStartsAtFirstComparableView) {
+TEST(ReportPageTest, SliderStartsAtFirstComparableView) {
   ReportData data;
   data.views = {{"alone.jpg", {{"render", "ours", "rendered", "\xff\xd8r", 4, 3}}},
                 {"both.jpg",
@@ -50,12 +50,12 @@ TEST(Report, SliderStartsAtFirstComparableView) {
   const std::string html = RenderReport(data);
   EXPECT_NE(html.find("<option value=\"1\">both.jpg</option>"), std::string::npos);
   EXPECT_EQ(html.find("<option value=\"0\">"), std::string::npos);
-  EXPECT_NE(html.find("id=\"view-1\""), std::string::npos) << "where its script looks";
+  EXPECT_NE(html.find("id=\"view-1\""), std::string::npos) << "the script looks for it";
   EXPECT_LT(html.find("id=\"compare\""), html.find("<h2>")) << "the result comes first";
   EXPECT_NE(html.find("<script>"), std::string::npos);
 }
 
-TEST(Report, ShowsPlanTimesAndCommands) {
+TEST(ReportPageTest, ShowsPlanTimesAndCommands) {
   ReportData data;
   data.plan = {{"key_view_selection", false, "the key view was given", 1.25, -1.0, ""},
                {"luminance_geometry", true, "every scene needs it", 0.0, 14.0, ""}};
@@ -63,15 +63,15 @@ TEST(Report, ShowsPlanTimesAndCommands) {
   data.facts = {{"seed", "7"}};
   data.repeat = {"color3d colorize PHOTOS -o OUT --key-view 'a<b.jpg'"};
   const std::string html = RenderReport(data);
-  EXPECT_NE(html.find("saved about 1.2 s"), std::string::npos);
+  EXPECT_NE(html.find("Estimated time saved: 1.2 s."), std::string::npos);
   EXPECT_NE(html.find("key view selection: the key view was given"), std::string::npos);
   EXPECT_NE(html.find("<td>solve chroma</td><td class=\"v\">1.5</td>"), std::string::npos);
   EXPECT_NE(html.find("<td class=\"v\">2.0</td>"), std::string::npos) << "the sum";
   EXPECT_NE(html.find("--key-view &#39;a&lt;b.jpg&#39;"), std::string::npos);
-  EXPECT_EQ(RenderReport({}).find("To repeat it"), std::string::npos);
+  EXPECT_EQ(RenderReport({}).find("Reproduction"), std::string::npos);
 }
 
-TEST(Report, KeyViewChapterTellsChoiceAndColour) {
+TEST(ReportPageTest, ShowsChoiceAndColorOfKeyView) {
   ReportData data;
   data.key_view.pictures = {"a.jpg", {{"as captured", "\x89PNG"}}};
   data.key_view.notes = {"Best of 5 views, narrowly ahead of <b>."};
@@ -85,7 +85,7 @@ TEST(Report, KeyViewChapterTellsChoiceAndColour) {
   EXPECT_EQ(RenderReport({}).find("Key view"), std::string::npos);
 }
 
-TEST(Report, ShowsEachAdditionalKeyView) {
+TEST(ReportPageTest, ShowsEachAdditionalKeyView) {
   ReportData data;
   data.additional_key_views.resize(2);
   data.additional_key_views[0].pictures = {"b.jpg", {{"as captured", "\x89PNG"}}};

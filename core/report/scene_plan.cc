@@ -3,7 +3,10 @@
 #include <fmt/core.h>
 
 #include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
 #include <utility>
+#include <vector>
 
 #include "core/catalogue/estimates.h"
 #include "core/catalogue/stages.h"
@@ -16,11 +19,31 @@ constexpr double kSecondsPerRemapMegapixel = 0.01;
 constexpr double kSecondsPerFeatureMegapixel = 0.5;
 constexpr double kFullyDynamic = 0.5;  // motion energy
 
-constexpr char kNothingReconstructed[] = "nothing is reconstructed of a film";
+// Steps that do something else for a kind of capture.
+struct StepOfKind {
+  CaptureKind kind;
+  const char* stage;
+  bool needed;
+  const char* reason;
+};
+
+constexpr StepOfKind kStepsOfKinds[] = {
+    {CaptureKind::kFilm,
+     kind::kImportScene,
+     false,
+     "frames of a film are coloured along the optical flow"},
+    {CaptureKind::kFilm, kind::kCarryColor, true, "colours are carried along the optical flow"},
+    {CaptureKind::kFilm, kind::kRender, true, "the coloured frames become a film"}};
+
+// "" if the scene is reconstructed.
+std::string_view WhyNotReconstructed(const PlanFacts& f) {
+  return WhyNothingToDo(f.kind, kind::kReconstructGeometry);
+}
 
 std::string MotionReason(const PlanFacts& f) {
-  if (f.is_film) return kNothingReconstructed;
-  if (!f.is_dynamic) return "all photos show one time";
+  const std::string_view why_not = WhyNotReconstructed(f);
+  if (!why_not.empty()) return std::string(why_not);
+  if (f.time_steps == 0) return "all photos show one time";
   std::string why = fmt::format("the views show {} time steps, seen by {} camera{}",
                                 f.time_steps,
                                 f.cameras,
@@ -33,7 +56,8 @@ std::string MotionReason(const PlanFacts& f) {
 }
 
 PlanStep TimeStep(const PlanFacts& f) {
-  const bool needed = f.is_dynamic && !f.is_film && (!f.motion || f.motion->moves);
+  const bool needed =
+      f.time_steps > 0 && WhyNotReconstructed(f).empty() && (!f.motion || f.motion->moves);
   return {.step = "deformation_over_time",
           .needed = needed,
           .reason = MotionReason(f),
@@ -42,14 +66,13 @@ PlanStep TimeStep(const PlanFacts& f) {
 
 // Adapts the step of a stage, as the catalogue has it, to the scene.
 void Decide(const PlanFacts& f, PlanStep* step) {
-  const auto leave_out = [step](const char* reason) {
+  const auto leave_out = [step](std::string_view reason) {
     step->needed = false;
     step->reason = reason;
   };
   if (step->stage == kind::kImportScene) {
     step->estimated_seconds = kPosesSecondsPerPhoto * f.views;
     if (f.has_poses) leave_out("the scene comes with camera poses");
-    if (f.is_film) leave_out("frames of a film are coloured along the optical flow");
   } else if (step->stage == kind::kSelectKeyView) {
     step->estimated_seconds = kSecondsPerFeatureMegapixel * f.views * f.megapixels_per_view;
     if (!f.key_view_strategy.empty()) {
@@ -58,38 +81,42 @@ void Decide(const PlanFacts& f, PlanStep* step) {
     if (f.key_view_given) leave_out("the key view was given");
   } else if (step->stage == kind::kReconstructGeometry) {
     if (f.geometry_given) leave_out("the scene's Gaussians were given");
-    if (f.is_film) leave_out(kNothingReconstructed);
-  } else if (step->stage == kind::kCarryColor) {
-    if (f.is_film) step->reason = "colours are carried along the optical flow";
   } else if (step->stage == kind::kGenerateAugmentations) {
     if (!f.has_augmentations) leave_out("the colorizer learns from the key views alone");
   } else if (step->stage == kind::kCorrectColors) {
-    if (!f.has_corrections) leave_out("nothing is to be corrected");
-  } else if (step->stage == kind::kSolveChroma || step->stage == kind::kExport) {
-    if (f.is_film) leave_out(kNothingReconstructed);
-  } else if (step->stage == kind::kRender) {
-    if (f.is_film) step->reason = "the coloured frames become a film";
+    if (!f.has_corrections) leave_out("no corrections were given");
   } else if (step->stage == kind::kEvaluate) {
     step->reason = f.has_truth
                        ? "true colours of held-out views were given"
                        : "no true colours were given: the views are compared with each other only";
   }
+  for (const StepOfKind& other : kStepsOfKinds) {
+    if (other.kind != f.kind || other.stage != step->stage) continue;
+    step->needed = other.needed;
+    step->reason = other.reason;
+  }
+  const std::string_view why_idle = WhyNothingToDo(f.kind, step->stage);
+  if (!why_idle.empty()) leave_out(why_idle);
 }
 
 // Parts of the stage that may be left out.
 void AddParts(const PlanFacts& f, const std::string& stage, std::vector<PlanStep>* plan) {
-  const auto add = [plan](const char* step, bool needed, const char* reason, double seconds = 0.0) {
-    plan->push_back(
-        {.step = step, .needed = needed, .reason = reason, .estimated_seconds = seconds});
-  };
+  const auto add =
+      [plan](const char* step, bool needed, std::string_view reason, double seconds = 0.0) {
+        plan->push_back({.step = step,
+                         .needed = needed,
+                         .reason = std::string(reason),
+                         .estimated_seconds = seconds});
+      };
   if (stage == kind::kImportScene) {
+    const std::string_view why_not = WhyNotReconstructed(f);
     add("undistortion",
         f.has_distortion,
         f.has_distortion ? "the cameras have lens distortion" : "no camera has lens distortion",
         kSecondsPerRemapMegapixel * f.views * f.megapixels_per_view);
     add("random_points",
-        !f.has_sparse_points && !f.is_film,
-        f.is_film             ? kNothingReconstructed
+        !f.has_sparse_points && why_not.empty(),
+        !why_not.empty()      ? why_not
         : f.has_sparse_points ? "the scene has sparse points to start from"
                               : "the scene has no sparse points to start from",
         0.1);
@@ -101,7 +128,7 @@ void AddParts(const PlanFacts& f, const std::string& stage, std::vector<PlanStep
   } else if (stage == kind::kSolveChroma) {
     add("view_dependent_chroma",
         false,
-        "chroma hardly depends on the direction: degree 0 suffices unless another is asked for");
+        "chroma hardly depends on the direction: degree 0 suffices unless another is requested");
   }
 }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/catalogue/captures.h"
+
 namespace color3d {
 
 // Motion that the geometry stage found in a scene with times and poses.
@@ -32,9 +34,8 @@ struct PlanFacts {
   bool has_poses = false;
   bool has_distortion = false;
   bool has_sparse_points = true;
-  bool geometry_given = false;             // the scene is a splat
-  bool is_film = false;                    // frames without poses: nothing is reconstructed
-  bool is_dynamic = false;                 // several times with poses
+  bool geometry_given = false;  // the scene is a splat
+  CaptureKind kind = CaptureKind::kStatic;
   int time_steps = 0;                      // dynamic scenes only
   int cameras = 0;                         // dynamic scenes only
   std::optional<SceneMotion> motion = {};  // dynamic scenes only, once there is geometry
@@ -51,7 +52,7 @@ struct PlanFacts {
 // that are graphs of others.
 std::vector<PlanStep> PlanScene(const PlanFacts& facts);
 
-// Leaves out the step of a stage that the planner skipped.
+// Marks the step of a stage as left out, because the planner skipped the stage.
 void SkipStep(const std::string& stage, const std::string& reason, std::vector<PlanStep>* plan);
 
 std::string PlanToJson(const std::vector<PlanStep>& steps);

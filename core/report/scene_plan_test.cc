@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-TEST(ScenePlan, LeavesOutStepsThatAreNotNeeded) {
+TEST(ScenePlanTest, OmitsUnneededSteps) {
   PlanFacts facts;
   facts.has_poses = true;
   facts.views = 20;
@@ -34,7 +34,7 @@ TEST(ScenePlan, LeavesOutStepsThatAreNotNeeded) {
   EXPECT_TRUE(PlanScene(facts)[0].needed);
 }
 
-TEST(ScenePlan, EveryStageIsAStep) {
+TEST(ScenePlanTest, HasOneStepPerStage) {
   const auto plan = PlanScene({});
   for (const Stage& stage : StageCatalogue()) {
     const std::string kind = stage.kind;
@@ -47,7 +47,7 @@ TEST(ScenePlan, EveryStageIsAStep) {
   }
 }
 
-TEST(ScenePlan, NamesTheStrategyOfTheKeyView) {
+TEST(ScenePlanTest, NamesKeyViewStrategy) {
   const auto selection = [](const PlanFacts& facts) {
     for (const PlanStep& step : PlanScene(facts)) {
       if (step.step == "key_view_selection") return step;
@@ -61,13 +61,13 @@ TEST(ScenePlan, NamesTheStrategyOfTheKeyView) {
   EXPECT_FALSE(selection({.key_view_given = true}).needed);
 }
 
-TEST(ScenePlan, PosesCostWhatTheTimeBudgetAllows) {
+TEST(ScenePlanTest, EstimatesPosesLikeTimeBudget) {
   const auto plan = PlanScene({.views = 50});
   EXPECT_EQ(plan[0].step, "structure_from_motion");
   EXPECT_DOUBLE_EQ(plan[0].estimated_seconds, 50 * kPosesSecondsPerPhoto);
 }
 
-TEST(ScenePlan, SkippedStagesAreLeftOut) {
+TEST(ScenePlanTest, OmitsSkippedStages) {
   auto plan = PlanScene({});
   const size_t steps = plan.size();
   SkipStep(kind::kCarryColor, "carry_color.skip is set", &plan);
@@ -79,7 +79,7 @@ TEST(ScenePlan, SkippedStagesAreLeftOut) {
   }
 }
 
-TEST(ScenePlan, TellsOfTime) {
+TEST(ScenePlanTest, ReportsTimeSteps) {
   const auto told = [](const PlanFacts& facts) {
     for (const PlanStep& step : PlanScene(facts)) {
       if (step.step == "deformation_over_time") return step;
@@ -87,16 +87,16 @@ TEST(ScenePlan, TellsOfTime) {
     return PlanStep{};
   };
   EXPECT_FALSE(told({}).needed);
-  const PlanStep step = told({.is_dynamic = true, .time_steps = 25, .cameras = 4});
+  const PlanStep step = told({.time_steps = 25, .cameras = 4});
   EXPECT_TRUE(step.needed);
   EXPECT_EQ(step.reason, "the views show 25 time steps, seen by 4 cameras");
-  EXPECT_FALSE(told({.is_film = true, .is_dynamic = true}).needed);
+  EXPECT_FALSE(told({.kind = CaptureKind::kFilm, .time_steps = 25}).needed);
 }
 
-TEST(ScenePlan, TellsTheMotionThatGeometryFound) {
+TEST(ScenePlanTest, ReportsMotionFoundByGeometry) {
   const auto told = [](const SceneMotion& motion) {
-    for (auto& step : nlohmann::json::parse(PlanToJson(
-             PlanScene({.is_dynamic = true, .time_steps = 9, .cameras = 1, .motion = motion})))) {
+    for (auto& step : nlohmann::json::parse(
+             PlanToJson(PlanScene({.time_steps = 9, .cameras = 1, .motion = motion})))) {
       if (step.at("step") == "deformation_over_time") return step;
     }
     return nlohmann::json();

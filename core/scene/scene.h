@@ -67,13 +67,15 @@ struct Scene {
   // Kind of the scene: kFilm, kDynamic and kRelief if each view has a moment. Films have one pose
   // for all views, which means none. kStatic without views.
   CaptureKind kind() const;
+  // True if each view has a moment, and there are views.
+  bool HasTimes() const;
   const CaptureKindInfo& capture() const { return InfoOf(kind()); }
   // Indices of all views in order of time; views of equal time, or without one, keep their order.
   std::vector<int> ViewsInOrderOfTime() const;
   // The distinct times of the views, seconds, ascending.
   std::vector<double> Times() const;
   // Views of the shot of `view`, in order of time. Requires: the view has a moment.
-  std::vector<int> FramesOfShotOf(int view) const;
+  std::vector<int> FramesInShot(int view) const;
   // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.
   double Extent() const;
   // In the world's units and frame.

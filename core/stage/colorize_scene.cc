@@ -47,7 +47,7 @@ void AddByHeldOut(const ordered_json& scores, ordered_json* metrics) {
     (*metrics)[fmt::format("views_{}", how)] = means.at("views");
     for (const std::string& key : KeysInOrder(means)) {
       const Metric* metric = FindMetric(key).metric;
-      if (key == "views" || (metric != nullptr && !metric->by_held_out)) continue;
+      if (key == "views" || (metric != nullptr && !metric->Is(Metric::kByHeldOut))) continue;
       (*metrics)[fmt::format("{}_{}", key, how)] = means.at(key);
     }
   }
@@ -113,12 +113,28 @@ std::vector<CurvePoint> CollectCurves(const StageContext& context) {
   return curves;
 }
 
-// nullopt for photos, and without geometry.
-std::optional<SceneMotion> MotionOf(const Scene& scene,
+// Facts of the plan that follow from the scene's kind.
+PlanFacts FactsOfKind(const Scene& scene, const StageContext& context) {
+  const CaptureKindInfo& capture = ColoredAs(context, scene);
+  PlanFacts facts{.kind = capture.kind};
+  if (!capture.is_dynamic) return facts;
+  std::set<double> times;
+  std::set<int> cameras;
+  for (const View& view : scene.views) {
+    times.insert(view.moment->time_s);
+    cameras.insert(view.moment->shot);
+  }
+  facts.time_steps = static_cast<int>(times.size());
+  facts.cameras = static_cast<int>(cameras.size());
+  return facts;
+}
+
+// nullopt without times, and without geometry.
+std::optional<SceneMotion> MotionOf(const PlanFacts& facts,
                                     const std::vector<CurvePoint>& curves,
                                     const StageContext& context) {
   const char* name = context.HasInput(artifact::kModel) ? artifact::kModel : artifact::kGeometry;
-  if (!scene.capture().is_dynamic || !context.HasInput(name)) return std::nullopt;
+  if (facts.time_steps == 0 || !context.HasInput(name)) return std::nullopt;
   SceneMotion motion;
   motion.moves = ParseGaussians(context.ReadInput(name)).motion.size() > 0;
   for (const CurvePoint& point : curves) {
@@ -149,36 +165,17 @@ std::string DescribeMotion(const FilmFindings& film, const Scene& scene) {
   return text;
 }
 
-void AddTime(const Scene& scene, PlanFacts* facts) {
-  facts->is_dynamic = scene.capture().is_dynamic;
-  if (!facts->is_dynamic) return;
-  std::set<double> times;
-  std::set<int> cameras;
-  for (const View& view : scene.views) {
-    times.insert(view.moment->time_s);
-    cameras.insert(view.moment->shot);
-  }
-  facts->time_steps = static_cast<int>(times.size());
-  facts->cameras = static_cast<int>(cameras.size());
-}
-
 std::vector<PlanStep> CollectPlan(const Scene& scene,
+                                  PlanFacts plan_facts,
                                   const std::vector<StageSummary>& stages,
-                                  const std::optional<SceneMotion>& motion,
-                                  bool has_truth,
                                   const StageContext& context) {
   if (!context.HasInput(artifact::kImportFacts))
     return {};  // the facts that the plan depends on are unknown
   const ImportFacts facts = ImportFactsFromJson(context.ReadInput(artifact::kImportFacts));
-  PlanFacts plan_facts;
-  plan_facts.is_film = !ColoredAs(context, scene).is_reconstructed;
-  AddTime(scene, &plan_facts);
-  plan_facts.motion = motion;
   plan_facts.has_poses = !facts.ran_structure_from_motion;
   plan_facts.geometry_given = context.HasInput(artifact::kGivenGeometry);
   plan_facts.has_distortion = facts.undistorted;
   plan_facts.has_sparse_points = !facts.random_points;
-  plan_facts.has_truth = has_truth;
   plan_facts.has_augmentations = context.HasInput(artifact::kAugmentationFacts);
   plan_facts.has_corrections = context.HasInput(artifact::kCorrections);
   if (context.HasInput(artifact::kKeyView)) {
@@ -223,17 +220,16 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
 }
 
 std::string Summary(const Scene& scene,
-                    bool is_film,
+                    const PlanFacts& facts,
                     const ordered_json& metrics,
                     const std::vector<std::string>& keys) {
+  const bool is_film = !InfoOf(facts.kind).is_reconstructed;
   const std::string result =
       is_film ? "Coloured" : fmt::format("{} Gaussians", metrics.value("gaussians", 0));
-  PlanFacts time;
-  AddTime(scene, &time);
   return fmt::format("{} {}{} ({} held out){}. {} in {} s of computing.",
                      scene.views.size(),
                      is_film ? "frames" : "views",
-                     time.is_dynamic ? fmt::format(" of {} times", time.time_steps) : "",
+                     facts.time_steps > 0 ? fmt::format(" of {} times", facts.time_steps) : "",
                      scene.HeldOutViews().size(),
                      keys.empty() ? std::string()
                                   : fmt::format(", all colours from the key {} {}",
@@ -248,7 +244,7 @@ std::vector<std::pair<std::string, std::string>> Headline(const ordered_json& me
   std::vector<std::pair<std::string, std::string>> headline;
   for (const Metric& metric : MetricCatalogue()) {
     const auto found = metrics.find(metric.key);
-    if (!metric.in_headline || found == metrics.end() || !found->is_number()) continue;
+    if (!metric.Is(Metric::kInHeadline) || found == metrics.end() || !found->is_number()) continue;
     headline.emplace_back(metric.label, MetricText(metric.key, found->get<double>()));
   }
   return headline;
@@ -267,12 +263,12 @@ ReportRow KeyPictures(const std::string& name, const StageContext& context) {
   return row;
 }
 
-void PassOnResults(StageContext& context) {
+void ForwardResults(StageContext& context) {
   for (const Stage& stage : StageCatalogue()) {
     for (const char* result : stage.results) {
-      if (context.HasInput(result)) context.PassOn(result);
+      if (context.HasInput(result)) context.ForwardInput(result);
       if (!std::string_view(result).ends_with('/')) continue;
-      for (const std::string& name : context.InputsBelow(result)) context.PassOn(name);
+      for (const std::string& name : context.InputsBelow(result)) context.ForwardInput(name);
     }
   }
 }
@@ -288,12 +284,14 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   const auto next = keys.empty() ? std::nullopt : AdviseNextKeyView(scene, keys, context);
   const ColorFacts colors(scene, context, next);
   const std::vector<CurvePoint> curves = CollectCurves(context);
-  const std::optional<SceneMotion> motion = MotionOf(scene, curves, context);
-  const ordered_json metrics = CollectMetrics(stages, keys, next, colors, motion, context);
+  PlanFacts facts = FactsOfKind(scene, context);
+  facts.motion = MotionOf(facts, curves, context);
+  const ordered_json metrics = CollectMetrics(stages, keys, next, colors, facts.motion, context);
+  facts.has_truth = metrics.contains("delta_e00");
 
   ReportData data;
   data.title = fmt::format("Color3D: {} views in colour", scene.views.size());
-  data.summary = Summary(scene, !ColoredAs(context, scene).is_reconstructed, metrics, keys);
+  data.summary = Summary(scene, facts, metrics, keys);
   if (context.HasInput(artifact::kViewPage)) data.view_page = artifact::kViewPage;
   data.key_view = KeyViewChapter(KeyPictures(key ? scene.views[*key].name : "", context), context);
   data.additional_key_views = AdditionalKeyViewChapters(scene, kReportSidePx, context);
@@ -309,17 +307,17 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   for (const auto& [name, value] : metrics.items()) {
     if (value.is_number()) data.metrics.emplace_back(name, value.get<double>());
   }
-  data.plan = CollectPlan(scene, stages, motion, metrics.contains("delta_e00"), context);
+  data.plan = CollectPlan(scene, facts, stages, context);
   for (const StageSummary& s : stages) {
     if (s.state == "SUCCEEDED") data.stages.push_back({s.kind, s.seconds});
     for (const std::string& w : s.warnings) data.warnings.push_back(s.kind + ": " + w);
   }
-  AddHowToRepeat(keys, metrics.contains("delta_e00"), context, &data);
+  AddHowToRepeat(keys, facts.has_truth, context, &data);
   context.WriteOutput(artifact::kMetrics, metrics.dump(1) + "\n");
   context.WriteOutput(artifact::kAllCurves, CurvesToCsv(curves));
   context.WriteOutput(artifact::kPlan, PlanToJson(data.plan));
   context.WriteOutput(artifact::kReport, RenderReport(data));
-  PassOnResults(context);
+  ForwardResults(context);
 }
 
 }  // namespace color3d

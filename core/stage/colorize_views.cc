@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
 #include "core/stage/film/color_frames.h"
@@ -36,8 +37,7 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
   const ViewPositions positions(scene, context);
-  const bool are_frames = !scene.capture().is_reconstructed ||
-                          (scene.capture().is_dynamic && !positions.NothingMoves());
+  const bool are_frames = scene.HasTimes() && !positions.NothingMoves();
   const ViewImages images(
       scene, context.scene_folder(), max_side_px, are_frames ? kColoredFramesCacheBytes : 0);
   const auto total = static_cast<int64_t>(scene.views.size());

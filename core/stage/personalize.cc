@@ -6,6 +6,7 @@
 #include "core/base/evenly.h"
 #include "core/carry/confidence.h"
 #include "core/color/lab.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
@@ -71,7 +72,7 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
                                              const ViewImages& images,
                                              const StageContext& context) {
   std::vector<std::pair<double, TrainingPicture>> found;
-  for (int view : EvenlyOf(scene.TrainingViews(), kMaxViewsToLookAt)) {
+  for (int view : PickEvenly(scene.TrainingViews(), kMaxViewsToLookAt)) {
     const std::string name = ViewArtifact(artifact::kCarried, scene.views[view], ".png");
     if (view == key || !context.HasInput(name)) continue;
     const auto luminance = images.Luminance(view);

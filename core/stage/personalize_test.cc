@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/stage/context/stage_context.h"
 #include "tests/support/stages/augmented_scene.h"
 

@@ -35,7 +35,7 @@ MemoryPlan PlanMemory(const GeometryOptions& options,
   demand.max_side_px = max_side_px;
   demand.max_gaussians = options.max_gaussians;
   demand.sh_degree = options.sh_degree;
-  demand.moves = scene.capture().is_dynamic;
+  demand.moves = scene.HasTimes();
   return PlanGeometryMemory(demand, budget_bytes);
 }
 

@@ -79,18 +79,19 @@ void ChooseManually(const std::string& name,
 
 // Selects several key views. A view that the user names remains the first. Visibility between views
 // comes from the geometry of an earlier job, if there is one.
-void ChooseTogether(const SelectKeyViewOptions& options,
-                    const Scene& scene,
-                    const std::vector<int>& candidates,
-                    const std::vector<bool>& kept,
-                    StageContext& context,
-                    KeyViewRanking* ranking) {
+void ChooseKeyViewSet(const SelectKeyViewOptions& options,
+                      const Scene& scene,
+                      const std::vector<int>& candidates,
+                      const std::vector<bool>& kept,
+                      bool is_film,
+                      StageContext& context,
+                      KeyViewRanking* ranking) {
   int first = -1;
   if (options.selection.strategy == KeyViewStrategy::kManual) {
     ChooseManually(options.view, scene, candidates, ranking);
     first = ranking->selection.index;
   }
-  if (!scene.capture().is_reconstructed) {
+  if (is_film) {
     ChosenKeyViews chosen = ChooseFilmKeys(
         scene, candidates, ranking->features, kept, options.selection.count, first, context);
     ranking->selection.index = chosen.views[0];
@@ -120,6 +121,7 @@ void ChooseTogether(const SelectKeyViewOptions& options,
 void ChooseByScore(const SelectKeyViewOptions& stage_options,
                    const Scene& scene,
                    const std::vector<int>& candidates,
+                   bool is_film,
                    StageContext& context,
                    KeyViewRanking* ranking) {
   std::vector<std::filesystem::path> photos;
@@ -141,7 +143,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
     contents.push_back(view.content);
   }
   std::vector<int> shots;  // shots of a film
-  if (!scene.capture().is_reconstructed) {
+  if (is_film) {
     for (const int view : candidates) shots.push_back(scene.views[view].moment->shot);
   }
   GuardedViews guarded = GuardViews(descriptors, UnfitFrames(contents, shots), options, shots);
@@ -153,7 +155,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   if (strategy == KeyViewStrategy::kTracks) {
     const auto tracks = TracksOf(scene, candidates, context);
     const std::string reason = tracks.empty() ? "the scene has no points from structure-from-motion"
-                                              : WhyTracksAreNoUse(tracks, kept);
+                                              : UnusableTracksReason(tracks, kept);
     if (reason.empty()) {
       scores = TrackCoverage(tracks, kept);
     } else {
@@ -169,11 +171,12 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   }
   ranking->strategy = StrategyName(strategy);
   ranking->selection = RankViews(std::move(guarded), scores);
-  if (!scene.capture().is_reconstructed &&
-      TakeFromLongestShot(scene, candidates, &ranking->selection)) {
+  if (is_film && PreferLongestShot(scene, candidates, &ranking->selection)) {
     ranking->among = "the film's longest shot";
   }
-  if (options.count > 1) ChooseTogether(stage_options, scene, candidates, kept, context, ranking);
+  if (options.count > 1) {
+    ChooseKeyViewSet(stage_options, scene, candidates, kept, is_film, context, ranking);
+  }
 }
 
 // Names of the views that the guard excluded.
@@ -196,8 +199,7 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   const Scene scene = ReadScene(context);
   // Colours of held-out views must not be used.
   std::vector<int> candidates = scene.TrainingViews();
-  if (!scene.capture().is_reconstructed || scene.capture().is_dynamic)
-    candidates = CandidatesOfFilm(scene, options.view);
+  if (scene.HasTimes()) candidates = CandidatesOfFilm(scene, options.view);
   if (options.selection.count > static_cast<int>(candidates.size())) {
     throw InvalidArgument("{} key views are requested, but the scene has only {} training views",
                           options.selection.count,
@@ -209,7 +211,8 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   if (options.selection.strategy == KeyViewStrategy::kManual && options.selection.count == 1) {
     ChooseManually(options.view, scene, candidates, &ranking);
   } else {
-    ChooseByScore(options, scene, candidates, context, &ranking);
+    const bool is_film = !scene.capture().is_reconstructed;
+    ChooseByScore(options, scene, candidates, is_film, context, &ranking);
   }
   for (const std::string& warning : ranking.selection.warnings) {
     context.progress().OnWarning(warning);

@@ -66,10 +66,8 @@ void CheckGiven(const std::map<std::string, JobRecord>& given, const ColorizeSce
       missing = kind;
     }
   }
-  for (const auto& entry : given) {
-    const JobRecord& job = entry.second;
-    const auto is_its_kind = [&](const GivenStage& stage) { return job.kind == stage.kind; };
-    if (std::any_of(std::begin(stages), std::end(stages), is_its_kind)) continue;
+  for (const auto& [kind, job] : given) {
+    if (std::ranges::find(stages, kind, &GivenStage::kind) != std::end(stages)) continue;
     throw InvalidArgument("the input {} is a {} job; {} takes {}, {} and {} jobs only",
                           job.name,
                           job.kind,
@@ -120,7 +118,7 @@ void CopySceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
 }
 
 // Reason for carrying no colour; empty if colour is carried. `scene`: `given` over its preset.
-std::string WhyNothingIsCarried(const ColorizeSceneSpec& given, const ColorizeSceneSpec& scene) {
+std::string NoCarryReason(const ColorizeSceneSpec& given, const ColorizeSceneSpec& scene) {
   if (!scene.carry_color().skip()) return "";
   return given.carry_color().has_skip() ? "carry_color.skip is set"
                                         : "the preset carries no colour";
@@ -128,7 +126,7 @@ std::string WhyNothingIsCarried(const ColorizeSceneSpec& given, const ColorizeSc
 
 // Reason for generating no pictures; empty if they are generated. Files in augment/ are used on
 // request only.
-std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
+std::string NoAugmentationsReason(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   const auto& spec = scene.generate_augmentations();
   if (spec.files() && facts.augment_files == 0) {
     throw InvalidArgument(
@@ -148,28 +146,24 @@ std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts&
 }
 
 // Reason why a stage has nothing to do for the scene; empty if it has, or if only import finds out.
-std::string WhyIdle(const std::string& kind,
-                    const SceneFacts& facts,
-                    const ColorizeSceneSpec& scene) {
-  if (!facts.is_film) return "";
-  if (scene.import_scene().film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO) return "";
-  return std::string(WhyNothingToDo(CaptureKind::kFilm, kind));
+std::string IdleReason(const std::string& kind,
+                       const SceneFacts& facts,
+                       const ColorizeSceneSpec& scene) {
+  return std::string(WhyNothingToDo(KindBeforeImport(facts, scene.import_scene()), kind));
 }
 
 // `scene`: as in BuildColorizeSceneGraph.
-void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
-  const bool has_poses =
-      facts.is_film && scene.import_scene().film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO;
+void CheckCorrections(const ColorizeSceneSpec& scene, const SceneFacts& facts, bool is_film) {
+  const bool has_poses = is_film && EstimatesPoses(facts, scene.import_scene());
   for (const v1::FurtherKeyView& correction : scene.correct_colors().corrections()) {
     const bool has_range = HasRange(correction);
-    if (facts.is_film && !has_range) {
+    if (is_film && !has_range) {
       throw InvalidArgument(
           "corrections of places need a reconstructed scene; for a film colour additional key "
-          "views "
-          "instead (carry_color.further_key_views), or give each correction a range of time "
+          "views instead (carry_color.further_key_views), or give each correction a range of time "
           "(begin_s, end_s)");
     }
-    if (has_range && (!facts.is_film || has_poses)) {
+    if (has_range && (!is_film || has_poses)) {
       throw InvalidArgument(
           "the key view {} has a range of time (begin_s, end_s), which is for films without poses; "
           "leave the range out{}",
@@ -194,24 +188,25 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
         kind::kSelectKeyView);
   }
   if (submitted.inputs_size() > 0) CheckGiven(builder->given(), given);
-  CheckCorrections(scene, facts);
+  const bool is_film = !InfoOf(InfoOf(facts.layout).kind).is_reconstructed;
+  CheckCorrections(scene, facts, is_film);
   for (const Stage& stage : StageCatalogue()) {
     const std::string kind = stage.kind;
     if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
     JobSpec spec = builder->StageSpec(kind);
     CopySceneOptions(scene, &spec);
-    if (kind == kind::kPersonalize && facts.is_film) {
+    if (kind == kind::kPersonalize && is_film) {
       *spec.mutable_personalize() = scene.personalize();
       TrainAtFrameSize(scene.max_side_px(), spec.mutable_personalize());
     }
     std::string skip_reason;
-    if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);
+    if (kind == kind::kCarryColor) skip_reason = NoCarryReason(given, scene);
     if (kind == kind::kCorrectColors && !given.has_correct_colors() &&
         scene.correct_colors().corrections().empty()) {
-      skip_reason = "nothing is to be corrected";
+      skip_reason = "no corrections were given";
     }
-    if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);
-    if (skip_reason.empty()) skip_reason = WhyIdle(kind, facts, scene);
+    if (kind == kind::kGenerateAugmentations) skip_reason = NoAugmentationsReason(scene, facts);
+    if (skip_reason.empty()) skip_reason = IdleReason(kind, facts, scene);
     builder->Add(std::move(spec), skip_reason);
   }
   builder->AddParent();

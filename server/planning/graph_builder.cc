@@ -14,18 +14,13 @@ namespace color3d {
 namespace {
 
 std::string ProviderOf(const std::string& artifact) {
-  const Stage* stage = StageThatLeaves(artifact);
+  const Stage* stage = FindProducer(artifact);
   if (stage == nullptr) throw Error(ErrorCode::kInternal, "no stage leaves '{}'", artifact);
   return stage->kind;
 }
 
-// A fixed default, so that equal submissions have equal stage keys.
-uint64_t SeedOf(const v1::JobSpec& submitted) {
-  return submitted.seed() != 0 ? submitted.seed() : 1;
-}
-
 // Later stages do not depend on a job that only proposes corrections: they stay cached.
-bool OnlyProposes(const NewJob& job) {
+bool IsKeyViewProposal(const NewJob& job) {
   return job.kind == kind::kCorrectColors &&
          ParseSpec(job.spec, job.kind).correct_colors().corrections().empty();
 }
@@ -63,7 +58,7 @@ GraphBuilder::GraphBuilder(const v1::JobSpec& submitted,
 v1::JobSpec GraphBuilder::StageSpec(const std::string& kind) const {
   v1::JobSpec spec;
   spec.set_scene(submitted_.scene());
-  spec.set_seed(SeedOf(submitted_));
+  spec.set_seed(submitted_.seed());
   spec.set_skip_cache(submitted_.skip_cache());
   MutableStage(&spec, kind);
   return spec;
@@ -110,11 +105,18 @@ void GraphBuilder::LinkIfThere(const std::string& provider, NewJob* job) const {
   if (planned != planned_.end()) {
     const int index = planned->second;
     const NewJob& other = graph_.jobs[static_cast<size_t>(index)];
-    if (other.skip_reason.empty() && !OnlyProposes(other)) job->inputs.push_back(index);
+    if (other.skip_reason.empty() && !IsKeyViewProposal(other)) job->inputs.push_back(index);
   } else if (given != given_.end() &&
              (!IsFinished(given->second.state) || given->second.state == JobState::kSucceeded)) {
     job->input_jobs.push_back(given->second.name);
   }
+}
+
+int GraphBuilder::Append(NewJob job, const v1::JobSpec& spec) {
+  job.spec = DeterministicBytes(spec);
+  for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
+  graph_.jobs.push_back(std::move(job));
+  return static_cast<int>(graph_.jobs.size()) - 1;
 }
 
 int GraphBuilder::AddKeyView(const v1::FurtherKeyView& view) {
@@ -124,10 +126,7 @@ int GraphBuilder::AddKeyView(const v1::FurtherKeyView& view) {
   NewJob job;
   job.kind = kind::kColorizeKeyView;
   Provide(artifact::kScene, job.kind, &job);
-  job.spec = DeterministicBytes(spec);
-  for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
-  graph_.jobs.push_back(std::move(job));
-  return static_cast<int>(graph_.jobs.size()) - 1;
+  return Append(std::move(job), spec);
 }
 
 void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
@@ -151,22 +150,15 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
       view->clear_color();
     }
   }
-  job.spec = DeterministicBytes(spec);
-  for (const FileDigest& digest : SpecBlobs(spec)) job.blobs.push_back(digest.sha256);
-  planned_[job.kind] = static_cast<int>(graph_.jobs.size());
-  graph_.jobs.push_back(std::move(job));
+  planned_[stage.kind] = Append(std::move(job), spec);
 }
 
 void GraphBuilder::AddParent() {
   NewJob parent;
   parent.kind = submitted_kind_;
-  v1::JobSpec spec = submitted_;
-  spec.set_seed(SeedOf(submitted_));
-  parent.spec = DeterministicBytes(spec);
   for (size_t i = 0; i < graph_.jobs.size(); ++i) parent.inputs.push_back(static_cast<int>(i));
   for (const auto& [kind, job] : given_) parent.input_jobs.push_back(job.name);
-  for (const FileDigest& digest : SpecBlobs(spec)) parent.blobs.push_back(digest.sha256);
-  graph_.jobs.push_back(std::move(parent));
+  Append(std::move(parent), submitted_);
 }
 
 }  // namespace color3d

@@ -18,7 +18,7 @@ class GraphBuilder {
   using FillUnset = std::function<void(v1::JobSpec*)>;
 
   // `inputs`: the jobs that `submitted` names, with their children; jobs that coloured additional
-  // key views are ignored. Requires: `submitted` outlives the builder. Throws
+  // key views are ignored. Requires: `submitted` has a seed and outlives the builder. Throws
   // Error{kInvalidArgument} for inputs of another scene and for two jobs of one kind.
   GraphBuilder(const v1::JobSpec& submitted,
                const std::vector<JobRecord>& inputs,
@@ -44,6 +44,8 @@ class GraphBuilder {
   NewGraph Take() { return std::move(graph_); }
 
  private:
+  // Appends the job with its options and returns its position.
+  int Append(NewJob job, const v1::JobSpec& spec);
   // Appends the colorize_key_view job of an additional key view and returns its position.
   int AddKeyView(const v1::FurtherKeyView& view);
   void Provide(const std::string& artifact, const std::string& for_kind, NewJob* job);

@@ -17,7 +17,7 @@ NewGraph PlanPersonalizeScenes(const v1::JobSpec& spec,
   for (int i = 0; i < scenes.routes_size(); ++i) {
     v1::JobSpec own;
     own.set_scene(scenes.routes(i).scene());
-    own.set_seed(spec.seed() != 0 ? spec.seed() : 1);
+    own.set_seed(spec.seed());
     own.set_skip_cache(spec.skip_cache());
     *own.mutable_personalize() = scenes.options();
     const SceneRouteInputs& route = inputs.at(static_cast<size_t>(i));

@@ -21,7 +21,7 @@ SceneRouteInputs RouteInputs(const std::string& scene) {
     job.state = JobState::kSucceeded;
     inputs.jobs.push_back(job);
   }
-  inputs.facts = {.photos = 20, .has_poses = true};
+  inputs.facts = {.pictures = 20, .layout = CaptureLayout::kColmap};
   return inputs;
 }
 

@@ -31,7 +31,6 @@ void SetEncoderOfColorizer(const GraphBuilder& builder, v1::JobSpec* spec) {
 
 void BuildStageGraph(const v1::JobSpec& submitted, GraphBuilder* builder) {
   v1::JobSpec spec = submitted;
-  if (spec.seed() == 0) spec.set_seed(1);
   if (spec.has_generate_augmentations()) {
     spec.mutable_generate_augmentations()->set_samples(SamplesOf(spec.generate_augmentations()));
   }
@@ -56,13 +55,13 @@ v1::ColorizeSceneSpec SceneOf(const v1::JobSpec& submitted, const std::vector<Jo
 
 }  // namespace
 
-NewGraph PlanJob(const v1::JobSpec& spec,
-                 const std::vector<JobRecord>& inputs,
-                 const SceneFacts& facts) {
+NewGraph PlanJob(v1::JobSpec spec, const std::vector<JobRecord>& inputs, const SceneFacts& facts) {
   CheckSpec(spec);
   if (spec.has_personalize_scenes()) {
     throw Error(ErrorCode::kInternal, "{} is planned by PlanPersonalizeScenes", KindOf(spec));
   }
+  // A fixed default, so that equal submissions have equal stage keys.
+  if (spec.seed() == 0) spec.set_seed(1);
   const v1::ColorizeSceneSpec scene = SceneOf(spec, inputs);
   std::optional<TimeBudget> time_budget;
   if (scene.time_budget_seconds() > 0.0) {

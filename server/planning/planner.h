@@ -13,8 +13,6 @@ namespace color3d {
 // their children. Throws what CheckSpec and DivideTimeBudget throw; kFailedPrecondition
 // (INPUT_MISSING) with an artifact that nothing provides; kInvalidArgument for inputs of another
 // scene and for two jobs of one kind.
-NewGraph PlanJob(const v1::JobSpec& spec,
-                 const std::vector<JobRecord>& inputs,
-                 const SceneFacts& facts);
+NewGraph PlanJob(v1::JobSpec spec, const std::vector<JobRecord>& inputs, const SceneFacts& facts);
 
 }  // namespace color3d

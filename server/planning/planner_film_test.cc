@@ -15,7 +15,7 @@ using ::testing::Not;
 
 TEST(Planner, FilmIsColoredNotReconstructed) {
   v1::JobSpec spec = SceneSpec();
-  const SceneFacts film{.photos = 0, .is_film = true};
+  const SceneFacts film{.pictures = 0, .layout = CaptureLayout::kFilm};
   const NewGraph graph = PlanJob(spec, {}, film);
   for (const char* kind : {"reconstruct_geometry", "solve_chroma", "export"}) {
     EXPECT_THAT(graph.jobs[IndexOf(graph, kind)].skip_reason, HasSubstr("film")) << kind;
@@ -42,7 +42,8 @@ TEST(Planner, FilmIsColoredNotReconstructed) {
 TEST(Planner, TrainsAtTheSizeOfFrames) {
   v1::JobSpec spec = SceneSpec();
   const auto size = [&](bool is_film) {
-    const NewGraph graph = PlanJob(spec, {}, {.photos = 0, .is_film = is_film});
+    const NewGraph graph =
+        PlanJob(spec, {}, {.layout = is_film ? CaptureLayout::kFilm : CaptureLayout::kPhotos});
     return SpecOf(graph, "personalize").personalize().max_side_px();
   };
   EXPECT_EQ(size(true), 500);
@@ -71,7 +72,7 @@ JobRecord GivenImport(const v1::ImportSceneSpec& options) {
 }
 
 TEST(Planner, TakesFilmPosesFromTheInputImport) {
-  const SceneFacts film{.photos = 0, .is_film = true};
+  const SceneFacts film{.pictures = 0, .layout = CaptureLayout::kFilm};
   v1::JobSpec spec = SceneSpec();
   v1::ImportSceneSpec options;
   const NewGraph colored = PlanJob(spec, {GivenImport(options)}, film);
@@ -91,7 +92,7 @@ TEST(Planner, TakesFilmPosesFromTheInputImport) {
 }
 
 TEST(Planner, KeyViewWithRangeIsACorrection) {
-  const SceneFacts film{.photos = 0, .is_film = true};
+  const SceneFacts film{.pictures = 0, .layout = CaptureLayout::kFilm};
   v1::JobSpec spec = SceneSpec();
   v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
   scene->set_preset(v1::PRESET_PAPER);  // carries no colour

@@ -7,8 +7,10 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "server/planning/job_spec.h"
 #include "server/planning/key_view_jobs.h"
 #include "server/planning/preset_files.h"
+#include "server/planning/spec_check.h"
 
 namespace color3d {
 namespace {
@@ -109,11 +111,10 @@ void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
     if (!views->has_max_side_px()) views->set_max_side_px(scene.max_side_px());
     return;
   }
-  const FieldDescriptor* stage = spec->GetReflection()->GetOneofFieldDescriptor(
-      *spec, spec->GetDescriptor()->FindOneofByName("stage"));
-  const FieldDescriptor* options = scene.GetDescriptor()->FindFieldByName(stage->name());
+  const std::string kind = KindOf(*spec);
+  const FieldDescriptor* options = scene.GetDescriptor()->FindFieldByName(kind);
   if (options == nullptr) return;
-  Message* given = spec->GetReflection()->MutableMessage(spec, stage);
+  Message* given = MutableStage(spec, kind);
   const std::unique_ptr<Message> own(given->New());
   own->CopyFrom(*given);
   given->CopyFrom(scene.GetReflection()->GetMessage(scene, options));

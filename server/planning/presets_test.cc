@@ -10,7 +10,7 @@ namespace color3d {
 namespace {
 using ::testing::ElementsAre;
 
-constexpr SceneFacts kTwentyPhotos = {.photos = 20, .has_poses = true};
+constexpr SceneFacts kTwentyPhotos = {.pictures = 20, .layout = CaptureLayout::kColmap};
 
 v1::ColorizeSceneSpec Given(v1::Preset preset) {
   v1::ColorizeSceneSpec spec;

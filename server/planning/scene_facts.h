@@ -1,5 +1,8 @@
-// Facts about a scene that are known before its import.
+// Facts about a scene that are known before its import. Pure functions, thread-safe.
 #pragma once
+
+#include "color3d/v1/stage.pb.h"
+#include "core/catalogue/captures.h"
 
 namespace color3d {
 
@@ -7,11 +10,24 @@ namespace color3d {
 inline constexpr int kSplatViews = 24;
 
 struct SceneFacts {
-  int photos = 0;  // of a film its pictures; 0 for video files, whose frames nobody has counted
-  bool has_poses = false;
+  int pictures = 0;  // photos or frames; 0 for splats, and for video files before import
+  CaptureLayout layout = CaptureLayout::kPhotos;
   int augment_files = 0;
-  bool is_film = false;   // frames without poses: coloured, not reconstructed
-  bool is_splat = false;  // its Gaussians are the geometry; `photos` are the views drawn from it
 };
+
+inline bool EstimatesPoses(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  const PoseSource poses = InfoOf(facts.layout).poses;
+  return poses == PoseSource::kEstimated ||
+         (poses == PoseSource::kOnRequest &&
+          import.film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO);
+}
+
+// Kind of scene that the import will make, as far as it is known.
+inline CaptureKind KindBeforeImport(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  const CaptureLayoutInfo& layout = InfoOf(facts.layout);
+  return layout.poses == PoseSource::kOnRequest && EstimatesPoses(facts, import)
+             ? CaptureKind::kDynamic
+             : layout.kind;
+}
 
 }  // namespace color3d

@@ -1,7 +1,6 @@
 #include "server/planning/spec_check.h"
 
 #include <fmt/core.h>
-#include <google/protobuf/message.h>
 
 #include <map>
 #include <set>
@@ -11,12 +10,11 @@
 #include "proto/option_text.h"
 #include "server/base/service_error.h"
 #include "server/planning/key_view_jobs.h"
+#include "server/planning/spec_values.h"
 
 namespace color3d {
 namespace {
 using google::protobuf::FieldDescriptor;
-using google::protobuf::Message;
-using google::protobuf::Reflection;
 
 constexpr int kMaxRepeated = 10'000;
 constexpr size_t kMaxTextBytes = 4096;
@@ -30,11 +28,6 @@ void CheckNumber(const FieldDescriptor* field, double value, const std::string& 
   if (!why.empty()) Reject(path, why);
 }
 
-void CheckEnum(const FieldDescriptor* field, int value, const std::string& path) {
-  if (field->enum_type()->FindValueByNumber(value) != nullptr) return;
-  Reject(path, fmt::format(" is {}, which is none of {}", value, ValuesText(field)));
-}
-
 void CheckText(const FieldDescriptor* field, size_t bytes, const std::string& path) {
   const int own = InfoOf(field).max_bytes();
   const size_t most = own > 0 ? static_cast<size_t>(own) : kMaxTextBytes;
@@ -43,48 +36,13 @@ void CheckText(const FieldDescriptor* field, size_t bytes, const std::string& pa
   }
 }
 
-void CheckMessage(const Message& message, const std::string& path);
-
-void CheckSingular(const Message& message, const FieldDescriptor* field, const std::string& path) {
-  const Reflection* reflection = message.GetReflection();
-  switch (field->cpp_type()) {
-    case FieldDescriptor::CPPTYPE_MESSAGE:
-      return CheckMessage(reflection->GetMessage(message, field), path);
-    case FieldDescriptor::CPPTYPE_ENUM:
-      return CheckEnum(field, reflection->GetEnumValue(message, field), path);
-    case FieldDescriptor::CPPTYPE_INT32:
-      return CheckNumber(field, reflection->GetInt32(message, field), path);
-    case FieldDescriptor::CPPTYPE_DOUBLE:
-      return CheckNumber(field, reflection->GetDouble(message, field), path);
-    case FieldDescriptor::CPPTYPE_STRING:
-      return CheckText(field, reflection->GetString(message, field).size(), path);
-    default:
-      return;
-  }
-}
-
-void CheckRepeated(const Message& message, const FieldDescriptor* field, const std::string& path) {
-  const Reflection* reflection = message.GetReflection();
-  const int count = reflection->FieldSize(message, field);
+// `path`: of the first entry.
+void CheckCount(const FieldDescriptor* field, int count, const std::string& path) {
   const int own = InfoOf(field).max_count();
   const int most = own > 0 ? own : kMaxRepeated;
   if (count > most) {
-    Reject(path, fmt::format(" has {} entries; at most {} are allowed", count, most));
-  }
-  for (int i = 0; field->cpp_type() == FieldDescriptor::CPPTYPE_ENUM && i < count; ++i) {
-    const int value = reflection->GetRepeatedEnumValue(message, field, i);
-    const std::string entry = fmt::format("{}[{}]", path, i);
-    CheckEnum(field, value, entry);
-    if (value == 0) Reject(entry, " is unspecified; name a value or leave the entry out");
-  }
-  for (int i = 0; field->cpp_type() == FieldDescriptor::CPPTYPE_STRING && i < count; ++i) {
-    CheckText(field,
-              reflection->GetRepeatedString(message, field, i).size(),
-              fmt::format("{}[{}]", path, i));
-  }
-  if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) return;
-  for (int i = 0; i < count; ++i) {
-    CheckMessage(reflection->GetRepeatedMessage(message, field, i), fmt::format("{}[{}]", path, i));
+    Reject(path.substr(0, path.rfind('[')),
+           fmt::format(" has {} entries; at most {} are allowed", count, most));
   }
 }
 
@@ -97,20 +55,44 @@ void CheckDigest(const v1::Digest& digest, const std::string& path) {
   }
 }
 
-// Checks field by field, recursively. `path`: the field as a client writes it.
-void CheckMessage(const Message& message, const std::string& path) {
-  if (const auto* digest = dynamic_cast<const v1::Digest*>(&message)) {
-    return CheckDigest(*digest, path);
-  }
-  std::vector<const FieldDescriptor*> fields;
-  message.GetReflection()->ListFields(message, &fields);
-  for (const FieldDescriptor* field : fields) {
-    const std::string field_path = path.empty() ? field->name() : path + "." + field->name();
-    if (field->is_repeated()) {
-      CheckRepeated(message, field, field_path);
-    } else {
-      CheckSingular(message, field, field_path);
+void CheckValue(const SpecValue& value) {
+  const auto& [owner, field, index, message, path] = value;
+  const google::protobuf::Reflection* reflection = owner.GetReflection();
+  const bool is_entry = field->is_repeated();
+  if (index == 0) CheckCount(field, reflection->FieldSize(owner, field), path);
+  switch (field->cpp_type()) {
+    case FieldDescriptor::CPPTYPE_MESSAGE:
+      if (const auto* digest = dynamic_cast<const v1::Digest*>(message)) CheckDigest(*digest, path);
+      return;
+    case FieldDescriptor::CPPTYPE_ENUM: {
+      const int number = is_entry ? reflection->GetRepeatedEnumValue(owner, field, index)
+                                  : reflection->GetEnumValue(owner, field);
+      if (field->enum_type()->FindValueByNumber(number) == nullptr) {
+        Reject(path, fmt::format(" is {}, which is none of {}", number, ValuesText(field)));
+      }
+      if (is_entry && number == 0) {
+        Reject(path, " is unspecified; name a value or leave the entry out");
+      }
+      return;
     }
+    case FieldDescriptor::CPPTYPE_INT32:
+      return CheckNumber(field,
+                         is_entry ? reflection->GetRepeatedInt32(owner, field, index)
+                                  : reflection->GetInt32(owner, field),
+                         path);
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+      return CheckNumber(field,
+                         is_entry ? reflection->GetRepeatedDouble(owner, field, index)
+                                  : reflection->GetDouble(owner, field),
+                         path);
+    case FieldDescriptor::CPPTYPE_STRING:
+      return CheckText(field,
+                       (is_entry ? reflection->GetRepeatedString(owner, field, index)
+                                 : reflection->GetString(owner, field))
+                           .size(),
+                       path);
+    default:
+      return;
   }
 }
 
@@ -188,7 +170,7 @@ void CheckKeyColor(const v1::KeyColorSource& source, const std::string& path) {
       fmt::format(" is required: where the key view's colour comes from (image, strokes, points, "
                   "automatic, ...). To learn which photo is the key view, first run {} and read "
                   "its artifact {}; `automatic` needs nothing of the user",
-                  StageThatLeaves(artifact::kKeyView)->kind,
+                  FindProducer(artifact::kKeyView)->kind,
                   artifact::kKeyView));
 }
 
@@ -341,53 +323,29 @@ void CheckSpec(const v1::JobSpec& spec) {
                        spec.ByteSizeLong(),
                        kMaxSpecBytes));
   }
-  CheckMessage(spec, "");
+  ForEachValue(spec, CheckValue);
   if (spec.has_colorize_scene()) CheckColorizeScene(spec.colorize_scene(), spec.inputs_size() > 0);
   if (spec.has_colorize_key_view()) {
     CheckKeyColor(spec.colorize_key_view().source(), kind + ".source");
   }
-  if (spec.has_carry_color()) {
-    CheckCarryColor(spec.carry_color(), /*of_whole_scene=*/false, kind);
-  }
-  if (spec.has_correct_colors()) CheckCorrections(spec.correct_colors(), kind);
-  if (spec.has_select_key_view()) CheckStrategy(spec.select_key_view(), kind);
   if (spec.has_personalize_scenes()) CheckRoutes(spec.personalize_scenes());
-  if (spec.has_render()) CheckRender(spec.render(), /*of_whole_scene=*/false, kind);
-  if (spec.has_evaluate()) {
-    CheckTruth(spec.evaluate().truth(), kind + ".truth");
-    CheckTraining(spec.evaluate().training_truth(),
-                  !spec.evaluate().truth().empty(),
-                  kind + ".training_truth");
-  }
+  // The options of another stage are empty, and pass.
+  CheckCarryColor(spec.carry_color(), /*of_whole_scene=*/false, kind);
+  CheckCorrections(spec.correct_colors(), kind);
+  CheckStrategy(spec.select_key_view(), kind);
+  CheckRender(spec.render(), /*of_whole_scene=*/false, kind);
+  CheckTruth(spec.evaluate().truth(), kind + ".truth");
+  CheckTraining(
+      spec.evaluate().training_truth(), !spec.evaluate().truth().empty(), kind + ".training_truth");
 }
-
-namespace {
-
-void CollectDigests(const Message& message, std::map<std::string, FileDigest>* digests) {
-  if (const auto* digest = dynamic_cast<const v1::Digest*>(&message)) {
-    (*digests)[digest->sha256()] = {digest->sha256(), digest->size_bytes()};
-    return;
-  }
-  const Reflection* reflection = message.GetReflection();
-  std::vector<const FieldDescriptor*> fields;
-  reflection->ListFields(message, &fields);
-  for (const FieldDescriptor* field : fields) {
-    if (field->cpp_type() != FieldDescriptor::CPPTYPE_MESSAGE) continue;
-    if (!field->is_repeated()) {
-      CollectDigests(reflection->GetMessage(message, field), digests);
-      continue;
-    }
-    for (int i = 0; i < reflection->FieldSize(message, field); ++i) {
-      CollectDigests(reflection->GetRepeatedMessage(message, field, i), digests);
-    }
-  }
-}
-
-}  // namespace
 
 std::vector<FileDigest> SpecBlobs(const v1::JobSpec& spec) {
   std::map<std::string, FileDigest> digests;
-  CollectDigests(spec, &digests);
+  ForEachValue(spec, [&](const SpecValue& value) {
+    if (const auto* digest = dynamic_cast<const v1::Digest*>(value.message)) {
+      digests[digest->sha256()] = {digest->sha256(), digest->size_bytes()};
+    }
+  });
   std::vector<FileDigest> result;
   for (const auto& [sha256, digest] : digests) result.push_back(digest);
   return result;

@@ -141,7 +141,8 @@ TEST(SpecNames, RefusesUnknownNames) {
 
 // The files' digests are added to the key by whoever knows the files.
 TEST(SpecNames, CacheKeysNameTheirFiles) {
-  const NewGraph graph = PlanJob(SpecWithNames(), {}, {.photos = 20, .has_poses = true});
+  const NewGraph graph =
+      PlanJob(SpecWithNames(), {}, {.pictures = 20, .layout = CaptureLayout::kColmap});
   std::map<std::string, StageKeyPart> parts;
   for (const NewJob& job : graph.jobs) {
     v1::JobSpec stage;
@@ -169,7 +170,8 @@ TEST(SpecNames, ColorizerKeepsItsEncoder) {
   personalize.name = "jobs/p";
   personalize.kind = "personalize";
   personalize.spec = trained.SerializeAsString();
-  const NewGraph graph = PlanJob(spec, {import, personalize}, {.photos = 20, .has_poses = true});
+  const NewGraph graph =
+      PlanJob(spec, {import, personalize}, {.pictures = 20, .layout = CaptureLayout::kColmap});
   v1::JobSpec planned;
   ASSERT_TRUE(planned.ParseFromString(graph.jobs.back().spec));
   EXPECT_EQ(planned.colorize_views().encoder(), "tiny");
@@ -211,6 +213,47 @@ TEST(RenderSpecTest, NamesMissingAndUselessOptions) {
   EXPECT_THAT(CheckRender([](Spec* s) { s->set_frames(0); }), HasSubstr("1 to 18000"));
   EXPECT_THAT(CheckRender([](Spec* s) { s->set_path(Spec::PATH_ORBIT); }, true),
               HasSubstr("color3d turntable"));
+}
+
+TEST(SpecCheckTest, NamesEntryOfListByPath) {
+  const auto complaint = [](auto change) {
+    v1::JobSpec spec;
+    spec.set_scene("scenes/test");
+    change(&spec);
+    try {
+      CheckSpec(spec);
+    } catch (const ServiceError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_THAT(complaint([](v1::JobSpec* spec) {
+                auto* augmentations = spec->mutable_generate_augmentations();
+                augmentations->add_kinds(v1::GenerateAugmentationsSpec::KIND_OUTPAINT);
+                augmentations->add_kinds(v1::GenerateAugmentationsSpec::KIND_UNSPECIFIED);
+              }),
+              HasSubstr("generate_augmentations.kinds[1] is unspecified"));
+  EXPECT_THAT(complaint([](v1::JobSpec* spec) {
+                spec->mutable_render()->add_views("0001");
+                spec->mutable_render()->add_views(std::string(5000, 'a'));
+              }),
+              HasSubstr("render.views[1] has 5000 bytes; at most 4096"));
+  EXPECT_THAT(complaint([](v1::JobSpec* spec) {
+                v1::TruthImage* truth = spec->mutable_evaluate()->add_truth();
+                truth->set_view("0001");
+                truth->mutable_image();  // empty
+              }),
+              HasSubstr("evaluate.truth[0].image.sha256 must be 64"));
+  EXPECT_EQ(complaint([](v1::JobSpec* spec) { spec->mutable_render()->add_views("0001"); }), "");
+}
+
+TEST(SpecCheckTest, CollectsDigestsOfListsOnce) {
+  v1::JobSpec spec;
+  auto* source = spec.mutable_colorize_key_view()->mutable_source();
+  for (const char* text : {"a", "b", "a"}) {
+    *source->mutable_references()->add_images() = SomeDigest(text);
+  }
+  EXPECT_EQ(SpecBlobs(spec).size(), 2u);
 }
 
 }  // namespace

@@ -2,38 +2,10 @@
 
 #include "proto/option_text.h"
 #include "server/base/service_error.h"
+#include "server/planning/spec_values.h"
 
 namespace color3d {
 namespace {
-using google::protobuf::FieldDescriptor;
-using google::protobuf::Message;
-using google::protobuf::Reflection;
-
-void Collect(const Message& message, const std::string& path, SpecNames* names) {
-  const Reflection* reflection = message.GetReflection();
-  std::vector<const FieldDescriptor*> fields;
-  reflection->ListFields(message, &fields);
-  for (const FieldDescriptor* field : fields) {
-    const std::string here = path.empty() ? field->name() : path + "." + field->name();
-    if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
-      if (!field->is_repeated()) {
-        Collect(reflection->GetMessage(message, field), here, names);
-        continue;
-      }
-      for (int i = 0; i < reflection->FieldSize(message, field); ++i) {
-        Collect(reflection->GetRepeatedMessage(message, field, i),
-                fmt::format("{}[{}]", here, i),
-                names);
-      }
-      continue;
-    }
-    const v1::OptionInfo::Names kind = InfoOf(field).names();
-    if (kind == v1::OptionInfo::NAMES_UNSPECIFIED) continue;
-    const std::string name = reflection->GetString(message, field);
-    if (name.empty()) continue;
-    (kind == v1::OptionInfo::NAMES_MODEL ? names->models : names->backends).push_back({here, name});
-  }
-}
 
 template <typename Value>
 void Require(const std::vector<NameUse>& uses,
@@ -57,7 +29,14 @@ void Require(const std::vector<NameUse>& uses,
 
 SpecNames NamesIn(const v1::JobSpec& spec) {
   SpecNames names;
-  Collect(spec, "", &names);
+  ForEachValue(spec, [&](const SpecValue& value) {
+    const v1::OptionInfo::Names kind = InfoOf(value.field).names();
+    if (kind == v1::OptionInfo::NAMES_UNSPECIFIED) return;
+    const std::string name = value.owner.GetReflection()->GetString(value.owner, value.field);
+    if (name.empty()) return;
+    (kind == v1::OptionInfo::NAMES_MODEL ? names.models : names.backends)
+        .push_back({value.path, name});
+  });
   return names;
 }
 

@@ -20,6 +20,7 @@ constexpr double kBaseSeconds = 6.0;
 constexpr double kSecondsPerPhoto = 1.7;  // carrying, colouring, rendering and scoring one view
 // Films are coloured along the optical flow: carrying 0.1, colouring 0.3, movie and metrics 0.1.
 constexpr double kSecondsPerFrame = 0.5;
+constexpr char kFewerFrames[] = ", or fewer frames (film_stride, film_begin_s, film_end_s)";
 constexpr double kMinScheduledSeconds = 15.0;  // with less, the result is of no use
 
 // Shares of the rest, chosen by where the error falls fastest per second.
@@ -27,55 +28,70 @@ constexpr double kGeometryShare = 0.25;
 constexpr double kPersonalizeShare = 0.70;
 constexpr double kChromaShare = 0.05;
 
-bool FindsPoses(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
-  return facts.is_film ? import.film_poses() == v1::ImportSceneSpec::FILM_POSES_AUTO
-                       : !facts.has_poses;
-}
-
-// The frames of video files are not counted before the import.
-bool ViewsAreKnown(const SceneFacts& facts) { return facts.photos > 0 || facts.is_splat; }
-
-// Number of views that the import will make.
-int ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
-  if (facts.is_splat) return import.has_splat_views() ? import.splat_views() : kSplatViews;
-  if (!facts.is_film) return facts.photos;
+// Number of frames that the import will take of a film.
+int FramesInRange(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   const double rate = import.has_film_frames_per_second() ? import.film_frames_per_second()
                                                           : kDefaultFramesPerSecond;
   const auto first_from = [&](double time_s) {
-    return static_cast<int>(std::clamp(std::ceil(time_s * rate), 0.0, 1.0 * facts.photos));
+    return static_cast<int>(std::clamp(std::ceil(time_s * rate), 0.0, 1.0 * facts.pictures));
   };
-  const int end = import.has_film_end_s() ? first_from(import.film_end_s()) : facts.photos;
+  const int end = import.has_film_end_s() ? first_from(import.film_end_s()) : facts.pictures;
   const int inside = std::max(0, end - first_from(import.film_begin_s()));
   const int stride = std::max(1, import.film_stride());
   return (inside + stride - 1) / stride;
 }
 
+struct ExpectedViews {
+  int count = 0;            // that the import will make
+  bool is_counted = false;  // the frames of video files are not counted before the import
+  const char* noun = "photos";
+  const char* fewer = ", or fewer photos";  // remedy
+  bool have_geometry = false;
+};
+
+ExpectedViews ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  const bool is_counted = facts.pictures > 0;
+  switch (InfoOf(facts.layout).views) {
+    case ViewSource::kSplatRenders:
+      return {.count = import.has_splat_views() ? import.splat_views() : kSplatViews,
+              .is_counted = true,
+              .noun = "views",
+              .fewer = ", or fewer views (splat_views)",
+              .have_geometry = true};
+    case ViewSource::kFrames:
+      return {FramesInRange(facts, import), is_counted, "frames", kFewerFrames};
+    case ViewSource::kPhotos:
+      break;
+  }
+  return {facts.pictures, is_counted};
+}
+
+bool IsReconstructed(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  return InfoOf(KindBeforeImport(facts, import)).is_reconstructed;
+}
+
 std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   const double fixed = FixedSeconds(facts, import);
-  const std::string subject =
-      !ViewsAreKnown(facts)
-          ? "a film takes, without its frames,"
-          : fmt::format("{} {} take", ViewsOf(facts, import), facts.is_film ? "frames" : "photos");
-  const char* fewer = !ViewsAreKnown(facts) ? ""
-                      : facts.is_film ? ", or fewer frames (film_stride, film_begin_s, film_end_s)"
-                                      : ", or fewer photos";
+  const ExpectedViews views = ViewsOf(facts, import);
   return fmt::format(
       "time_budget_seconds is {:.0f}, but {} about {:.0f} s in stages that cannot be shortened{}; "
       "give at least {:.0f} s{}",
       std::ceil(seconds),
-      subject,
+      views.is_counted ? fmt::format("{} {} take", views.count, views.noun)
+                       : "a film takes, without its frames,",
       std::ceil(fixed),
-      ViewsAreKnown(facts) && FindsPoses(facts, import) ? " (finding their poses among them)" : "",
+      views.is_counted && EstimatesPoses(facts, import) ? " (finding their poses among them)" : "",
       std::ceil(fixed + kMinScheduledSeconds),
-      fewer);
+      views.is_counted ? views.fewer : "");
 }
 
 }  // namespace
 
 double FixedSeconds(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
-  const double per_view = (facts.is_film ? kSecondsPerFrame : kSecondsPerPhoto) +
-                          (FindsPoses(facts, import) ? kPosesSecondsPerPhoto : 0.0);
-  return kBaseSeconds + per_view * ViewsOf(facts, import);
+  const bool is_film = !InfoOf(InfoOf(facts.layout).kind).is_reconstructed;
+  const double per_view = (is_film ? kSecondsPerFrame : kSecondsPerPhoto) +
+                          (EstimatesPoses(facts, import) ? kPosesSecondsPerPhoto : 0.0);
+  return kBaseSeconds + per_view * ViewsOf(facts, import).count;
 }
 
 TimeBudget DivideTimeBudget(double seconds,
@@ -88,12 +104,13 @@ TimeBudget DivideTimeBudget(double seconds,
                        {{fmt::format("spec.{}.time_budget_seconds", kind::kColorizeScene),
                          "too short for this scene"}});
   }
-  if (facts.is_splat) {  // the geometry is given
+  const ExpectedViews views = ViewsOf(facts, import);
+  if (views.have_geometry) {
     return {0.0, (kGeometryShare + kPersonalizeShare) * rest, kChromaShare * rest};
   }
-  if (facts.is_film && !FindsPoses(facts, import)) {  // nothing is reconstructed
+  if (!IsReconstructed(facts, import)) {
     // The shares of geometry and chroma are kept for frames that are not counted yet.
-    return {0.0, ViewsAreKnown(facts) ? rest : kPersonalizeShare * rest, 0.0};
+    return {0.0, views.is_counted ? rest : kPersonalizeShare * rest, 0.0};
   }
   return {kGeometryShare * rest, kPersonalizeShare * rest, kChromaShare * rest};
 }

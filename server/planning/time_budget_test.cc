@@ -30,7 +30,7 @@ TEST(Planner, DividesTheTimeBudget) {
 TEST(Planner, GeometryOfASplatTakesNoTime) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(90);
-  const SceneFacts splat = {.has_poses = true, .is_splat = true};
+  const SceneFacts splat = {.layout = CaptureLayout::kSplat};
   const NewGraph graph = PlanJob(spec, {}, splat);
   const double personalize = SpecOf(graph, "personalize").personalize().time_limit_seconds();
   const double chroma = SpecOf(graph, "solve_chroma").solve_chroma().time_limit_seconds();
@@ -38,10 +38,11 @@ TEST(Planner, GeometryOfASplatTakesNoTime) {
 }
 
 TEST(Planner, BudgetsAllViewsOfASplat) {
-  const SceneFacts splat = {.has_poses = true, .is_splat = true};
-  const SceneFacts photos = {.photos = 200, .has_poses = true};
+  const SceneFacts splat = {.layout = CaptureLayout::kSplat};
+  const SceneFacts photos = {.pictures = 200, .layout = CaptureLayout::kColmap};
   v1::ImportSceneSpec import;
-  EXPECT_EQ(FixedSeconds(splat, import), FixedSeconds({.photos = 24, .has_poses = true}));
+  EXPECT_EQ(FixedSeconds(splat, import),
+            FixedSeconds({.pictures = 24, .layout = CaptureLayout::kColmap}));
   import.set_splat_views(200);
   EXPECT_EQ(FixedSeconds(splat, import), FixedSeconds(photos));
   v1::JobSpec spec = SceneSpec();
@@ -62,7 +63,7 @@ double PersonalizeSeconds(const v1::JobSpec& spec, const SceneFacts& facts) {
 TEST(Planner, BudgetOfAFilmGoesToPersonalization) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(120);
-  const SceneFacts film = {.photos = 65, .is_film = true};
+  const SceneFacts film = {.pictures = 65, .layout = CaptureLayout::kFilm};
   EXPECT_NEAR(FixedSeconds(film), 39.0, 1.0);
   EXPECT_NEAR(PersonalizeSeconds(spec, film) + FixedSeconds(film), 120.0, 1e-6);
   v1::ImportSceneSpec* import = spec.mutable_colorize_scene()->mutable_import_scene();
@@ -75,10 +76,11 @@ TEST(Planner, BudgetOfAFilmGoesToPersonalization) {
 }
 
 TEST(Planner, UnusedFramesTakeNoTime) {
-  const SceneFacts film = {.photos = 3000, .is_film = true};
+  const SceneFacts film = {.pictures = 3000, .layout = CaptureLayout::kFilm};
   const auto same_as = [&](int frames, const v1::ImportSceneSpec& import) {
-    EXPECT_NEAR(
-        FixedSeconds(film, import), FixedSeconds({.photos = frames, .is_film = true}), 1e-6);
+    EXPECT_NEAR(FixedSeconds(film, import),
+                FixedSeconds({.pictures = frames, .layout = CaptureLayout::kFilm}),
+                1e-6);
   };
   v1::ImportSceneSpec import;
   import.set_film_stride(7);
@@ -91,11 +93,17 @@ TEST(Planner, UnusedFramesTakeNoTime) {
   import.set_film_begin_s(1e6);
   import.clear_film_end_s();
   same_as(0, import);
+  import.Clear();
+  import.set_film_stride(7);
+  const auto seconds = [&](int frames, const v1::ImportSceneSpec& with) {
+    return FixedSeconds({.pictures = frames, .layout = CaptureLayout::kFilms}, with);
+  };
+  EXPECT_NEAR(seconds(3000, import), seconds(429, {}), 1e-6) << "of several cameras";
 }
 
 TEST(Planner, BudgetsFilmsOfUnknownLength) {
-  const SceneFacts video = {.photos = 0, .is_film = true};
-  const SceneFacts rig = {.photos = 0, .has_poses = true};
+  const SceneFacts video = {.pictures = 0, .layout = CaptureLayout::kFilm};
+  const SceneFacts rig = {.layout = CaptureLayout::kTransforms};
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(30);
   for (const SceneFacts& facts : {video, rig}) {
@@ -116,10 +124,10 @@ TEST(Planner, RefusalOfAFilmSpeaksOfFrames) {
     }
     return std::string("nothing");
   };
-  EXPECT_THAT(complaint(40, {.photos = 65, .is_film = true}),
+  EXPECT_THAT(complaint(40, {.pictures = 65, .layout = CaptureLayout::kFilm}),
               HasSubstr("65 frames take about 39 s in stages that cannot be shortened; give at "
                         "least 54 s, or fewer frames (film_stride"));
-  EXPECT_THAT(complaint(12, {.photos = 0, .is_film = true}),
+  EXPECT_THAT(complaint(12, {.pictures = 0, .layout = CaptureLayout::kFilm}),
               HasSubstr("a film takes, without its frames, about 6 s"));
 }
 

@@ -1,4 +1,4 @@
-// Places that belong to each RPC (CONTRIBUTING.md, "An RPC"). AccessTest.EveryRpcRequiresRole
+// Places of each RPC, as listed in CONTRIBUTING.md. AccessTest.EveryRpcRequiresRole
 // covers its service and its role.
 #include <gtest/gtest.h>
 

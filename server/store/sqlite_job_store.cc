@@ -33,7 +33,7 @@ SqliteJobStore::~SqliteJobStore() = default;
 
 namespace {
 
-ServiceError NoSuchJob(const std::string& name) {
+ServiceError JobNotFound(const std::string& name) {
   return ServiceError(ErrorReason::kJobNotFound, "there is no job '{}'", name);
 }
 
@@ -49,7 +49,7 @@ std::optional<JobRecord> SqliteJobStore::FindJob(SqliteDatabase& db, const std::
 
 JobRecord SqliteJobStore::RequireJob(SqliteDatabase& db, const std::string& name) {
   std::optional<JobRecord> job = FindJob(db, name);
-  if (!job) throw NoSuchJob(name);
+  if (!job) throw JobNotFound(name);
   return *std::move(job);
 }
 
@@ -255,7 +255,7 @@ std::vector<int64_t> SqliteJobStore::ResolveWatch(const std::vector<std::string>
   std::set<int64_t> ids;
   for (const std::string& name : names) {
     SqliteStatement select(db, "select job_id from job where name=?1 or parent=?1", name);
-    if (!select.Step()) throw NoSuchJob(name);
+    if (!select.Step()) throw JobNotFound(name);
     do {
       ids.insert(select.Int(0));
     } while (select.Step());

@@ -99,7 +99,7 @@ bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
 }
 
 // Writes nothing if nothing has changed, so that the server can still answer reads on a full disk.
-void RecordServer(SqliteDatabase& db, const ServerIdentity& identity) {
+void RecordServerIdentity(SqliteDatabase& db, const ServerIdentity& identity) {
   if (IsKnown(db, identity)) return;
   SqliteTransaction transaction(db);
   if (!SqliteStatement(db, "select 1 from server where boot_id=?", identity.boot_id).Step()) {
@@ -146,7 +146,7 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
     Migrate(db);
   }
   EnableSpaceReturn(file, db);
-  RecordServer(db, identity);
+  RecordServerIdentity(db, identity);
 }
 
 }  // namespace color3d

@@ -46,7 +46,7 @@ Entry Split(const std::string& text, const std::string& flag, const std::string&
   return entry;
 }
 
-[[noreturn]] void ThrowRepeatedName(const std::string& flag, const std::string& name) {
+[[noreturn]] void RejectDuplicate(const std::string& flag, const std::string& name) {
   throw InvalidArgument("{} {} is given twice; give each name once", flag, name);
 }
 
@@ -69,13 +69,13 @@ UserModels ParseUserModels(const std::vector<std::string>& models,
   for (const std::string& text : models) {
     const Entry entry = Split(text, "--model", "FILE");
     if (!result.files.emplace(entry.name, fs::absolute(entry.value)).second) {
-      ThrowRepeatedName("--model", entry.name);
+      RejectDuplicate("--model", entry.name);
     }
   }
   for (const std::string& text : backends) {
     const Entry entry = Split(text, "--backend", "ADDRESS");
     if (!result.backends.emplace(entry.name, entry.value).second) {
-      ThrowRepeatedName("--backend", entry.name);
+      RejectDuplicate("--backend", entry.name);
     }
   }
   return result;

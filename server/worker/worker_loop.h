@@ -10,9 +10,9 @@
 
 #include "server/store/user_models.h"
 #include "server/worker/lease_keeper.h"
-#include "server/worker/live_engine.h"
+#include "server/worker/live/live_engine.h"
 #include "server/worker/stage_runner.h"
-#include "server/worker/worker_settings.h"
+#include "server/worker/supervision/worker_settings.h"
 
 namespace color3d {
 

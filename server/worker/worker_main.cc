@@ -18,9 +18,9 @@
 #include "server/ops/stop_signals.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
-#include "server/worker/inference_worker.h"
+#include "server/worker/live/inference_worker.h"
+#include "server/worker/supervision/worker_settings.h"
 #include "server/worker/worker_loop.h"
-#include "server/worker/worker_settings.h"
 
 namespace color3d {
 namespace {
@@ -139,7 +139,7 @@ void LimitMemory(int64_t memory_mib) {
   constexpr int64_t kLeastBytes = int64_t{256} << 20;
   // Sanitizers reserve terabytes, which would count.
   constexpr int64_t kMostReserved = int64_t{1} << 40;
-  if (!BeEndedFirstWhenMemoryRunsOut()) {
+  if (!PreferAsOomVictim()) {
     spdlog::warn("the kernel may kill the server before this worker when memory runs out");
   }
   if (memory_mib == 0) return;

@@ -85,9 +85,9 @@ void CompareDdcolor(WeightMap weights, Comparison& comparison) {
   const Ddcolor network(std::move(weights));
   const Image input = PictureOf(comparison.Expected("input"), 0);
   at::NoGradGuard no_grad;
-  const torch::Tensor normalised = ConvNext::NormaliseInput(TensorFromImage(input));
-  const std::vector<torch::Tensor> stages = network.encoder().StageOutputs(normalised, 4);
-  const std::vector<torch::Tensor> taps = network.encoder().Taps(normalised);
+  const torch::Tensor normalized = ConvNext::NormalizeInput(TensorFromImage(input));
+  const std::vector<torch::Tensor> stages = network.encoder().StageOutputs(normalized, 4);
+  const std::vector<torch::Tensor> taps = network.encoder().Taps(normalized);
   for (int i = 0; i < 4; ++i) {
     comparison.Add(fmt::format("stage{}", i), ValuesOf(stages[i]));
     comparison.Add(fmt::format("norm{}", i), ValuesOf(taps[i]));
@@ -99,7 +99,7 @@ std::vector<float> AsFloats(const std::vector<int64_t>& values) {
   return {values.begin(), values.end()};
 }
 
-void Normalise(std::vector<float>& feature) {
+void Normalize(std::vector<float>& feature) {
   double sum = 0.0;
   for (const float value : feature) sum += static_cast<double>(value) * value;
   for (float& value : feature) value = static_cast<float>(value / std::sqrt(sum));
@@ -119,14 +119,14 @@ std::string CompareClip(WeightMap weights,
   for (int64_t i = 0; i < pictures.shape.at(0); ++i) {
     images.push_back(clip.ImageFeatures(PictureOf(pictures, i)));
     all_images.insert(all_images.end(), images.back().begin(), images.back().end());
-    Normalise(images.back());
+    Normalize(images.back());
   }
   for (int64_t i = 0; i < tokens.shape[0]; ++i) {
     const auto begin = tokens.values.begin() + i * tokens.shape[1];
     texts.push_back(
         clip.TextFeaturesOfTokens(std::vector<int64_t>(begin, begin + tokens.shape[1])));
     all_texts.insert(all_texts.end(), texts.back().begin(), texts.back().end());
-    Normalise(texts.back());
+    Normalize(texts.back());
   }
   for (const auto& image : images) {
     for (const auto& text : texts) {
@@ -162,7 +162,7 @@ int RunGolden(const GoldenArguments& args) {
   WeightMap weights = ReadWeightFile(args.weights_file);
   std::string network;
   std::string skipped;
-  if (Ddcolor::Recognises(weights)) {
+  if (Ddcolor::Recognizes(weights)) {
     network = "DDColor";
     CompareDdcolor(std::move(weights), comparison);
   } else if (HoldsClip(weights)) {

@@ -13,10 +13,10 @@ namespace color3d {
 namespace {
 
 constexpr char kScene[] = "scenes/a";
-constexpr SceneFacts kFacts[] = {{.photos = 20, .has_poses = true},
-                                 {.photos = 2, .augment_files = 3},
-                                 {.photos = 90, .is_film = true},
-                                 {.has_poses = true, .is_splat = true}};
+constexpr SceneFacts kFacts[] = {{.pictures = 20, .layout = CaptureLayout::kColmap},
+                                 {.pictures = 2, .augment_files = 3},
+                                 {.pictures = 90, .layout = CaptureLayout::kFilm},
+                                 {.layout = CaptureLayout::kSplat}};
 
 // A job of each kind that others read.
 std::vector<JobRecord> InputsOf(const std::string& scene) {

@@ -8,7 +8,7 @@
 #include "core/base/random.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
-#include "core/colorizer/colorizer.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "tests/stability/stability_case.h"
 
 namespace color3d {

@@ -15,6 +15,7 @@
 #include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/weight_digest.h"
+#include "core/image/image_checks.h"
 #include "core/weights/weight_file.h"
 
 namespace color3d {
@@ -51,16 +52,8 @@ torch::Tensor CenterSquare(const torch::Tensor& rgb, int64_t side) {
   return resized.slice(2, top, top + side).slice(3, left, left + side).contiguous();
 }
 
-std::vector<float> Values(const torch::Tensor& tensor) {
-  const torch::Tensor flat = tensor.flatten().contiguous();
-  return {flat.data_ptr<float>(), flat.data_ptr<float>() + flat.numel()};
-}
-
 Image GrayPicture(const Image& luminance) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the encoder takes a picture with 1 channel (L), but got {} channels",
-                          luminance.channels);
-  }
+  RequireLuminance(luminance, "the encoder");
   return SrgbFromLab(luminance);
 }
 
@@ -71,7 +64,7 @@ double Norm(const std::vector<float>& values) {
 }
 
 // Reads config.json (Hugging Face) or open_clip_config.json beside the weights.
-bool QuickGeluOf(const std::filesystem::path& weights) {
+bool UsesQuickGelu(const std::filesystem::path& weights) {
   for (const char* name : {"open_clip_config.json", "config.json"}) {
     const std::filesystem::path path = weights.parent_path() / name;
     if (!std::filesystem::is_regular_file(path)) continue;
@@ -121,7 +114,7 @@ std::shared_ptr<const ClipModel> ClipModel::FromWeightFile(const std::filesystem
         path.string(),
         weights.size());
   }
-  const auto model = std::make_shared<ClipModel>(std::move(weights), QuickGeluOf(path));
+  const auto model = std::make_shared<ClipModel>(std::move(weights), UsesQuickGelu(path));
   if (!model->network_->HasText()) return model;
   for (const char* name : kVocabularyNames) {
     const std::filesystem::path vocabulary = path.parent_path() / name;
@@ -148,7 +141,7 @@ std::vector<float> ClipModel::ImageFeatures(const Image& srgb) const {
   const torch::Tensor rgb = RgbTensor(srgb);
   return WithTorchErrors("CLIP", [&] {
     at::NoGradGuard no_grad;
-    return Values(network_->EncodeImages(CenterSquare(rgb, network_->input_side_px())));
+    return TensorValues(network_->EncodeImages(CenterSquare(rgb, network_->input_side_px())));
   });
 }
 
@@ -190,7 +183,7 @@ std::vector<float> ClipModel::TextFeaturesOfTokens(const std::vector<int64_t>& t
   }
   return WithTorchErrors("CLIP", [&] {
     at::NoGradGuard no_grad;
-    return Values(network_->EncodeTokens(torch::tensor(tokens, torch::kInt64).unsqueeze(0)));
+    return TensorValues(network_->EncodeTokens(torch::tensor(tokens, torch::kInt64).unsqueeze(0)));
   });
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/encoder/weight_tensors.h"
 #include "core/weights/weight_reader.h"
 
 namespace color3d {
@@ -37,11 +38,8 @@ class ClipNetwork {
   torch::Tensor EncodeTokens(const torch::Tensor& tokens) const;
 
  private:
-  struct Linear {
-    torch::Tensor weight, bias;
-  };
   struct Block {
-    Linear in, out, norm1, norm2, expand, contract;
+    Layer in, out, norm1, norm2, expand, contract;
   };
   struct Tower {
     int64_t width = 0;
@@ -63,9 +61,9 @@ class ClipNetwork {
   int patch_px_ = 0;
   Tower vision_, text_;
   torch::Tensor patch_weight_, class_embedding_, vision_position_, vision_projection_;
-  Linear norm_pre_, norm_post_;
+  Layer norm_pre_, norm_post_;
   torch::Tensor token_embedding_, text_position_, text_projection_;
-  Linear norm_final_;
+  Layer norm_final_;
 };
 
 }  // namespace color3d

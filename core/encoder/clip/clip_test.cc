@@ -97,7 +97,7 @@ TEST(ClipModelTest, DescribesGrayPicturesOfAnySize) {
   EXPECT_THROW(model.ImageFeatures(Image(4, 4, 2)), Error);
 }
 
-TEST(ClipModelTest, ReadsActivationBesideTheWeights) {
+TEST(ClipModelTest, ReadsActivationFromConfig) {
   const ScratchFolder folder;
   const auto path = folder.path() / "clip.safetensors";
   WriteFileAtomic(path, SerializeSafetensors(SyntheticClipWeights({}, 1), false));
@@ -111,7 +111,7 @@ TEST(ClipModelTest, ReadsActivationBesideTheWeights) {
   EXPECT_NO_THROW(ClipModel::FromWeightFile(path));
 }
 
-TEST(ClipModelTest, AgreesWithTheAuthorsNetwork) {
+TEST(ClipModelTest, AgreesWithAuthorsNetwork) {
   if (!std::filesystem::exists(Golden("clip_mini.safetensors"))) GTEST_SKIP() << "no data";
   ClipModel clip(ReadWeightFile(Golden("clip_mini.safetensors")), /*quick_gelu=*/true);
   clip.LoadVocabulary(std::filesystem::path(COLOR3D_SHARED_DATA) /

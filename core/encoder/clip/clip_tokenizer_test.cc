@@ -34,9 +34,9 @@ std::vector<int64_t> Words(const std::string& text) {
   return words;
 }
 
-TEST(ClipTokenizerTest, MergesTheBestPairsFirst) {
+TEST(ClipTokenizerTest, MergesBestPairsFirst) {
   EXPECT_EQ(Words("the abc at"), (std::vector<int64_t>{Merge(3), Merge(2), Merge(4)}));
-  // "th" comes before "a t": no merge crosses, and an unfinished "th" stays one symbol.
+  // "t h" is merged first, so that "a t" has nothing to merge.
   EXPECT_EQ(Words("tha"), (std::vector<int64_t>{Merge(0), AtEnd('a')}));
   EXPECT_EQ(Words("abab"), (std::vector<int64_t>{Merge(1), Inside('a'), AtEnd('b')}));
 }
@@ -58,7 +58,7 @@ TEST(ClipTokenizerTest, ReadsAnyBytes) {
   EXPECT_TRUE(Words("").empty());
 }
 
-TEST(ClipTokenizerTest, CutsLongTextBeforeTheEndOfText) {
+TEST(ClipTokenizerTest, TruncatesLongText) {
   std::string text;
   for (int i = 0; i < 200; ++i) text += "the ";
   const ClipTokenizer tokenizer(kText, kVocabulary, "test");
@@ -77,14 +77,14 @@ TEST(ClipTokenizerTest, RefusesOtherFilesAsVocabulary) {
   EXPECT_THROW(ClipTokenizer::FromFile("/nonexistent", 515), Error);
 }
 
-TEST(ClipTokenizerTest, ReadsAPlainFile) {
+TEST(ClipTokenizerTest, ReadsPlainFile) {
   const ScratchFolder folder;
   WriteFileAtomic(folder.path() / "merges.txt", kText);
   const auto tokenizer = ClipTokenizer::FromFile(folder.path() / "merges.txt", kVocabulary);
   EXPECT_EQ(tokenizer.Tokens("the")[1], Merge(3));
 }
 
-TEST(ClipTokenizerTest, AgreesWithTheAuthorsTokens) {
+TEST(ClipTokenizerTest, AgreesWithAuthorsTokens) {
   const std::filesystem::path data = COLOR3D_SHARED_DATA;
   const std::filesystem::path vocabulary = data / "weights/clip_vocab/bpe_simple_vocab_16e6.txt.gz";
   const std::filesystem::path expected = data / "golden/clip_mini.expected.safetensors";

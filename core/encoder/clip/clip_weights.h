@@ -5,7 +5,8 @@
 
 namespace color3d {
 
-// Whether the names are those of a CLIP in the layout of OpenAI (and open_clip) or Hugging Face.
+// Returns whether the names are those of a CLIP in the layout of OpenAI (and open_clip) or Hugging
+// Face.
 bool HoldsClip(const WeightMap& weights);
 
 // Converts Hugging Face's layout to OpenAI's: stacks q, k and v, transposes projections and drops

@@ -86,7 +86,7 @@ WeightMap HuggingFaceLayout(const WeightMap& openai) {
   return out;
 }
 
-TEST(ClipWeightsTest, ReadsBothLayoutsAsTheSameModel) {
+TEST(ClipWeightsTest, ReadsBothLayoutsAsSameModel) {
   const WeightMap openai = SyntheticClipWeights({}, 7);
   const WeightMap other = HuggingFaceLayout(openai);
   ASSERT_TRUE(HoldsClip(openai));
@@ -117,7 +117,6 @@ TEST(ClipWeightsTest, NamesArraysThatDoNotFit) {
   EXPECT_THROW(ClipModel(resnet, true), Error);
 }
 
-// Distinguishes transformer blocks by number, and q from k by position.
 TEST(ClipWeightsTest, ListsIncompleteAttentionStack) {
   WeightMap other = HuggingFaceLayout(SyntheticClipWeights({}, 7));
   other.erase("vision_model.encoder.layers.0.self_attn.k_proj.weight");

@@ -12,6 +12,7 @@
 #include "core/encoder/weight_digest.h"
 #include "core/encoder/weight_tensors.h"
 #include "core/image/codec.h"
+#include "core/image/image_checks.h"
 
 namespace color3d {
 namespace {
@@ -22,22 +23,13 @@ constexpr int kDeepSidePx = 384;
 constexpr int kDeepStridePx = 16;
 
 // Layer norm over the channels of [B,C,H,W]. Copies nothing if x is channels-last.
-torch::Tensor ChannelNorm(const torch::Tensor& x,
-                          const torch::Tensor& weight,
-                          const torch::Tensor& bias) {
-  return torch::layer_norm(x.permute({0, 2, 3, 1}).to(weight.scalar_type()),
+torch::Tensor ChannelNorm(const torch::Tensor& x, const Layer& norm) {
+  return torch::layer_norm(x.permute({0, 2, 3, 1}).to(norm.weight.scalar_type()),
                            {x.size(1)},
-                           weight,
-                           bias,
+                           norm.weight,
+                           norm.bias,
                            kNormEpsilon)
       .permute({0, 3, 1, 2});
-}
-
-void CheckLuminance(const Image& luminance) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the encoder takes a picture with 1 channel (L), but got {} channels",
-                          luminance.channels);
-  }
 }
 
 // sRGB grey of L (0..100), elementwise: inverse CIE f, then the sRGB transfer function
@@ -65,80 +57,40 @@ ConvNext::ConvNext(const ConvNextConfig& config, WeightMap weights, std::string 
       digest_(DigestOfWeights(config.ToString(), weights)),
       description_(std::move(description)) {
   WeightReader reader(std::move(weights), "the encoder weights");
+  const auto take = [&](const std::string& name, const std::vector<int64_t>& shape) {
+    return parameters_.emplace_back(name, TakeTensor(reader, name, shape)).second;
+  };
+  const auto layer = [&](const std::string& name, const std::vector<int64_t>& shape) {
+    return Layer{take(name + ".weight", shape), take(name + ".bias", {shape[0]})};
+  };
   for (int i = 0; i < config.StageCount(); ++i) {
-    Stage stage;
     const int64_t c = config.dims[i];
+    const int64_t before = i == 0 ? 3 : config.dims[i - 1];
+    const int64_t kernel = i == 0 ? config.stem_kernel : 2;
     const std::string down = fmt::format("downsample_layers.{}.", i);
-    if (i == 0) {
-      stage.down_weight =
-          TakeTensor(reader, down + "0.weight", {c, 3, config.stem_kernel, config.stem_kernel});
-      stage.down_bias = TakeTensor(reader, down + "0.bias", {c});
-      stage.down_norm_weight = TakeTensor(reader, down + "1.weight", {c});
-      stage.down_norm_bias = TakeTensor(reader, down + "1.bias", {c});
-    } else {
-      const int64_t before = config.dims[i - 1];
-      stage.down_norm_weight = TakeTensor(reader, down + "0.weight", {before});
-      stage.down_norm_bias = TakeTensor(reader, down + "0.bias", {before});
-      stage.down_weight = TakeTensor(reader, down + "1.weight", {c, before, 2, 2});
-      stage.down_bias = TakeTensor(reader, down + "1.bias", {c});
-    }
+    Stage stage;
+    stage.down = layer(down + (i == 0 ? "0" : "1"), {c, before, kernel, kernel});
+    stage.down_norm = layer(down + (i == 0 ? "1" : "0"), {i == 0 ? c : before});
     for (int j = 0; j < config.depths[i]; ++j) {
       const std::string name = fmt::format("stages.{}.{}.", i, j);
-      Block block;
-      block.dwconv_weight = TakeTensor(reader, name + "dwconv.weight", {c, 1, 7, 7});
-      block.dwconv_bias = TakeTensor(reader, name + "dwconv.bias", {c});
-      block.norm_weight = TakeTensor(reader, name + "norm.weight", {c});
-      block.norm_bias = TakeTensor(reader, name + "norm.bias", {c});
-      block.pwconv1_weight = TakeTensor(reader, name + "pwconv1.weight", {4 * c, c});
-      block.pwconv1_bias = TakeTensor(reader, name + "pwconv1.bias", {4 * c});
-      block.pwconv2_weight = TakeTensor(reader, name + "pwconv2.weight", {c, 4 * c});
-      block.pwconv2_bias = TakeTensor(reader, name + "pwconv2.bias", {c});
-      block.gamma = TakeTensor(reader, name + "gamma", {c});
-      stage.blocks.push_back(std::move(block));
+      stage.blocks.push_back({layer(name + "dwconv", {c, 1, 7, 7}),
+                              layer(name + "norm", {c}),
+                              layer(name + "pwconv1", {4 * c, c}),
+                              layer(name + "pwconv2", {c, 4 * c}),
+                              take(name + "gamma", {c})});
     }
-    stage.norm_weight = TakeTensor(reader, fmt::format("norm{}.weight", i), {c});
-    stage.norm_bias = TakeTensor(reader, fmt::format("norm{}.bias", i), {c});
+    stage.norm = layer(fmt::format("norm{}", i), {c});
     stages_.push_back(std::move(stage));
   }
   reader.Finish();
 }
 
-std::vector<std::pair<std::string, torch::Tensor>> ConvNext::Parameters() const {
-  std::vector<std::pair<std::string, torch::Tensor>> parameters;
-  for (size_t i = 0; i < stages_.size(); ++i) {
-    const Stage& stage = stages_[i];
-    const std::string down = fmt::format("downsample_layers.{}.", i);
-    const std::string conv = down + (i == 0 ? "0." : "1.");
-    const std::string norm = down + (i == 0 ? "1." : "0.");
-    parameters.emplace_back(conv + "weight", stage.down_weight);
-    parameters.emplace_back(conv + "bias", stage.down_bias);
-    parameters.emplace_back(norm + "weight", stage.down_norm_weight);
-    parameters.emplace_back(norm + "bias", stage.down_norm_bias);
-    for (size_t j = 0; j < stage.blocks.size(); ++j) {
-      const Block& block = stage.blocks[j];
-      const std::string name = fmt::format("stages.{}.{}.", i, j);
-      parameters.emplace_back(name + "dwconv.weight", block.dwconv_weight);
-      parameters.emplace_back(name + "dwconv.bias", block.dwconv_bias);
-      parameters.emplace_back(name + "norm.weight", block.norm_weight);
-      parameters.emplace_back(name + "norm.bias", block.norm_bias);
-      parameters.emplace_back(name + "pwconv1.weight", block.pwconv1_weight);
-      parameters.emplace_back(name + "pwconv1.bias", block.pwconv1_bias);
-      parameters.emplace_back(name + "pwconv2.weight", block.pwconv2_weight);
-      parameters.emplace_back(name + "pwconv2.bias", block.pwconv2_bias);
-      parameters.emplace_back(name + "gamma", block.gamma);
-    }
-    parameters.emplace_back(fmt::format("norm{}.weight", i), stage.norm_weight);
-    parameters.emplace_back(fmt::format("norm{}.bias", i), stage.norm_bias);
-  }
-  return parameters;
-}
-
 torch::Tensor ConvNext::Input(const torch::Tensor& luminance) const {
   at::NoGradGuard no_grad;
-  return NormaliseInput(GrayFromLuminanceTensor(luminance));
+  return NormalizeInput(GrayFromLuminanceTensor(luminance));
 }
 
-torch::Tensor ConvNext::NormaliseInput(const torch::Tensor& rgb) {
+torch::Tensor ConvNext::NormalizeInput(const torch::Tensor& rgb) {
   const torch::Tensor mean =
       torch::tensor({0.485f, 0.456f, 0.406f}).view({1, 3, 1, 1}).to(rgb.device());
   const torch::Tensor deviation =
@@ -152,33 +104,32 @@ torch::Tensor ConvNext::RunBlock(const Block& block,
                                  const torch::Tensor& adapted) const {
   const int64_t c = x.size(1);
   torch::Tensor y = torch::conv2d(
-      x, block.dwconv_weight, block.dwconv_bias, /*stride=*/1, /*padding=*/3, /*dilation=*/1, c);
+      x, block.dwconv.weight, block.dwconv.bias, /*stride=*/1, /*padding=*/3, /*dilation=*/1, c);
   if (adapted.defined()) y = y + adapted;
-  y = torch::layer_norm(y.permute({0, 2, 3, 1}).to(block.norm_weight.scalar_type()),
+  y = torch::layer_norm(y.permute({0, 2, 3, 1}).to(block.norm.weight.scalar_type()),
                         {c},
-                        block.norm_weight,
-                        block.norm_bias,
+                        block.norm.weight,
+                        block.norm.bias,
                         kNormEpsilon);
   const auto type = products.first.scalar_type();
-  y = torch::gelu(torch::linear(y.to(type), products.first, block.pwconv1_bias.to(type)));
-  y = torch::linear(y, products.second, block.pwconv2_bias.to(type)) * block.gamma;
+  y = torch::gelu(torch::linear(y.to(type), products.first, block.pwconv1.bias.to(type)));
+  y = torch::linear(y, products.second, block.pwconv2.bias.to(type)) * block.gamma;
   return x + y.permute({0, 3, 1, 2});
 }
 
 torch::Tensor ConvNext::Downsample(int i, const torch::Tensor& x) const {
   const Stage& stage = stages_[i];
   if (i > 0) {
-    return torch::conv2d(ChannelNorm(x, stage.down_norm_weight, stage.down_norm_bias),
-                         stage.down_weight,
-                         stage.down_bias,
+    return torch::conv2d(ChannelNorm(x, stage.down_norm),
+                         stage.down.weight,
+                         stage.down.bias,
                          /*stride=*/2);
   }
   const int border = (config_.stem_kernel - config_.stem_stride) / 2;
   const torch::Tensor padded =
       border > 0 ? torch::replication_pad2d(x, {border, border, border, border}) : x;
-  return ChannelNorm(torch::conv2d(padded, stage.down_weight, stage.down_bias, config_.stem_stride),
-                     stage.down_norm_weight,
-                     stage.down_norm_bias);
+  return ChannelNorm(torch::conv2d(padded, stage.down.weight, stage.down.bias, config_.stem_stride),
+                     stage.down_norm);
 }
 
 std::vector<torch::Tensor> ConvNext::StageOutputs(const torch::Tensor& input,
@@ -192,23 +143,23 @@ std::vector<torch::Tensor> ConvNext::StageOutputs(const torch::Tensor& input,
       const Block& block = stages_[i].blocks[j];
       torch::Tensor adapted;
       if (adapter) adapted = adapter(i, static_cast<int>(j), x);
-      x = RunBlock(block, {block.pwconv1_weight, block.pwconv2_weight}, x, adapted);
+      x = RunBlock(block, {block.pwconv1.weight, block.pwconv2.weight}, x, adapted);
     }
     outputs.push_back(x);
   }
   return outputs;
 }
 
-std::vector<torch::Tensor> ConvNext::NormaliseTaps(std::vector<torch::Tensor> outputs) const {
+std::vector<torch::Tensor> ConvNext::NormalizeTaps(std::vector<torch::Tensor> outputs) const {
   for (size_t i = 0; i < outputs.size(); ++i) {
-    outputs[i] = ChannelNorm(outputs[i], stages_[i].norm_weight, stages_[i].norm_bias);
+    outputs[i] = ChannelNorm(outputs[i], stages_[i].norm);
   }
   return outputs;
 }
 
 std::vector<torch::Tensor> ConvNext::Taps(const torch::Tensor& input,
                                           const BlockAdapter& adapter) const {
-  return NormaliseTaps(StageOutputs(input, config_.StageCount(), adapter));
+  return NormalizeTaps(StageOutputs(input, config_.StageCount(), adapter));
 }
 
 std::vector<torch::Tensor> ConvNext::FastTaps(const torch::Tensor& input) const {
@@ -217,8 +168,8 @@ std::vector<torch::Tensor> ConvNext::FastTaps(const torch::Tensor& input) const 
     for (const Stage& stage : stages_) {
       std::vector<Products>& products = half_products_.emplace_back();
       for (const Block& block : stage.blocks) {
-        products.emplace_back(block.pwconv1_weight.to(torch::kBFloat16),
-                              block.pwconv2_weight.to(torch::kBFloat16));
+        products.emplace_back(block.pwconv1.weight.to(torch::kBFloat16),
+                              block.pwconv2.weight.to(torch::kBFloat16));
       }
     }
   });
@@ -231,21 +182,17 @@ std::vector<torch::Tensor> ConvNext::FastTaps(const torch::Tensor& input) const 
     }
     outputs.push_back(x);
   }
-  return NormaliseTaps(std::move(outputs));
+  return NormalizeTaps(std::move(outputs));
 }
 
 torch::Tensor ConvNext::DeepTap(const Image& luminance, int max_side_px, int stage) const {
-  CheckLuminance(luminance);
+  RequireLuminance(luminance, "the encoder");
   at::NoGradGuard no_grad;
   const Image small = FitWithin(luminance, max_side_px);
-  const int stride = config_.Stride(stage);
-  const int right = (stride - small.width % stride) % stride;
-  const int bottom = (stride - small.height % stride) % stride;
-  torch::Tensor tensor = TensorFromImage(small);
   // Unlike reflection, replication pads pictures of any size, even 1x1.
-  if (right > 0 || bottom > 0) tensor = torch::replication_pad2d(tensor, {0, right, 0, bottom});
+  const torch::Tensor tensor = PadByReplication(TensorFromImage(small), config_.Stride(stage));
   const torch::Tensor output = StageOutputs(Input(tensor), stage + 1).back();
-  return ChannelNorm(output, stages_[stage].norm_weight, stages_[stage].norm_bias);
+  return ChannelNorm(output, stages_[stage].norm);
 }
 
 std::vector<double> ConvNext::Describe(const Image& luminance) const {

@@ -10,6 +10,7 @@
 
 #include "core/encoder/convnext/convnext_config.h"
 #include "core/encoder/tap_encoder.h"
+#include "core/encoder/weight_tensors.h"
 #include "core/weights/weight_map.h"
 
 namespace color3d {
@@ -24,7 +25,9 @@ class ConvNext : public TapEncoder {
   // All weights by published name, in a fixed order. Shares storage. For pre-training only: a
   // caller that enables gradients or changes values must be the only user, and digest() remains
   // that of the original weights.
-  std::vector<std::pair<std::string, torch::Tensor>> Parameters() const;
+  const std::vector<std::pair<std::string, torch::Tensor>>& Parameters() const {
+    return parameters_;
+  }
   const std::string& digest() const override { return digest_; }
   const std::string& description() const override { return description_; }
   std::vector<double> Describe(const Image& luminance) const override;
@@ -34,7 +37,7 @@ class ConvNext : public TapEncoder {
   // sRGB, normalised with ImageNet's statistics.
   torch::Tensor Input(const torch::Tensor& luminance) const override;
   // Normalises RGB in 0..1, [B,3,H,W], with ImageNet's statistics. Channels-last.
-  static torch::Tensor NormaliseInput(const torch::Tensor& rgb);
+  static torch::Tensor NormalizeInput(const torch::Tensor& rgb);
   // Returns norm0 .. norm3: taps [B, dims[i], H / Stride(i), W / Stride(i)], channels-last.
   // Requires: H and W are multiples of the last stride. Gradients flow to the adapter, never to the
   // weights.
@@ -49,12 +52,11 @@ class ConvNext : public TapEncoder {
 
  private:
   struct Block {
-    torch::Tensor dwconv_weight, dwconv_bias, norm_weight, norm_bias;
-    torch::Tensor pwconv1_weight, pwconv1_bias, pwconv2_weight, pwconv2_bias, gamma;
+    Layer dwconv, norm, pwconv1, pwconv2;
+    torch::Tensor gamma;
   };
   struct Stage {
-    torch::Tensor down_weight, down_bias, down_norm_weight, down_norm_bias;
-    torch::Tensor norm_weight, norm_bias;
+    Layer down, down_norm, norm;
     std::vector<Block> blocks;
   };
   // Weights of the two matrix products of a block, in float32 or bfloat16.
@@ -64,13 +66,14 @@ class ConvNext : public TapEncoder {
                          const torch::Tensor& x,
                          const torch::Tensor& adapted) const;
   torch::Tensor Downsample(int stage, const torch::Tensor& x) const;
-  std::vector<torch::Tensor> NormaliseTaps(std::vector<torch::Tensor> outputs) const;
+  std::vector<torch::Tensor> NormalizeTaps(std::vector<torch::Tensor> outputs) const;
   torch::Tensor DeepTap(const Image& luminance, int max_side_px, int stage) const;
 
   ConvNextConfig config_;
   std::string digest_;
   std::string description_;
   std::vector<Stage> stages_;
+  std::vector<std::pair<std::string, torch::Tensor>> parameters_;
   mutable std::once_flag half_once_;
   mutable std::vector<std::vector<Products>> half_products_;  // by stage and block
 };

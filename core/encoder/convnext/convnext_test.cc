@@ -198,7 +198,7 @@ TEST(ConvNextTest, AgreesWithFloat64Reference) {
   }
 }
 
-TEST(ConvNextTest, InputIsTheImageNetNormalisedGrayOfL) {
+TEST(ConvNextTest, NormalizesGrayByImageNetStatistics) {
   Image luminance(101, 1, 1);
   for (int x = 0; x <= 100; ++x) luminance.data[x] = static_cast<float>(x);
   const ConvNext network(TinyConfig(), RandomFeatureWeights(TinyConfig(), 1), "tiny");
@@ -213,7 +213,7 @@ TEST(ConvNextTest, InputIsTheImageNetNormalisedGrayOfL) {
   }
 }
 
-TEST(ConvNextTest, TapsHaveTheirStridesAndAreNormalised) {
+TEST(ConvNextTest, TapsHaveStridesAndAreNormalized) {
   // Untrained norms have no scale and shift of their own.
   const ConvNextConfig config;
   const auto encoder =
@@ -264,7 +264,7 @@ TEST(ConvNextTest, ZeroOrNoAdapterGivesSameBytes) {
   EXPECT_FALSE(torch::equal(plain[1], ones[1]));
 }
 
-TEST(ConvNextTest, DigestNamesArchitectureAndWeights) {
+TEST(ConvNextTest, DigestDependsOnArchitectureAndWeights) {
   const ConvNextConfig config = TinyConfig();
   WeightMap weights = RandomFeatureWeights(config, 1);
   const std::string digest = ConvNext(config, weights, "a").digest();
@@ -289,7 +289,7 @@ TEST(ConvNextTest, RefusesWeightsThatDoNotFit) {
   EXPECT_THROW(ConvNext(config, reshaped, ""), Error);
 }
 
-TEST(ConvNextTest, AgreesWithTheAuthorsNetwork) {
+TEST(ConvNextTest, AgreesWithAuthorsNetwork) {
   const std::filesystem::path golden = std::filesystem::path(COLOR3D_SHARED_DATA) / "golden";
   if (!std::filesystem::exists(golden)) GTEST_SKIP() << "no golden data";
   ConvNextConfig config;

@@ -15,7 +15,7 @@ constexpr const char* kPrefixes[] = {"encoder.arch.", "encoder."};  // DDColor, 
 constexpr int64_t kMaxChannels = 16384;
 constexpr const char* kStem = "downsample_layers.0.0.weight";
 
-std::string PrefixOf(const WeightMap& weights) {
+std::string NamePrefix(const WeightMap& weights) {
   for (const char* prefix : kPrefixes) {
     if (weights.count(std::string(prefix) + kStem) > 0) return prefix;
   }
@@ -26,14 +26,14 @@ bool IsUnused(const std::string& name) {
   return name.starts_with("head.") || name.starts_with("head_cls.") || name.starts_with("norm.");
 }
 
-std::vector<int64_t> ShapeOf(const WeightMap& weights, const std::string& name) {
+std::vector<int64_t> StoredShape(const WeightMap& weights, const std::string& name) {
   const auto found = weights.find(name);
   return found == weights.end() ? std::vector<int64_t>{} : found->second.shape;
 }
 
 // The shape of the stem gives its kernel but not its stride: 4x4 is the published one, 8x8 our own.
 void ReadStem(const WeightMap& weights, ConvNextConfig& config) {
-  const std::vector<int64_t> shape = ShapeOf(weights, kStem);
+  const std::vector<int64_t> shape = StoredShape(weights, kStem);
   const bool square = shape.size() == 4 && shape[1] == 3 && shape[2] == shape[3];
   if (!square || (shape[2] != 4 && shape[2] != 8)) {
     throw InvalidArgument(
@@ -50,8 +50,8 @@ ConvNextConfig ReadConfig(const WeightMap& weights) {
   config.dims.clear();
   config.depths.clear();
   for (int stage = 0;; ++stage) {
-    const std::vector<int64_t> shape =
-        ShapeOf(weights, fmt::format("downsample_layers.{}.{}.weight", stage, stage == 0 ? 0 : 1));
+    const std::vector<int64_t> shape = StoredShape(
+        weights, fmt::format("downsample_layers.{}.{}.weight", stage, stage == 0 ? 0 : 1));
     if (shape.size() != 4) break;
     if (shape[0] < 1 || shape[0] > kMaxChannels) {
       throw InvalidArgument("the ConvNeXt's stage {} has {} channels; at most {} are taken",
@@ -72,14 +72,14 @@ ConvNextConfig ReadConfig(const WeightMap& weights) {
 }  // namespace
 
 bool HoldsConvNext(const WeightMap& weights) {
-  return weights.count(PrefixOf(weights) + kStem) > 0;
+  return weights.count(NamePrefix(weights) + kStem) > 0;
 }
 
 ConvNextWeights TakeConvNextWeights(WeightMap& weights) {
   if (!HoldsConvNext(weights)) {
     throw InvalidArgument("the weights have no ConvNeXt (no \"{}\")", kStem);
   }
-  const std::string prefix = PrefixOf(weights);
+  const std::string prefix = NamePrefix(weights);
   ConvNextWeights found;
   for (auto at = weights.lower_bound(prefix); at != weights.end();) {
     const auto current = at++;

@@ -14,7 +14,7 @@ struct ConvNextWeights {
   std::string description;
 };
 
-// Whether the names are those of a ConvNeXt in its authors' layout, plain or under
+// Returns whether the names are those of a ConvNeXt in its authors' layout, plain or under
 // "encoder.arch." (DDColor) or "encoder." (our own pre-trained files).
 bool HoldsConvNext(const WeightMap& weights);
 

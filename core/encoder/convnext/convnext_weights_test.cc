@@ -19,7 +19,7 @@ ConvNextConfig PublishedStem() {
   return config;
 }
 
-TEST(ConvNextWeightsTest, ReadsTheSizesFromTheShapes) {
+TEST(ConvNextWeightsTest, ReadsSizesFromShapes) {
   WeightMap weights = RandomFeatureWeights(PublishedStem(), 1);
   weights["head.weight"] = {{1}, {0.0f}};
   weights["norm.bias"] = {{1}, {0.0f}};

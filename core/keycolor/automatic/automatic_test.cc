@@ -75,13 +75,13 @@ TEST(AutomaticColorizerTest, IsRepeatableAndMirrorSymmetric) {
   }
 }
 
-TEST(AutomaticColorizerTest, RefusesAnotherChannelCount) {
+TEST(AutomaticColorizerTest, RefusesOtherChannelCounts) {
   const auto colorizer = AutomaticColorizer::Embedded();
   EXPECT_THROW(colorizer->Colorize(Image(8, 8, 3)), Error);
   EXPECT_THROW(colorizer->Colorize(Image()), Error);
 }
 
-TEST(AutomaticColorizerTest, NamesAMissingOrMisshapenWeight) {
+TEST(AutomaticColorizerTest, NamesMissingOrMisshapenWeights) {
   for (const char* name : {"color_bins", "color_temperature", "color_head.out.weight"}) {
     WeightMap weights = EmbeddedWeights("");
     weights.erase(name);
@@ -114,13 +114,13 @@ TEST(AutomaticColorizerTest, ColorWeightsLowerOvercountedColors) {
   EXPECT_THROW(AutomaticColorizer::FromPretrained(weights), Error);
 }
 
-TEST(EmbeddedWeightsTest, AreSmallEnoughToShip) {
+TEST(EmbeddedWeightsTest, HaveBoundedSize) {
   EXPECT_LE(EmbeddedWeightFile().size(), 12'000'000u);
   EXPECT_FALSE(EmbeddedWeights("encoder.").empty());
   EXPECT_TRUE(EmbeddedWeights("nothing.").empty());
 }
 
-// Held-out photographs: better than grey on the whole, and colourful, but not garish.
+// On held-out photographs: less error than grey, and a plausible colourfulness.
 TEST(AutomaticColorizerTest, BeatsGrayOnHeldOutPhotos) {
   const std::filesystem::path folder =
       std::filesystem::path(COLOR3D_SHARED_DATA) / "photos/validate";

@@ -13,7 +13,7 @@ constexpr int kFinestWidth = 96;
 constexpr int kWidestWidth = 192;
 constexpr double kNormEpsilon = 1e-6;
 
-int WidthOf(int level_from_fine) {
+int LevelWidth(int level_from_fine) {
   return std::min(kWidestWidth, kFinestWidth + 32 * level_from_fine);
 }
 
@@ -23,8 +23,8 @@ ColorHead::ColorHead(const ConvNextConfig& encoder, int bin_count, Random& rando
   const int taps = encoder.StageCount();
   if (taps < 3) throw InvalidArgument("the colour head needs an encoder with at least 3 taps");
   for (int tap = taps - 1; tap >= 1; --tap) {
-    const int width = WidthOf(tap - 1);
-    const int finer = WidthOf(std::max(0, tap - 2));
+    const int width = LevelWidth(tap - 1);
+    const int finer = LevelWidth(std::max(0, tap - 2));
     const std::string name = "levels." + std::to_string(tap) + ".";
     Level level;
     level.lateral =

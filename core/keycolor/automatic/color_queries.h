@@ -7,6 +7,7 @@
 
 #include <vector>
 
+#include "core/encoder/weight_tensors.h"
 #include "core/weights/weight_reader.h"
 
 namespace color3d {
@@ -24,21 +25,16 @@ class ColorQueries {
   torch::Tensor Forward(const std::vector<torch::Tensor>& levels) const;
 
  private:
-  struct Linear {
-    torch::Tensor weight, bias;
-  };
   struct Attention {
-    torch::Tensor in_weight, in_bias;  // q, k, v stacked
-    Linear out;
-    Linear norm;
+    Layer in;  // q, k, v stacked
+    Layer out;
+    Layer norm;
   };
-  struct Layer {
+  struct Block {
     Attention cross, self;
-    Linear linear1, linear2, norm;
+    Layer linear1, linear2, norm;
   };
-  static Linear TakeLinear(WeightReader& reader,
-                           const std::string& name,
-                           const std::vector<int64_t>& shape);
+
   Attention TakeAttention(WeightReader& reader,
                           const std::string& name,
                           const std::string& inner) const;
@@ -50,10 +46,10 @@ class ColorQueries {
   int64_t width_ = 0;
   torch::Tensor query_feat_, query_embed_;
   std::vector<torch::Tensor> level_embed_;
-  std::vector<Linear> input_proj_;
-  std::vector<Layer> layers_;
-  Linear decoder_norm_;
-  Linear embed_[3];
+  std::vector<Layer> input_proj_;
+  std::vector<Block> blocks_;
+  Layer decoder_norm_;
+  Layer embed_[3];
 };
 
 }  // namespace color3d

@@ -15,6 +15,7 @@
 #include "core/encoder/weight_digest.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/automatic/ddcolor_decoder.h"
 #include "core/weights/weight_file.h"
 
@@ -23,23 +24,9 @@ namespace {
 
 constexpr int kNetworkSidePx = 512;
 
-void CheckLuminance(const Image& luminance) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument(
-        "the automatic colourizer takes a picture with 1 channel (L), but got {} channels",
-        luminance.channels);
-  }
-  const bool finite = std::all_of(luminance.data.begin(), luminance.data.end(), [](float value) {
-    return std::isfinite(value);
-  });
-  if (!finite) {
-    throw InvalidArgument("the luminance to colour has a value that is not finite");
-  }
-}
-
 }  // namespace
 
-bool Ddcolor::Recognises(const WeightMap& weights) {
+bool Ddcolor::Recognizes(const WeightMap& weights) {
   return weights.count("decoder.color_decoder.query_feat.weight") > 0 ||
          weights.count("refine_net.0.0.weight_orig") > 0;
 }
@@ -76,13 +63,16 @@ Image Ddcolor::Predict(const Image& gray_rgb) const {
   }
   return WithTorchErrors("DDColor", [&] {
     at::NoGradGuard no_grad;
-    const torch::Tensor input = ConvNext::NormaliseInput(TensorFromImage(gray_rgb));
+    const torch::Tensor input = ConvNext::NormalizeInput(TensorFromImage(gray_rgb));
     return ImageFromTensor(decoder_->Forward(encoder_->Taps(input), input));
   });
 }
 
 AutomaticColor Ddcolor::Colorize(const Image& luminance) const {
-  CheckLuminance(luminance);
+  RequireLuminance(luminance, "the automatic colourizer");
+  if (!IsFinite(luminance)) {
+    throw InvalidArgument("the luminance to colour has a value that is not finite");
+  }
   const Image coarse = WithTorchErrors("DDColor", [&] {
     at::NoGradGuard no_grad;
     const Image square = Resize(luminance, kNetworkSidePx, kNetworkSidePx);
@@ -100,7 +90,7 @@ AutomaticColor Ddcolor::Colorize(const Image& luminance) const {
 std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::FromWeightFile(
     const std::filesystem::path& ddcolor_weights) {
   WeightMap weights = ReadWeightFile(ddcolor_weights);
-  if (!Ddcolor::Recognises(weights)) {
+  if (!Ddcolor::Recognizes(weights)) {
     throw InvalidArgument(
         "{} holds no DDColor (it has {} arrays, none called refine_net.0.0.weight_orig); give a "
         "published DDColor file",

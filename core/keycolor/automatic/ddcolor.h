@@ -15,8 +15,8 @@ class DdcolorDecoder;
 
 class Ddcolor : public AutomaticColorizer {
  public:
-  // Whether the names are those of a DDColor state dict.
-  static bool Recognises(const WeightMap& weights);
+  // Returns whether the names are those of a DDColor state dict.
+  static bool Recognizes(const WeightMap& weights);
 
   // Throws Error{kInvalidArgument} listing arrays that are missing, unexpected or misshapen.
   explicit Ddcolor(WeightMap weights);

@@ -13,11 +13,6 @@ namespace {
 constexpr int64_t kLastScale = 4;  // from stride 4 to the picture's pixels
 constexpr int64_t kRowsAtOnce = 2048;
 
-int64_t SizeOf(const WeightReader& reader, const std::string& name, size_t dimension) {
-  const std::vector<int64_t> shape = reader.ShapeOf(name);
-  return dimension < shape.size() ? shape[dimension] : 0;
-}
-
 torch::Tensor Apply(const ChannelAffine& affine, const torch::Tensor& x) {
   const int64_t c = x.size(1);
   return torch::addcmul(affine.shift.view({1, c, 1, 1}), x, affine.scale.view({1, c, 1, 1}));
@@ -73,7 +68,7 @@ DdcolorDecoder::UpBlock DdcolorDecoder::TakeUpBlock(
     const std::string& name, int64_t in, int64_t skip, WeightReader& reader, Problems& problems) {
   UpBlock block;
   const std::string shuffle = name + "shuf.conv.0";
-  const int64_t up = SizeOf(reader, shuffle + ".weight_orig", 0) / 4;
+  const int64_t up = StoredSize(reader, shuffle + ".weight_orig", 0) / 4;
   const torch::Tensor weight = TakeSpectral(shuffle, {4 * up, in, 1, 1}, reader);
   const ChannelAffine norm = TakeBatchNorm(name + "shuf.conv.1", 4 * up, reader);
   block.shuffle_weight = weight * norm.scale.view({4 * up, 1, 1, 1});
@@ -82,7 +77,7 @@ DdcolorDecoder::UpBlock DdcolorDecoder::TakeUpBlock(
   problems.Check(name + "shuf.conv.1", block.shuffle_bias);
   block.skip = TakeBatchNorm(name + "bn", skip, reader);
   problems.Check(name + "bn", block.skip.shift);
-  const int64_t out = SizeOf(reader, name + "conv.0.weight_orig", 0);
+  const int64_t out = StoredSize(reader, name + "conv.0.weight_orig", 0);
   block.conv_weight = TakeSpectral(name + "conv.0", {out, up + skip, 3, 3}, reader);
   problems.Check(name + "conv.0", block.conv_weight);
   block.out = TakeBatchNorm(name + "conv.2", out, reader);

@@ -31,7 +31,7 @@ std::string MessageOf(WeightMap weights) {
   return "no error";
 }
 
-TEST(FoldedNormsTest, SpectralNormDividesByTheStoredSingularValue) {
+TEST(FoldedNormsTest, DividesByStoredSingularValue) {
   torch::manual_seed(1);
   const torch::Tensor weight = torch::randn({3, 2, 1, 2});
   const torch::Tensor u = torch::randn({3});
@@ -50,7 +50,7 @@ TEST(FoldedNormsTest, SpectralNormDividesByTheStoredSingularValue) {
   EXPECT_LT((FoldSpectralNorm(last, u, v) - expected).abs().max().item<double>(), 1e-5);
 }
 
-TEST(FoldedNormsTest, BatchNormIsAScaleAndAShift) {
+TEST(FoldedNormsTest, FoldsBatchNormToScaleAndShift) {
   const ChannelAffine folded = FoldBatchNorm(torch::tensor({2.0f}),
                                              torch::tensor({0.5f}),
                                              torch::tensor({3.0f}),
@@ -72,7 +72,7 @@ TEST(DdcolorTest, ListsEveryWeightThatDoesNotFit) {
   EXPECT_THAT(message, testing::HasSubstr("decoder_norm.bias"));
 }
 
-TEST(DdcolorTest, EveryWeightCanBeMissing) {
+TEST(DdcolorTest, RefusesEachMissingWeight) {
   const WeightMap all = Mini();
   for (const auto& [name, array] : all) {
     if (name.ends_with("num_batches_tracked") || name == "mean" || name == "std" ||
@@ -118,7 +118,7 @@ TEST(DdcolorTest, SyntheticModelHasPublishedKeys) {
       std::filesystem::path(COLOR3D_SHARED_DATA) / "../reference/keys/ddcolor_tiny.tsv";
   std::ifstream file(list);
   if (!file) GTEST_SKIP() << "no key list";
-  // Small numbers of the same layout: names are compared, and the shapes of the mini elsewhere.
+  // A small model of the same layout; only names are compared.
   SyntheticDdcolor sizes = SyntheticDdcolor::Mini();
   sizes.depths = SyntheticDdcolor().depths;
   sizes.layers = SyntheticDdcolor().layers;
@@ -134,8 +134,8 @@ TEST(DdcolorTest, SyntheticModelHasPublishedKeys) {
   EXPECT_EQ(weights.size(), count);
 }
 
-// Checkpoint quality is out of reach here: this is the authors' code on random weights.
-TEST(DdcolorTest, AgreesWithTheAuthorsNetwork) {
+// The expected values are those of the authors' code on random weights.
+TEST(DdcolorTest, AgreesWithAuthorsNetwork) {
   const std::filesystem::path golden = std::filesystem::path(COLOR3D_SHARED_DATA) / "golden";
   if (!std::filesystem::exists(golden)) GTEST_SKIP() << "no golden data";
   const WeightMap expected = ReadWeightFile(golden / "ddcolor_mini.expected.safetensors");
@@ -155,7 +155,7 @@ TEST(DdcolorTest, AgreesWithTheAuthorsNetwork) {
   EXPECT_LT(error("ddcolor_mini.safetensors"), 1e-4);
   EXPECT_LT(error("ddcolor_mini_params.pth"), 1e-4);
   EXPECT_LT(error("ddcolor_mini_raw.bin"), 1e-4);
-  // The expected values come from the float32 weights: what is left is their rounding to half.
+  // The expected values come from the float32 weights: the difference is their rounding to half.
   EXPECT_LT(error("ddcolor_mini_f16.safetensors"), 2e-2);
 }
 

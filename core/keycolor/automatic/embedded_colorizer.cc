@@ -15,6 +15,7 @@
 #include "core/encoder/weight_tensors.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/keycolor/automatic/color_head.h"
 
@@ -87,10 +88,7 @@ class EmbeddedColorizer : public AutomaticColorizer {
   const std::string& digest() const override { return digest_; }
 
   AutomaticColor Colorize(const Image& luminance) const override {
-    if (luminance.channels != 1 || luminance.Empty()) {
-      throw InvalidArgument("the automatic colourizer takes a picture with 1 channel (L), not {}",
-                            luminance.channels);
-    }
+    RequireLuminance(luminance, "the automatic colourizer");
     return WithTorchErrors("automatic colourizer", [&] {
       torch::NoGradGuard no_grad;
       const torch::Tensor p = MeanProbabilities(luminance)[0];

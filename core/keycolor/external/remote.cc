@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/keycolor/picture_checks.h"
@@ -39,7 +40,7 @@ void RequireCapabilities(const RemoteOptions& options, const RemoteInfo& info) {
   for (const std::string& name : needed) {
     if (info.capabilities.contains(name)) continue;
     Refuse(options,
-           fmt::format("does not claim {} (it claims: {}); leave that input out or use another "
+           fmt::format("does not support {} (it supports: {}); leave that input out or use another "
                        "backend",
                        name,
                        Listing(info.capabilities)));
@@ -67,7 +68,7 @@ Image PictureToSend(const Image& luminance, const RemoteOptions& options, const 
   return gray;
 }
 
-std::string HexOf(const ColorHint& hint, double l) {
+std::string HexColor(const ColorHint& hint, double l) {
   const RgbColor rgb = SrgbFromLab(LabColor{l, hint.a, hint.b});
   const auto byte = [](double value) { return static_cast<unsigned>(std::lround(value * 255.0)); };
   char text[8];
@@ -95,7 +96,7 @@ std::vector<RemotePoint> PointsToSend(const Image& luminance,
                             SizeText(luminance));
     }
     const double l = luminance.At(0, static_cast<int>(hint.y_px), static_cast<int>(hint.x_px));
-    points.push_back({hint.x_px * scale_x, hint.y_px * scale_y, HexOf(hint, l)});
+    points.push_back({hint.x_px * scale_x, hint.y_px * scale_y, HexColor(hint, l)});
   }
   return points;
 }
@@ -157,14 +158,14 @@ void CheckAnswerLuminance(const Image& luminance,
   if (!agreement.SameSubject()) {
     Refuse(options,
            fmt::format("answered with a picture of something else (correlation "
-                       "of luminances {:.3g}, needed > {})",
+                       "of luminances {:.3g}, required > {})",
                        agreement.correlation,
                        LuminanceAgreement::kMinCorrelation));
   }
   if (agreement.mean_difference > kNotableDifference) {
     solution->warnings.push_back(fmt::format(
         "the backend '{}' changed the luminance by {:.3g} L units on average; the photo's "
-        "own was put back",
+        "luminance was restored",
         options.name,
         agreement.mean_difference));
   }
@@ -209,8 +210,7 @@ RemoteSolution KeyColorFromRemote(const Image& luminance,
   solution.answer_height = answer.height;
 
   const Image lab = LabFromSrgb(answer);
-  Image ab(lab.width, lab.height, 2);
-  std::copy_n(lab.Plane(1), ab.data.size(), ab.data.begin());
+  Image ab = ChromaOfLab(lab);
   CheckAnswerLuminance(luminance, lab, options, &solution);
   const ChromaLevel chroma = MeasureChroma(lab);
   if (chroma.IsGray()) {
@@ -219,7 +219,7 @@ RemoteSolution KeyColorFromRemote(const Image& luminance,
   }
   if (ab.width != luminance.width || ab.height != luminance.height) {
     solution.warnings.push_back(fmt::format(
-        "the backend '{}' coloured the photo at {} px; its colours were brought to {} px",
+        "the backend '{}' coloured the photo at {} px; its colours were resampled to {} px",
         options.name,
         SizeText(ab),
         SizeText(luminance)));

@@ -85,7 +85,7 @@ TEST_F(RemoteTest, ReturnsChromaAndFacts) {
   EXPECT_GT(solution.luminance_correlation, 0.99);
   EXPECT_TRUE(solution.warnings.empty());
   EXPECT_EQ(remote_.request.idempotency_key, "jobs/1/2");
-  EXPECT_EQ(remote_.request.seed, 0u) << "it does not claim to take a seed";
+  EXPECT_EQ(remote_.request.seed, 0u) << "it does not support seeds";
   const Image sent = DecodeImage(remote_.request.image_png, "sent");
   EXPECT_EQ(sent.channels, 1);
   EXPECT_NEAR(LuminanceFromGray(sent.At(0, 3, 50)), luminance_.At(0, 3, 50), 0.01) << "16 bits";
@@ -116,7 +116,7 @@ TEST_F(RemoteTest, ScalesLargePhotoWithItsPointsAndMask) {
   EXPECT_EQ(solution.sent_width, 83);
   EXPECT_EQ(solution.sent_height, 55);
   EXPECT_EQ(solution.ab.width, kWidth);
-  EXPECT_EQ(solution.ab.At(0, 5, 5), 0.0f) << "outside the mask nothing is coloured";
+  EXPECT_EQ(solution.ab.At(0, 5, 5), 0.0f) << "no colour outside the mask";
   EXPECT_NEAR(solution.ab.At(0, 20, 20), 10.0f, 1.5f);
   ASSERT_EQ(remote_.request.points.size(), 1u);
   EXPECT_NEAR(remote_.request.points[0].x_px, 48.0 * 83 / 96, 1e-9);
@@ -130,11 +130,11 @@ TEST_F(RemoteTest, SendsOnlyClaimedInputs) {
   options_.prompt = "red";
   EXPECT_THAT(
       Complaint(),
-      AllOf(HasSubstr("'fake'"), HasSubstr("text_prompt"), HasSubstr("it claims: automatic")));
+      AllOf(HasSubstr("'fake'"), HasSubstr("text_prompt"), HasSubstr("it supports: automatic")));
   EXPECT_EQ(code_, ErrorCode::kFailedPrecondition);
   options_.prompt.clear();
   remote_.info.capabilities.clear();
-  EXPECT_THAT(Complaint(), AllOf(HasSubstr("automatic"), HasSubstr("it claims: nothing")));
+  EXPECT_THAT(Complaint(), AllOf(HasSubstr("automatic"), HasSubstr("it supports: nothing")));
   EXPECT_TRUE(remote_.request.image_png.empty()) << "nothing was sent";
 }
 

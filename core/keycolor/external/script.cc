@@ -12,8 +12,12 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
+#include "core/encoder/image_tensors.h"
 #include "core/image/codec.h"
+#include "core/image/crop.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 
 namespace color3d {
 namespace {
@@ -37,20 +41,6 @@ std::string FirstLine(const std::exception& error) {
   const size_t raised = text.rfind("Error: ");
   const size_t from = raised == std::string::npos ? begin : text.rfind('\n', raised) + 1;
   return text.substr(from, std::min<size_t>(text.find('\n', from) - from, 200));
-}
-
-torch::Tensor PaddedInput(const Image& luminance) {
-  const int width = (luminance.width + kMultiple - 1) / kMultiple * kMultiple;
-  const int height = (luminance.height + kMultiple - 1) / kMultiple * kMultiple;
-  torch::Tensor input = torch::empty({1, 1, height, width}, torch::kFloat32);
-  float* values = input.data_ptr<float>();
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      values[static_cast<size_t>(y) * width + x] =
-          luminance.At(0, std::min(y, luminance.height - 1), std::min(x, luminance.width - 1));
-    }
-  }
-  return input;
 }
 
 torch::Tensor FirstTensor(const torch::IValue& answer, const std::filesystem::path& file) {
@@ -79,11 +69,7 @@ Image CheckedAnswer(const torch::Tensor& answer, const std::filesystem::path& fi
                     shape.str(),
                     std::string(answer.dtype().name())));
   }
-  const torch::Tensor planar = answer[0].detach().to(torch::kCPU, torch::kFloat32).contiguous();
-  Image image(static_cast<int>(planar.size(2)),
-              static_cast<int>(planar.size(1)),
-              static_cast<int>(planar.size(0)));
-  std::memcpy(image.data.data(), planar.data_ptr<float>(), image.data.size() * sizeof(float));
+  Image image = ImageFromTensor(answer.detach().to(torch::kCPU));
   const float low = image.channels == 2 ? -kMaxChroma : -kRgbMargin;
   const float high = image.channels == 2 ? kMaxChroma : 1.0f + kRgbMargin;
   for (float value : image.data) {
@@ -105,7 +91,7 @@ Image Run(const Image& luminance, const std::filesystem::path& file) {
   }
   torch::IValue answer;
   try {
-    answer = module.forward({PaddedInput(luminance)});
+    answer = module.forward({PadByReplication(TensorFromImage(luminance), kMultiple)});
   } catch (const std::exception& error) {
     throw Refused(file, "failed: " + FirstLine(error));
   }
@@ -118,23 +104,14 @@ Image Cropped(const Image& answer, const Image& luminance) {
     const int padded = (px + kMultiple - 1) / kMultiple * kMultiple;
     return std::max(1, static_cast<int>(std::lround(static_cast<double>(answer_px) * px / padded)));
   };
-  Image cropped(
-      part(answer.width, luminance.width), part(answer.height, luminance.height), answer.channels);
-  for (int c = 0; c < answer.channels; ++c) {
-    for (int y = 0; y < cropped.height; ++y) {
-      for (int x = 0; x < cropped.width; ++x) cropped.At(c, y, x) = answer.At(c, y, x);
-    }
-  }
-  return cropped;
+  return Crop(
+      answer, 0, 0, part(answer.width, luminance.width), part(answer.height, luminance.height));
 }
 
 }  // namespace
 
 ScriptColor KeyColorFromScript(const Image& luminance, const std::filesystem::path& torchscript) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, but has {}",
-                          luminance.channels);
-  }
+  RequireLuminance(luminance, "the colouring of the key view");
   const Image small = FitWithin(luminance, kMaxSidePx);
   Image answer = Cropped(Run(small, torchscript), small);
   ScriptColor color;
@@ -146,8 +123,7 @@ ScriptColor KeyColorFromScript(const Image& luminance, const std::filesystem::pa
       color.luminance_deviation +=
           std::abs(lab.data[i] - expected.data[i]) / static_cast<double>(lab.PlaneSize());
     }
-    answer = Image(lab.width, lab.height, 2);
-    std::copy_n(lab.Plane(1), answer.data.size(), answer.data.begin());
+    answer = ChromaOfLab(lab);
   }
   const bool fits = answer.width == luminance.width && answer.height == luminance.height;
   color.ab = fits ? std::move(answer) : UpsampleGuided(answer, luminance);

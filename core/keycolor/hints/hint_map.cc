@@ -10,6 +10,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
 
 namespace color3d {
 namespace {
@@ -243,15 +244,12 @@ HintMap DrawHints(const std::vector<ColorHint>& hints,
   return drawer.Take();
 }
 
-HintMap HintsOfStrokes(const Image& strokes) {
+HintMap HintsFromStrokes(const Image& strokes) {
   Image rgb(strokes.width, strokes.height, 3);
   std::copy_n(strokes.data.begin(), rgb.data.size(), rgb.data.begin());
   for (float& value : rgb.data) value = std::isfinite(value) ? value : 0.0f;
   const Image lab = LabFromSrgb(rgb);
-  HintMap map;
-  map.hinted.assign(lab.PlaneSize(), 0);
-  map.ab = Image(lab.width, lab.height, 2);
-  std::copy_n(lab.Plane(1), map.ab.data.size(), map.ab.data.begin());
+  HintMap map{std::vector<uint8_t>(lab.PlaneSize()), ChromaOfLab(lab)};
   for (size_t i = 0; i < lab.PlaneSize(); ++i) {
     map.hinted[i] = strokes.channels == 4
                         ? strokes.Plane(3)[i] > kAlphaOfHint

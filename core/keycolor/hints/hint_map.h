@@ -24,6 +24,6 @@ HintMap DrawHints(const std::vector<ColorHint>& hints,
                   ProgressObserver& progress,
                   const CancellationToken& cancel);
 // Hints from a strokes picture, as in KeyColorFromStrokes.
-HintMap HintsOfStrokes(const Image& strokes);
+HintMap HintsFromStrokes(const Image& strokes);
 
 }  // namespace color3d

@@ -13,20 +13,16 @@
 #include "core/grid/grid_solver.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/hints/hint_map.h"
 
 namespace color3d {
 namespace {
 
 void CheckLuminance(const Image& luminance) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, but has {}",
-                          luminance.channels);
-  }
-  for (float value : luminance.data) {
-    if (!std::isfinite(value)) {
-      throw InvalidArgument("the key view's luminance has a value that is not finite");
-    }
+  RequireLuminance(luminance, "the colouring of the key view");
+  if (!IsFinite(luminance)) {
+    throw InvalidArgument("the key view's luminance has a value that is not finite");
   }
 }
 
@@ -134,7 +130,7 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
     throw InvalidArgument("the strokes picture has {} channels, but must have 3 (RGB) or 4 (RGBA)",
                           strokes.channels);
   }
-  HintMap hints = HintsOfStrokes(strokes);
+  HintMap hints = HintsFromStrokes(strokes);
   if (std::find(hints.hinted.begin(), hints.hinted.end(), 1) == hints.hinted.end()) {
     throw InvalidArgument(
         strokes.channels == 4

@@ -103,7 +103,7 @@ void ParseFill(const Json& entry, const std::string& name, ColorHint& hint) {
 }
 
 // Fields of an entry by its shape, without "color" and "keep".
-std::vector<std::string> FieldsOf(const Json& entry) {
+std::vector<std::string> AllowedFields(const Json& entry) {
   if (entry.contains("line")) return {"line", "width"};
   if (entry.contains("region")) return {"region"};
   if (entry.contains("label")) return {"label"};
@@ -112,7 +112,7 @@ std::vector<std::string> FieldsOf(const Json& entry) {
 
 ColorHint ParseHint(const Json& entry, const std::string& name) {
   if (!entry.is_object()) throw InvalidArgument("{} is not an object", name);
-  std::vector<std::string> fields = FieldsOf(entry);
+  std::vector<std::string> fields = AllowedFields(entry);
   fields.insert(fields.end(), {"color", "keep"});
   for (const auto& [key, value] : entry.items()) {
     if (std::find(fields.begin(), fields.end(), key) != fields.end()) continue;

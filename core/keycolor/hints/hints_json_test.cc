@@ -24,7 +24,7 @@ TEST(HintsJsonTest, ReadsEntries) {
   EXPECT_NEAR(hints[1].a, 0.0, 1e-3);
 }
 
-TEST(HintsJsonTest, NamesTheBadEntry) {
+TEST(HintsJsonTest, NamesBadEntry) {
   const std::vector<std::string> bad{"",
                                      "{",
                                      "{}",

@@ -54,7 +54,7 @@ Image TwoHalves(int width, int height) {
   return luminance;
 }
 
-TEST(HintsTest, ColorStopsAtALuminanceEdge) {
+TEST(HintsTest, StopsColorAtLuminanceEdge) {
   const Image luminance = TwoHalves(80, 60);
   const HintSolution solution = Spread(luminance, {{10, 30, 2, 50, 20}, {70, 30, 2, -40, 10}});
   for (int y = 0; y < 60; ++y) {
@@ -67,13 +67,13 @@ TEST(HintsTest, ColorStopsAtALuminanceEdge) {
   EXPECT_GT(solution.hinted_pixels, 20);
 }
 
-TEST(HintsTest, ReportsTheResidual) {
+TEST(HintsTest, ReportsResidual) {
   Recorder recorder;
   const HintSolution solution = Spread(TwoHalves(40, 40), {{10, 10, 2, 50, 20}}, {}, {}, &recorder);
   EXPECT_NEAR(recorder.last_residual, solution.relative_residual, 1e-5);
 }
 
-TEST(HintsTest, FlatPictureTakesItsOnlyHint) {
+TEST(HintsTest, FillsFlatPictureFromOnlyHint) {
   const HintSolution solution = Spread(Image(64, 48, 1, 55.0f), {{5, 5, 0, 33, -12}});
   for (size_t i = 0; i < solution.ab.PlaneSize(); ++i) {
     ASSERT_NEAR(solution.ab.Plane(0)[i], 33.0f, 0.05f);
@@ -103,7 +103,7 @@ TEST(HintsTest, LastOfContradictingHintsWinsWithWarning) {
   EXPECT_EQ(agreeing.warning, "");
 }
 
-TEST(HintsTest, TwoHintsOnAFlatRegionBlendSmoothly) {
+TEST(HintsTest, BlendsTwoHintsSmoothly) {
   // Along a narrow strip the interpolant is linear: no plateau, no step.
   const HintSolution solution = Spread(
       Image(101, 3, 1, 50.0f),
@@ -112,7 +112,7 @@ TEST(HintsTest, TwoHintsOnAFlatRegionBlendSmoothly) {
   for (int x = 0; x <= 100; ++x) EXPECT_NEAR(solution.ab.At(0, 1, x), 40.0f - 0.8f * x, 0.3f);
 }
 
-TEST(HintsTest, TenThousandHintsAreExactAndFinite) {
+TEST(HintsTest, HandlesTenThousandHints) {
   Image luminance(400, 300, 1);
   Random random(4);
   for (float& value : luminance.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
@@ -132,7 +132,7 @@ TEST(HintsTest, TenThousandHintsAreExactAndFinite) {
             static_cast<float>(last.a));
 }
 
-TEST(HintsTest, ExtremePicturesGiveFiniteColors) {
+TEST(HintsTest, StaysFiniteForExtremePictures) {
   Image checkered(64, 64, 1);
   for (int i = 0; i < 64 * 64; ++i) checkered.data[i] = (i + i / 64) % 2 ? 100.0f : 0.0f;
   for (const Image& luminance : {Image(64, 64, 1, 0.0f), Image(64, 64, 1, 100.0f), checkered}) {
@@ -191,7 +191,7 @@ TEST(HintsTest, NamesRefusedRegionsAndLabels) {
             std::string::npos);
 }
 
-TEST(HintsTest, HintOfWholePictureIsTheResult) {
+TEST(HintsTest, ReturnsHintOfWholePicture) {
   const Image luminance = TwoHalves(32, 24);
   const HintSolution solution = Spread(luminance, {{16, 12, 1e6, 12, 34}});
   EXPECT_EQ(solution.hinted_pixels, 32 * 24);
@@ -200,7 +200,7 @@ TEST(HintsTest, HintOfWholePictureIsTheResult) {
   }
 }
 
-TEST(HintsTest, BadHintsAreRefused) {
+TEST(HintsTest, RefusesBadHints) {
   const Image luminance(32, 24, 1, 50.0f);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<ColorHint> bad{{32, 5, 1, 0, 0},
@@ -221,12 +221,12 @@ TEST(HintsTest, BadHintsAreRefused) {
   EXPECT_THROW(Spread(broken, {{5, 5, 1, 0, 0}}), Error);
 }
 
-TEST(HintsTest, OnePixelPicture) {
+TEST(HintsTest, ColorsOnePixelPicture) {
   const HintSolution solution = Spread(Image(1, 1, 1, 50.0f), {{0.5, 0.5, 1, 7, 8}});
   EXPECT_NEAR(solution.ab.At(0, 0, 0), 7.0f, 1e-3f);
 }
 
-TEST(HintsTest, LargePicturesAreSolvedSmallAndUpsampled) {
+TEST(HintsTest, SolvesLargePicturesAtReducedSize) {
   const Image luminance = TwoHalves(400, 300);
   HintOptions options;
   options.max_side_px = 100;
@@ -239,7 +239,7 @@ TEST(HintsTest, LargePicturesAreSolvedSmallAndUpsampled) {
   }
 }
 
-TEST(StrokesTest, AlphaMarksTheHints) {
+TEST(StrokesTest, ReadsHintsFromAlpha) {
   const Image luminance = TwoHalves(60, 40);
   Image strokes(60, 40, 4, 0.0f);
   for (int y = 10; y < 30; ++y) {
@@ -256,7 +256,7 @@ TEST(StrokesTest, AlphaMarksTheHints) {
   EXPECT_NEAR(solution.ab.At(1, 5, 40), blue.b, 6.0);
 }
 
-TEST(StrokesTest, ChromaMarksTheHintsWithoutAlpha) {
+TEST(StrokesTest, ReadsHintsFromChromaWithoutAlpha) {
   const Image luminance(40, 40, 1, 50.0f);
   Image strokes(40, 40, 3, 0.5f);
   strokes.At(0, 20, 20) = 0.9f;
@@ -265,7 +265,7 @@ TEST(StrokesTest, ChromaMarksTheHintsWithoutAlpha) {
   EXPECT_GT(solution.ab.At(0, 2, 2), 20.0f);
 }
 
-TEST(StrokesTest, ThinStrokesSurviveTheReduction) {
+TEST(StrokesTest, KeepsThinStrokesWhenReduced) {
   const Image luminance(600, 600, 1, 50.0f);
   Image strokes(600, 600, 4, 0.0f);
   for (int c : {0, 3}) strokes.At(c, 300, 300) = 1.0f;

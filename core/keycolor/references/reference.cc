@@ -24,6 +24,7 @@
 #include "core/grid/grid_solver.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/picture_checks.h"
 #include "core/keycolor/references/confidence.h"
 #include "core/matching/cell_features.h"
@@ -44,10 +45,7 @@ constexpr int kLevels = 1024;  // bins of the histograms of L
 constexpr float kMinConfidence = 1e-4f;
 
 void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, but has {}",
-                          luminance.channels);
-  }
+  RequireLuminance(luminance, "the colouring of the key view");
   if (references.empty()) throw InvalidArgument("no reference picture; give at least one");
   for (size_t k = 0; k < references.size(); ++k) {
     const Image& picture = references[k];
@@ -59,13 +57,11 @@ void CheckInputs(const Image& luminance, const std::vector<Image>& references) {
       throw InvalidArgument(
           "{} is {} px; sides must have at least {} px", name, SizeText(picture), kMinSidePx);
     }
-    for (float value : picture.data) {
-      if (!std::isfinite(value)) throw InvalidArgument("{} has a value that is not finite", name);
-    }
+    if (!IsFinite(picture)) throw InvalidArgument("{} has a value that is not finite", name);
   }
 }
 
-int LevelOf(float l) {
+int HistogramBin(float l) {
   return std::clamp(static_cast<int>(l * (kLevels / 100.0f)), 0, kLevels - 1);
 }
 
@@ -74,7 +70,8 @@ int LevelOf(float l) {
 Image MatchHistogram(const Image& luminance, const Image& key) {
   const auto cumulate = [](const Image& picture) {
     std::vector<double> sums(kLevels, 0.0);
-    for (float l : picture.data) sums[LevelOf(l)] += 1.0 / static_cast<double>(picture.data.size());
+    for (float l : picture.data)
+      sums[HistogramBin(l)] += 1.0 / static_cast<double>(picture.data.size());
     std::partial_sum(sums.begin(), sums.end(), sums.begin());
     return sums;
   };
@@ -87,19 +84,15 @@ Image MatchHistogram(const Image& luminance, const Image& key) {
         (static_cast<float>(std::min<std::ptrdiff_t>(at, kLevels - 1)) + 0.5f) * (100.0f / kLevels);
   }
   Image matched = luminance;
-  for (float& l : matched.data) l = map[LevelOf(l)];
+  for (float& l : matched.data) l = map[HistogramBin(l)];
   return matched;
 }
 
 // Cells of a picture, with features of the encoder.
 CellFeatures Describe(const TapEncoder& encoder, const Image& luminance) {
   const ConvNextConfig& config = encoder.config();
-  const int multiple = config.Stride(config.StageCount() - 1);
   const torch::Tensor l = TensorFromImage(luminance);
-  const int64_t right = (multiple - luminance.width % multiple) % multiple;
-  const int64_t bottom = (multiple - luminance.height % multiple) % multiple;
-  const torch::Tensor padded =
-      right > 0 || bottom > 0 ? torch::replication_pad2d(l, {0, right, 0, bottom}) : l;
+  const torch::Tensor padded = PadByReplication(l, config.Stride(config.StageCount() - 1));
   return DescribeCells(config, encoder.Taps(encoder.Input(padded)), l);
 }
 

@@ -36,7 +36,7 @@ Image Bands(int width, int height, int shift) {
   return lab;
 }
 
-// Vertical fine stripes of strong contrast: nothing of the kind is in Bands.
+// Fine vertical stripes of strong contrast, unlike all of Bands.
 Image Stripes(int width, int height) {
   Image lab(width, height, 3);
   for (int y = 0; y < height; ++y) {
@@ -68,7 +68,7 @@ double MeanError(const Image& ab, const Image& lab) {
   return sum / static_cast<double>(ab.PlaneSize());
 }
 
-TEST(ReferenceTest, ColorsFollowTexture) {
+TEST(ReferenceTest, TransfersColorsByTexture) {
   const Image key = Bands(360, 160, 120);
   Recorder recorder;
   const ReferenceSolution solution =
@@ -84,7 +84,7 @@ TEST(ReferenceTest, ColorsFollowTexture) {
   }
 }
 
-TEST(ReferenceTest, PrefersTheSimilarReference) {
+TEST(ReferenceTest, PrefersSimilarReference) {
   const Image key = Bands(360, 160, 120);
   Recorder recorder;
   const ReferenceSolution solution =
@@ -97,10 +97,10 @@ TEST(ReferenceTest, PrefersTheSimilarReference) {
   EXPECT_GT(solution.explained[1], 0.7);
 }
 
-TEST(ReferenceTest, WarnsAndFadesForUnrelatedReference) {
+TEST(ReferenceTest, WarnsAndFadesUnrelatedReferences) {
   const Image key = Bands(360, 160, 120);
   ReferenceOptions options;
-  options.low_confidence = 1.0;  // nothing is that certain
+  options.low_confidence = 1.0;  // no match is that certain
   Recorder recorder;
   const ReferenceSolution solution =
       Solve(LuminanceOfLab(key), {SrgbFromLab(Stripes(64, 64))}, options, recorder);
@@ -121,7 +121,7 @@ TEST(ReferenceTest, GivesSameBytesForAnyThreadCount) {
   }
 }
 
-TEST(ReferenceTest, NamesReferencesThatItRefuses) {
+TEST(ReferenceTest, NamesRefusedReferences) {
   const Image luminance = LuminanceOfLab(Bands(100, 70, 0));
   const Image good = SrgbFromLab(Bands(100, 70, 0));
   const auto message_of = [&](const std::vector<Image>& references) -> std::string {

@@ -65,7 +65,7 @@ constexpr Modifier kModifiers[] = {
     {"vivid", 1.4},
 };
 
-LabColor LabOf(uint32_t rgb) {
+LabColor LabFromRgb(uint32_t rgb) {
   return LabFromSrgb(RgbColor{static_cast<double>((rgb >> 16) & 0xff) / 255.0,
                               static_cast<double>((rgb >> 8) & 0xff) / 255.0,
                               static_cast<double>(rgb & 0xff) / 255.0});
@@ -73,7 +73,7 @@ LabColor LabOf(uint32_t rgb) {
 
 std::optional<LabColor> FromTable(std::string_view name) {
   for (const TableEntry& entry : kColors) {
-    if (entry.name == name) return LabOf(entry.rgb);
+    if (entry.name == name) return LabFromRgb(entry.rgb);
   }
   return std::nullopt;
 }
@@ -87,11 +87,11 @@ std::optional<LabColor> FromHex(const std::string& word) {
     const auto digit = static_cast<uint32_t>(std::strtoul(word.substr(i, 1).c_str(), nullptr, 16));
     rgb = word.size() == 4 ? (rgb << 8) | (digit * 17) : (rgb << 4) | digit;
   }
-  return LabOf(rgb);
+  return LabFromRgb(rgb);
 }
 
 // "reddish", "bluish": half of the chroma.
-std::optional<LabColor> FromIsh(const std::string& word) {
+std::optional<LabColor> PaleColor(const std::string& word) {
   if (!word.ends_with("ish")) return std::nullopt;
   std::string stem = word.substr(0, word.size() - 3);
   if (stem == "redd") stem = "red";
@@ -105,7 +105,7 @@ std::optional<LabColor> FromIsh(const std::string& word) {
   return std::nullopt;
 }
 
-std::optional<double> ModifierOf(const std::string& word) {
+std::optional<double> FindModifier(const std::string& word) {
   for (const Modifier& modifier : kModifiers) {
     if (modifier.name == word) return modifier.chroma;
   }
@@ -126,13 +126,13 @@ std::optional<NamedColor> ColorAt(const std::vector<std::string>& words, size_t 
     } else {
       lab = FromTable(words[i]);
       if (!lab) lab = FromHex(words[i]);
-      if (!lab) lab = FromIsh(words[i]);
+      if (!lab) lab = PaleColor(words[i]);
     }
     if (lab) {
       name += words[i] + (count == 2 ? " " + words[i + 1] : "");
       return NamedColor{name, {lab->l, chroma * lab->a, chroma * lab->b}, i + count - begin};
     }
-    const std::optional<double> modifier = ModifierOf(words[i]);
+    const std::optional<double> modifier = FindModifier(words[i]);
     if (!modifier) return std::nullopt;
     chroma *= *modifier;
     name += words[i] + " ";

@@ -5,6 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/image/codec.h"
+#include "core/image/crop.h"
 
 namespace color3d {
 namespace {
@@ -15,7 +16,7 @@ constexpr int kMaxWindowsPerSide = 16;  // bounds the work for elongated picture
 constexpr float kMinWeight =
     0.05f;  // weight at a window's border, above 0 so that borders of the picture count
 
-void Normalise(std::vector<float>& vector) {
+void Normalize(std::vector<float>& vector) {
   double sum = 1e-30;
   for (const float value : vector) sum += static_cast<double>(value) * value;
   for (float& value : vector) value = static_cast<float>(value / std::sqrt(sum));
@@ -38,7 +39,8 @@ std::vector<int> Starts(int length, int side) {
   return starts;
 }
 
-std::vector<Window> WindowsOf(const Image& picture, const std::vector<int>& windows_per_side) {
+std::vector<Window> CoverWithWindows(const Image& picture,
+                                     const std::vector<int>& windows_per_side) {
   std::vector<Window> windows;
   const int shorter = std::min(picture.width, picture.height);
   const int longer = std::max(picture.width, picture.height);
@@ -53,17 +55,6 @@ std::vector<Window> WindowsOf(const Image& picture, const std::vector<int>& wind
     }
   }
   return windows;
-}
-
-Image Cut(const Image& picture, const Window& window) {
-  Image out(window.width, window.height, picture.channels);
-  for (int c = 0; c < picture.channels; ++c) {
-    for (int y = 0; y < window.height; ++y) {
-      const float* row = picture.Plane(c) + static_cast<size_t>(window.top + y) * picture.width;
-      std::copy_n(row + window.left, window.width, &out.At(c, y, 0));
-    }
-  }
-  return out;
 }
 
 // Cosines of a window's grid of features with every text.
@@ -116,15 +107,15 @@ void Blend(const Image& cosines, const Window& window, double scale, Image& sum,
 
 }  // namespace
 
-std::vector<float> TextFeatureOf(const TextImageModel& model, const std::string& thing) {
+std::vector<float> MeanTextFeature(const TextImageModel& model, const std::string& thing) {
   std::vector<float> mean;
   for (const char* sentence : kSentences) {
     std::vector<float> feature = model.TextFeatures(sentence + thing);
-    Normalise(feature);
+    Normalize(feature);
     mean.resize(feature.size(), 0.0f);
     for (size_t i = 0; i < feature.size(); ++i) mean[i] += feature[i];
   }
-  Normalise(mean);
+  Normalize(mean);
   return mean;
 }
 
@@ -141,17 +132,15 @@ Image DenseSimilarity(const TextImageModel& model,
             std::max(1, static_cast<int>(std::lround(scale * srgb.height))),
             static_cast<int>(texts.size()));
   Image weights(sum.width, sum.height, 1, 1e-12f);
-  const std::vector<Window> windows = WindowsOf(srgb, windows_per_side);
+  const std::vector<Window> windows = CoverWithWindows(srgb, windows_per_side);
   for (size_t i = 0; i < windows.size(); ++i) {
     cancel.ThrowIfCancelled();
     progress.OnProgress(static_cast<int64_t>(i),
                         static_cast<int64_t>(windows.size()),
                         "looking for the prompt's things");
-    Blend(Cosines(model.PatchFeatures(Cut(srgb, windows[i])), texts),
-          windows[i],
-          scale,
-          sum,
-          weights);
+    const Window& window = windows[i];
+    const Image part = Crop(srgb, window.left, window.top, window.width, window.height);
+    Blend(Cosines(model.PatchFeatures(part), texts), window, scale, sum, weights);
   }
   for (int c = 0; c < sum.channels; ++c) {
     for (size_t i = 0; i < sum.PlaneSize(); ++i) sum.Plane(c)[i] /= weights.data[i];

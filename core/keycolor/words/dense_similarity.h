@@ -13,7 +13,7 @@
 namespace color3d {
 
 // Unit feature of a thing: mean over several sentences about it.
-std::vector<float> TextFeatureOf(const TextImageModel& model, const std::string& thing);
+std::vector<float> MeanTextFeature(const TextImageModel& model, const std::string& thing);
 
 // One plane per text, cosines in -1..1, on a grid whose longer side is `map_side_px` (or the
 // picture's, if smaller). `texts` are unit vectors. `windows_per_side`: for each entry n, square

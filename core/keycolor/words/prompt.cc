@@ -11,6 +11,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
+#include "core/image/image_checks.h"
 #include "core/keycolor/words/dense_similarity.h"
 
 namespace color3d {
@@ -26,16 +27,12 @@ constexpr int kPatchGuideRadius = 3;
 constexpr float kPatchGuideVarianceFloor = 30.0f;
 
 void CheckPictures(const Image& luminance, const Image& rest) {
-  if (luminance.channels != 1 || luminance.Empty()) {
-    throw InvalidArgument("the key view's luminance must have 1 channel, it has {}",
-                          luminance.channels);
-  }
+  RequireLuminance(luminance, "the colouring of the key view");
   const bool fits =
       rest.channels == 2 && rest.width == luminance.width && rest.height == luminance.height;
   if (!rest.Empty() && !fits) {
     throw InvalidArgument(
-        "the colours of the rest are {}x{} px with {} channels, the key view has {}x{} px and "
-        "needs 2",
+        "the colours of the rest are {}x{} px with {} channels, but must be {}x{} px with 2",
         rest.width,
         rest.height,
         rest.channels,
@@ -69,8 +66,8 @@ Image Probabilities(const Image& luminance,
                     ProgressObserver& progress,
                     const CancellationToken& cancel) {
   std::vector<std::vector<float>> texts;
-  for (const ColorPhrase& phrase : phrases) texts.push_back(TextFeatureOf(model, phrase.thing));
-  for (const char* background : kBackgrounds) texts.push_back(TextFeatureOf(model, background));
+  for (const ColorPhrase& phrase : phrases) texts.push_back(MeanTextFeature(model, phrase.thing));
+  for (const char* background : kBackgrounds) texts.push_back(MeanTextFeature(model, background));
   const Image picture = SrgbFromLab(FitWithin(luminance, kLargestPictureSidePx));
   Image planes = DenseSimilarity(
       model, picture, texts, options.windows_per_side, options.map_side_px, progress, cancel);
@@ -118,9 +115,9 @@ Leader LeaderAt(const Image& probabilities, size_t i, const std::vector<bool>& a
   return leader;
 }
 
-std::vector<PromptRegion> RegionsOf(const std::vector<ColorPhrase>& phrases,
-                                    const Image& probabilities,
-                                    double min_share) {
+std::vector<PromptRegion> FindRegions(const std::vector<ColorPhrase>& phrases,
+                                      const Image& probabilities,
+                                      double min_share) {
   std::vector<PromptRegion> regions;
   const std::vector<bool> all(probabilities.channels, true);
   std::vector<size_t> pixels(probabilities.channels, 0);
@@ -221,7 +218,7 @@ class HintPlacer {
   std::vector<bool> allowed_;  // phrases that were found, and background
 };
 
-Error NothingFound(const std::vector<PromptRegion>& regions) {
+Error NoRegionFound(const std::vector<PromptRegion>& regions) {
   std::string text = "none of the prompt's things was found in the key view:";
   for (const PromptRegion& region : regions) {
     text += fmt::format(" \"{}\" (best score {:.3g})", region.phrase.thing, region.score);
@@ -256,7 +253,7 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
   solution.notes = std::move(parsed.notes);
   const Image probabilities =
       Probabilities(luminance, parsed.phrases, model, options, control.progress, control.cancel);
-  solution.regions = RegionsOf(parsed.phrases, probabilities, options.min_share);
+  solution.regions = FindRegions(parsed.phrases, probabilities, options.min_share);
   bool any = false;
   for (const PromptRegion& region : solution.regions) {
     any = any || region.found;
@@ -264,11 +261,11 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
     solution.notes.push_back(fmt::format(
         "\"{}\" was not found in the key view; its colour is not used", region.phrase.thing));
   }
-  if (!any) throw NothingFound(solution.regions);
+  if (!any) throw NoRegionFound(solution.regions);
   const HintPlacer placer(
       luminance, rest, probabilities, solution.regions, options.seed_confidence);
   const std::vector<ColorHint> hints = placer.Place();
-  if (hints.empty()) throw NothingFound(solution.regions);
+  if (hints.empty()) throw NoRegionFound(solution.regions);
   solution.confidence = placer.Confidence();
   solution.spread = KeyColorFromHints(luminance, hints, options.hints, control);
   solution.ab = std::move(solution.spread.ab);

@@ -53,7 +53,7 @@ struct Clause {
 };
 
 // Splits into lower-case words, with "" where punctuation ends a clause. Hyphens separate words.
-std::vector<std::string> WordsOf(const std::string& prompt) {
+std::vector<std::string> SplitWords(const std::string& prompt) {
   std::vector<std::string> words;
   std::string word;
   const auto finish = [&] {
@@ -73,9 +73,9 @@ std::vector<std::string> WordsOf(const std::string& prompt) {
   return words;
 }
 
-std::vector<Clause> ClausesOf(const std::string& prompt) {
+std::vector<Clause> SplitClauses(const std::string& prompt) {
   std::vector<Clause> clauses(1);
-  for (std::string& word : WordsOf(prompt)) {
+  for (std::string& word : SplitWords(prompt)) {
     if (word.empty() || kBreaks.count(word) || kLinks.count(word)) {
       const Boundary boundary =
           !word.empty() && kLinks.count(word) ? Boundary::kLink : Boundary::kBreak;
@@ -169,7 +169,7 @@ ParsedPrompt ParsePrompt(const std::string& prompt) {
   }
   PhraseCollector collector;
   std::string previous;
-  for (const Clause& clause : ClausesOf(prompt)) {
+  for (const Clause& clause : SplitClauses(prompt)) {
     collector.AddClause(clause, previous);
     if (clause.words.empty()) continue;
     previous = ColorsIn(clause.words).empty() ? Joined(clause.words, 0, clause.words.size()) : "";

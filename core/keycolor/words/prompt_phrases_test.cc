@@ -24,7 +24,7 @@ Pairs Parse(const std::string& prompt) {
   return pairs;
 }
 
-TEST(PromptPhrasesTest, ColorsBeforeThings) {
+TEST(PromptPhrasesTest, ParsesColorsBeforeThings) {
   EXPECT_EQ(Parse("Red brick castle, blue sky and green grass"),
             (Pairs{{"red", "brick castle"}, {"blue", "sky"}, {"green", "grass"}}));
   EXPECT_EQ(Parse("a golden autumn forest, blue sky & white clouds"),
@@ -36,7 +36,7 @@ TEST(PromptPhrasesTest, ColorsBeforeThings) {
   EXPECT_EQ(Parse("an orange on an orange table"), (Pairs{{"orange", "table"}}));
 }
 
-TEST(PromptPhrasesTest, ColorsAfterThings) {
+TEST(PromptPhrasesTest, ParsesColorsAfterThings) {
   EXPECT_EQ(Parse("the sky is blue. Roses are red"), (Pairs{{"blue", "sky"}, {"red", "roses"}}));
   EXPECT_EQ(Parse("paint the roof red"), (Pairs{{"red", "roof"}}));
   EXPECT_EQ(Parse("the house in light yellow"), (Pairs{{"light yellow", "house"}}));
@@ -44,7 +44,7 @@ TEST(PromptPhrasesTest, ColorsAfterThings) {
             (Pairs{{"green", "door"}, {"white", "wall"}}));
 }
 
-TEST(PromptPhrasesTest, NamesOfTwoWordsModifiersAndHex) {
+TEST(PromptPhrasesTest, ParsesTwoWordNamesModifiersAndHex) {
   EXPECT_EQ(
       Parse("pale sky-blue shirt; #4682B4 door, reddish hair, dark night, #fff wall"),
       (Pairs{
@@ -75,7 +75,7 @@ TEST(PromptPhrasesTest, RefusesPromptsWithoutColor) {
   EXPECT_THROW(ParsePrompt(many), Error);
 }
 
-TEST(ColorNamesTest, TableIsSortedAndEveryNameIsFound) {
+TEST(ColorNamesTest, FindsEveryNameOfSortedTable) {
   const std::vector<std::string> names = KnownColorNames();
   EXPECT_TRUE(std::is_sorted(names.begin(), names.end()));
   for (const std::string& name : names) {

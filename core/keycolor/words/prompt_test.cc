@@ -13,8 +13,8 @@
 namespace color3d {
 namespace {
 
-// Knows three things by their brightness in the grey picture: sky is bright, grass dark, and walls
-// are in between. Features: (bright, middle, dark, nothing).
+// Recognizes three things by brightness in the grey picture: bright sky, dark grass, and walls in
+// between. Features: (bright, middle, dark, nothing).
 class BrightnessModel : public TextImageModel {
  public:
   Image PatchFeatures(const Image& srgb) const override {
@@ -68,7 +68,7 @@ PromptSolution Solve(const Image& l, const std::string& prompt, const Image& res
   return SolveWith({}, l, prompt, rest);
 }
 
-TEST(PromptTest, PhrasesColorTheirRegions) {
+TEST(PromptTest, ColorsRegionsByPhrases) {
   const Image l = Scene(320, 240);
   const PromptSolution solution = Solve(l, "blue sky over green grass, and a red wall");
   ASSERT_EQ(solution.regions.size(), 3u);
@@ -85,7 +85,7 @@ TEST(PromptTest, PhrasesColorTheirRegions) {
   EXPECT_GT(solution.spread.hinted_pixels, 100);
 }
 
-TEST(PromptTest, ReportsPhraseThatIsNotFound) {
+TEST(PromptTest, ReportsMissingPhrases) {
   Image l(200, 150, 1, 85.0f);  // nothing but sky
   const PromptSolution solution = Solve(l, "blue sky, red wall");
   EXPECT_TRUE(solution.regions[0].found);
@@ -104,7 +104,7 @@ TEST(PromptTest, ReportsPhraseThatIsNotFound) {
   }
 }
 
-TEST(PromptTest, UnnamedAreasTakeTheGivenColors) {
+TEST(PromptTest, ColorsUnnamedAreasFromRest) {
   // The model knows no unicorn: its text is near the "nothing" feature, which no patch shows.
   const Image l = Scene(320, 240);
   Image rest(320, 240, 2);
@@ -126,7 +126,7 @@ TEST(PromptTest, IsRepeatable) {
   EXPECT_EQ(a.confidence.data, b.confidence.data);
 }
 
-TEST(PromptTest, TakesPicturesOfAnySize) {
+TEST(PromptTest, AcceptsPicturesOfAnySize) {
   for (const auto& [width, height] :
        {std::pair{1, 1}, std::pair{3, 200}, std::pair{500, 7}, std::pair{20000, 2}}) {
     const Image l(width, height, 1, 85.0f);

@@ -44,7 +44,7 @@ ordered_json TemporalScores(const Scene& scene,
                             const std::map<int, std::filesystem::path>& truth,
                             StageContext& context) {
   ordered_json json = ordered_json::object();
-  if (scene.capture().is_reconstructed && !scene.capture().is_dynamic) return json;
+  if (!scene.HasTimes()) return json;
   const ViewImages images(
       scene, context.scene_folder(), kConsistencySidePx, kScoredFramesCacheBytes);
   const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;

@@ -53,7 +53,7 @@ double TimeInScene(double time_s, double last_s, const std::string& what) {
 
 // Times in a file of cameras. Throws if only some of its frames have one.
 bool ReadTimes(const std::vector<FileCamera>& file, const Scene& scene, Stations* stations) {
-  if (!scene.capture().is_dynamic) return false;
+  if (!scene.HasTimes()) return false;
   const bool has_times = file[0].time_s.has_value();
   const double last_s = scene.Times().back();
   for (size_t i = 0; i < file.size(); ++i) {
@@ -86,8 +86,7 @@ Stations CamerasOfFile(const RenderOptions& options, const Scene& scene, const C
 std::vector<PathCamera> CamerasOfViews(const RenderOptions& options, const Scene& scene, int home) {
   std::vector<int> order;
   for (const std::string& name : options.views) order.push_back(scene.FindView(name));
-  if (order.empty())
-    order = scene.capture().is_dynamic ? scene.FramesOfShotOf(home) : ViewsInOrder(scene);
+  if (order.empty()) order = scene.HasTimes() ? scene.FramesInShot(home) : ViewsInOrder(scene);
   std::vector<PathCamera> cameras;
   for (const int index : order) {
     const View& view = scene.views[index];
@@ -106,14 +105,14 @@ std::vector<PathCamera> StillCamera(const Scene& scene, int home) {
 }
 
 // Returns true if a movie without a given length shows every camera of its path once.
-bool IsOneByOne(const RenderOptions& options, const Scene& scene) {
+bool ShowsEachCameraOnce(const RenderOptions& options, const Scene& scene) {
   using Path = RenderOptions::Path;
   return options.path == Path::kCameras || options.path == Path::kStill ||
-         (options.path == Path::kPhotos && scene.capture().is_dynamic);
+         (options.path == Path::kPhotos && scene.HasTimes());
 }
 
 // The cameras as they are, and back again for --bounce.
-std::vector<PathCamera> OneByOne(std::vector<PathCamera> cameras, bool bounce) {
+std::vector<PathCamera> EachCameraOnce(std::vector<PathCamera> cameras, bool bounce) {
   const size_t count = cameras.size();
   for (size_t i = count - 1; bounce && i-- > 1;) cameras.push_back(cameras[i]);
   return cameras;
@@ -171,7 +170,7 @@ Stations PathStations(const RenderOptions& options, const Scene& scene, int home
     case Path::kCameras:
       return CamerasOfFile(options, scene, scene.views[home].camera);
     case Path::kPhotos:
-      return {CamerasOfViews(options, scene, home), scene.capture().is_dynamic};
+      return {CamerasOfViews(options, scene, home), scene.HasTimes()};
     case Path::kStill:
       return {StillCamera(scene, home), true};
     default:
@@ -220,11 +219,11 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
   for (PathCamera& station : stations.cameras) {
     station.camera = CoverPicture(station.camera, picture.width, picture.height);
   }
-  const bool one_by_one = !options.frames && IsOneByOne(options, scene);
+  const bool one_by_one = !options.frames && ShowsEachCameraOnce(options, scene);
   const bool file_tells = stations.have_times && options.path == RenderOptions::Path::kCameras;
   std::vector<PathCamera> frames;
   if (one_by_one) {
-    frames = OneByOne(stations.cameras, options.bounce);
+    frames = EachCameraOnce(stations.cameras, options.bounce);
   } else {
     const Eigen::Vector3d focus = FocusOfView(view, model, context.pool());
     const double unit = (focus - view.cam_from_world.Center()).norm();
@@ -233,7 +232,7 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
                  : SmoothFrames(options, stations, unit, file_tells);
   }
   const bool told = file_tells || (one_by_one && stations.have_times);
-  if (!told && scene.capture().is_dynamic) SpreadTimes(options.bounce, scene, &frames);
+  if (!told && scene.HasTimes()) SpreadTimes(options.bounce, scene, &frames);
   if (!options.time_s) return frames;
   const double time_s =
       TimeInScene(*options.time_s, scene.Times().back(), "the requested time (time_s)");
@@ -246,9 +245,9 @@ std::optional<FilmClock> ClockOfScene(const RenderOptions& options,
                                       const Scene& scene,
                                       const std::vector<PathCamera>& frames,
                                       const StageContext& context) {
-  const bool own = !options.frames && !options.time_s && frames.size() > 1 &&
-                   scene.capture().is_dynamic && options.path != RenderOptions::Path::kCameras &&
-                   IsOneByOne(options, scene);
+  const bool own = !options.frames && !options.time_s && frames.size() > 1 && scene.HasTimes() &&
+                   options.path != RenderOptions::Path::kCameras &&
+                   ShowsEachCameraOnce(options, scene);
   if (!own || !TimesAreSeconds(scene, FindImportFacts(context))) return std::nullopt;
   std::vector<double> times;
   for (const PathCamera& frame : frames) times.push_back(frame.time_s);
@@ -291,8 +290,7 @@ void RenderMovie(const RenderOptions& options,
                  const Scene& scene,
                  const GaussianModel& model,
                  StageContext& context) {
-  if (!scene.capture().is_dynamic &&
-      (options.path == RenderOptions::Path::kStill || options.time_s)) {
+  if (!scene.HasTimes() && (options.path == RenderOptions::Path::kStill || options.time_s)) {
     throw InvalidArgument("this scene has no times: path still and time_s need a dynamic scene");
   }
   const int home = HomeView(scene, context);

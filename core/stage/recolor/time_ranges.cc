@@ -99,20 +99,16 @@ void AddTo(std::vector<RecoloredRange>* ranges,
 }  // namespace
 
 std::vector<RecoloredRange> RangesOf(const std::vector<RangeKeyView>& keys, const Scene& scene) {
-  if (scene.capture().is_reconstructed) {
-    throw InvalidArgument("the key view {} has a range of time, but {}; leave the range out{}",
-                          keys.front().view,
-                          scene.capture().is_dynamic
-                              ? "the scene has poses, and is coloured for all times"
-                              : "the scene is no film",
-                          scene.capture().is_dynamic ? ", or colour the film without poses" : "");
+  if (const std::string why_not = scene.capture().why_no_time_range; !why_not.empty()) {
+    throw InvalidArgument(
+        "the key view {} has a range of time, but {}", keys.front().view, why_not);
   }
   const FilmTime film = TimeOf(scene);
   std::vector<RecoloredRange> ranges;
   for (const RangeKeyView& key : keys) {
     const int view = FindAdditionalKeyView(scene, key.view);
     CheckRange(key, scene.views[view], film);
-    std::vector<int> views = scene.FramesOfShotOf(view);
+    std::vector<int> views = scene.FramesInShot(view);
     std::erase_if(views, [&](int v) { return !IsInside(key, scene.views[v].time_s()); });
     AddTo(&ranges, std::move(views), {view, &key}, scene);
   }

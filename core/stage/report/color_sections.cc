@@ -155,7 +155,7 @@ std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
                                                                    : "_2d";
       for (const std::string& key : ColumnsOf(table, KeysOf(row.figures))) {
         const Metric* metric = FindMetric(key).metric;
-        if (metric == nullptr || metric->in_metrics) {
+        if (metric == nullptr || metric->Is(Metric::kInMetrics)) {
           metrics.emplace_back(key + suffix, row.figures.at(key));
         }
       }

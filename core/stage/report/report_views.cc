@@ -31,8 +31,8 @@ std::vector<int> ChosenViews(const Scene& scene, bool has_model, const StageCont
     if (!has_model && !HasRender(scene.views[i], context)) continue;
     (scene.views[i].held_out ? held_out : training).push_back(static_cast<int>(i));
   }
-  std::vector<int> chosen = EvenlyOf(held_out, kMaxViews / 2);
-  const std::vector<int> others = EvenlyOf(training, kMaxViews - chosen.size());
+  std::vector<int> chosen = PickEvenly(held_out, kMaxViews / 2);
+  const std::vector<int> others = PickEvenly(training, kMaxViews - chosen.size());
   chosen.insert(chosen.end(), others.begin(), others.end());
   return chosen;
 }
@@ -52,9 +52,9 @@ Image GrayPicture(const Image& luminance) {
 
 std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
   std::optional<GaussianModel> model;
-  if (scene.capture().is_reconstructed && context.HasInput(artifact::kModel)) {
+  if (context.HasInput(artifact::kModel)) {
     model = ParseGaussians(context.ReadInput(artifact::kModel));
-    if (model->channels != 3) model.reset();
+    if (model->channels != 3 || model->size() == 0) model.reset();
   }
   const std::vector<int> chosen = ChosenViews(scene, model.has_value(), context);
   const double side = kLargestPx * std::sqrt(kViewsAtLargest / std::max<size_t>(1, chosen.size()));

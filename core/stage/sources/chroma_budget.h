@@ -20,7 +20,7 @@ inline ChromaOptions ChromaWithinMemory(ChromaOptions options,
                                         const GaussianModel& geometry,
                                         int64_t memory_bytes) {
   const bool as_photos = geometry.motion.size() == 0 && scene.views.size() <= kFramesLikePhotos;
-  if (scene.capture().is_dynamic && !as_photos) options = ForManyFrames(options);
+  if (scene.HasTimes() && !as_photos) options = ForManyFrames(options);
   options.memory_budget_bytes = std::min(options.memory_budget_bytes, memory_bytes / 2);
   options.target_budget_bytes = std::min(options.target_budget_bytes, memory_bytes / 8);
   return options;

@@ -102,7 +102,7 @@ GivenColors Read(const PaintedColors& painted,
                  StageContext& context) {
   switch (painted.kind) {
     case PaintedColors::Kind::kStrokes:
-      return FromMap(HintsOfStrokes(ReadPainted(painted.file, srgb)), srgb);
+      return FromMap(HintsFromStrokes(ReadPainted(painted.file, srgb)), srgb);
     case PaintedColors::Kind::kPoints:
       return FromHints(painted, srgb, context);
     case PaintedColors::Kind::kPicture:
@@ -130,10 +130,10 @@ GivenColors ReadGivenColors(const PaintedColors& painted,
   return colors;
 }
 
-CarriedColor UndistortGiven(const Image& ab,
-                            const Image& given,
-                            int view,
-                            const ViewImages& images) {
+CarriedColor UndistortGivenColors(const Image& ab,
+                                  const Image& given,
+                                  int view,
+                                  const ViewImages& images) {
   Image weighted = ab;
   for (int c = 0; c < 2; ++c) {
     for (size_t i = 0; i < given.data.size(); ++i) weighted.Plane(c)[i] *= given.data[i];

@@ -73,15 +73,12 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
 }
 
 SceneFacts SceneFactsFrom(const SceneRecord& scene) {
-  const bool is_splat = scene.layout == CaptureLayout::kSplat;
-  return {.photos = scene.photo_count,
-          .has_poses = InfoOf(scene.layout).has_poses,
+  return {.pictures = scene.photo_count,
+          .layout = scene.layout,
           .augment_files = static_cast<int>(
-              std::count_if(scene.files.begin(),
-                            scene.files.end(),
-                            [](const auto& file) { return IsAugmentFile(file.path); })),
-          .is_film = scene.layout == CaptureLayout::kFilm,
-          .is_splat = is_splat};
+              std::count_if(scene.files.begin(), scene.files.end(), [](const auto& file) {
+                return IsAugmentFile(file.path);
+              }))};
 }
 
 // Returns the route's colorize_key_view job, by default the accepted one of its scene, and the
@@ -232,7 +229,7 @@ class JobServiceImpl final : public v1::JobService::CallbackService {
                                 v1::Job* response) override {
     return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
       CheckName(request->name(), "jobs");
-      *response = ToProto(WithRoomMade(parts_.make_room, [&] {
+      *response = ToProto(RetryAfterMakingRoom(parts_.make_room, [&] {
         return call.store.Cancel(request->name(), IdempotencyKey("CancelJob", *request));
       }));
       spdlog::info("[job={}] cancellation requested", request->name());
@@ -258,7 +255,7 @@ class JobServiceImpl final : public v1::JobService::CallbackService {
                                 v1::DeleteJobResponse* response) override {
     return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
       CheckName(request->name(), "jobs");
-      WithRoomMade(parts_.make_room, [&] {
+      RetryAfterMakingRoom(parts_.make_room, [&] {
         call.store.Delete(request->name(), IdempotencyKey("DeleteJob", *request));
       });
     });

@@ -116,7 +116,7 @@ class SceneServiceImpl final : public v1::SceneService::CallbackService {
                                   v1::DeleteSceneResponse* response) override {
     return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
       CheckName(request->name(), "scenes");
-      WithRoomMade(parts_.make_room, [&] {
+      RetryAfterMakingRoom(parts_.make_room, [&] {
         call.store.DeleteScene(request->name(), IdempotencyKey("DeleteScene", *request));
       });
     });

@@ -294,14 +294,15 @@ SceneCheck CheckScene(const SceneRecord& scene,
     checks.Check(file, held.contains(file.digest.sha256), &check);
     missing += violations.size() - before;
   }
-  if (check.layout == CaptureLayout::kSplat) {
+  const ViewSource views = InfoOf(check.layout).views;
+  if (views == ViewSource::kSplatRenders) {
     if (const int splats = CountSplats(scene.files); splats > 1) {
       violations.push_back({"",
                             fmt::format("the scene holds {} splats and no photos; give one "
                                         "splat per scene",
                                         splats)});
     }
-  } else if (check.layout == CaptureLayout::kFilm || check.layout == CaptureLayout::kFilms) {
+  } else if (views == ViewSource::kFrames) {
     if (CountFilms(scene.files) > 0 && check.photo_count > 0) {
       violations.push_back(
           {"", "the scene holds pictures in frames/ and video files; give one of the two"});

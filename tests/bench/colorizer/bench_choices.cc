@@ -13,6 +13,7 @@
 #include "core/base/files.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"

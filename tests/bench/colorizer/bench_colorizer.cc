@@ -12,7 +12,7 @@
 #include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
-#include "core/colorizer/colorizer.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
 #include "core/image/probe/probe.h"

@@ -8,8 +8,9 @@
 #include <thread>
 
 #include "core/base/memory.h"
+#include "core/colorizer/model/tensor_file.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/scene_batch.h"
-#include "core/colorizer/tensor_file.h"
 
 namespace color3d {
 namespace {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
+#include "core/encoder/encoder.h"
 
 namespace color3d {
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/colorizer/named_tensors.h"
+#include "core/colorizer/model/named_tensors.h"
 #include "core/encoder/convnext/convnext.h"
 #include "core/weights/weight_map.h"
 #include "tests/bench/pretrain/color_bins.h"

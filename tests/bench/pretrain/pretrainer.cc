@@ -11,7 +11,7 @@
 #include <numbers>
 
 #include "core/base/error.h"
-#include "core/colorizer/named_tensors.h"
+#include "core/colorizer/model/named_tensors.h"
 #include "core/encoder/image_tensors.h"
 #include "core/matching/cell_features.h"
 #include "tests/bench/pretrain/network_start.h"

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/colorizer/named_tensors.h"
+#include "core/colorizer/model/named_tensors.h"
 #include "core/encoder/convnext/convnext.h"
 #include "core/keycolor/automatic/color_head.h"
 #include "tests/bench/pretrain/color_bins.h"

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "core/colorizer/colorizer.h"
-#include "core/colorizer/padding.h"
-#include "core/colorizer/personal_model.h"
-#include "core/colorizer/recipe.h"
+#include "core/colorizer/model/padding.h"
+#include "core/colorizer/model/personal_model.h"
+#include "core/colorizer/training/recipe.h"
 #include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_threads.h"
 #include "tests/support/networks/random_features.h"

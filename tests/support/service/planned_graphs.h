@@ -19,7 +19,7 @@ inline v1::Digest SomeDigest(const std::string& text) {
   return digest;
 }
 
-inline constexpr SceneFacts kTwentyPhotos = {.photos = 20, .has_poses = true};
+inline constexpr SceneFacts kTwentyPhotos = {.pictures = 20, .layout = CaptureLayout::kColmap};
 
 inline v1::JobSpec SceneSpec() {
   v1::JobSpec spec;

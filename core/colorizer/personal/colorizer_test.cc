@@ -1,0 +1,248 @@
+// Tests of the public interface: train, colorize, store, load.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/base/error.h"
+#include "core/base/random.h"
+#include "core/color/difference.h"
+#include "core/color/lab.h"
+#include "core/colorizer/personal/train_colorizer.h"
+
+namespace color3d {
+namespace {
+
+struct Key {
+  Image luminance;
+  Image ab;
+};
+
+// Horizontal stripes are orange, vertical ones blue.
+Key MakeKey(int width, int height) {
+  Key key{Image(width, height, 1), Image(width, height, 2)};
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const bool left = 2 * x < width;
+      key.luminance.At(0, y, x) = 50.0f + 20.0f * std::sin(0.8f * (left ? y : x));
+      key.ab.At(0, y, x) = left ? 30.0f : 5.0f;
+      key.ab.At(1, y, x) = left ? 40.0f : -45.0f;
+    }
+  }
+  return key;
+}
+
+ColorizerOptions Quick(int iterations) {
+  ColorizerOptions options;
+  options.iterations = iterations;
+  options.crop_px = 64;
+  return options;
+}
+
+// Trained once, since training is slow.
+const std::shared_ptr<const Encoder>& TheEncoder() {
+  static const std::shared_ptr<const Encoder> encoder = Encoder::Embedded();
+  return encoder;
+}
+
+std::shared_ptr<const Colorizer> Train(const Key& key, const ColorizerOptions& options) {
+  ThreadPool pool(1);
+  NoCheckpoints checkpoints;
+  NullObserver progress;
+  return TrainColorizer(
+      TheEncoder(), {{"key", key.luminance, key.ab}}, options, {pool, checkpoints, progress, {}});
+}
+
+double MeanError(const Image& luminance, const Image& x, const Image& y) {
+  return MeanDeltaE00(JoinLab(luminance, x), JoinLab(luminance, y));
+}
+
+void ExpectRefused(const std::string& bytes, ErrorCode code = ErrorCode::kInvalidArgument) {
+  try {
+    LoadColorizer(bytes, TheEncoder(), 1);
+    FAIL() << "was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), code) << error.what();
+  }
+}
+
+struct OtherEncoder : Encoder {
+  const std::string& digest() const override { return name; }
+  const std::string& description() const override { return name; }
+  std::vector<double> Describe(const Image&) const override { return {1.0}; }
+  Image DeepFeatures(const Image&) const override { return Image(1, 1, 1); }
+  std::string name = "other";
+};
+
+TEST(ColorizerTest, LearnsTheKeyView) {
+  const Key key = MakeKey(128, 96);
+  const double gray = MeanError(key.luminance, key.ab, Image(128, 96, 2));
+  const double neighbors =
+      MeanError(key.luminance, key.ab, Train(key, Quick(0))->Colorize(key.luminance));
+  const double trained =
+      MeanError(key.luminance, key.ab, Train(key, Quick(40))->Colorize(key.luminance));
+  EXPECT_GT(gray, 15.0);
+  EXPECT_LT(neighbors, 0.25 * gray);
+  EXPECT_LT(trained, 0.25 * gray);
+}
+
+TEST(ColorizerTest, RestoresSameColorizerFromFile) {
+  const Key key = MakeKey(96, 80);
+  for (auto recipe : {ColorizerOptions::Recipe::kColor3d, ColorizerOptions::Recipe::kPaper}) {
+    ColorizerOptions options = Quick(3);
+    options.recipe = recipe;
+    const auto trained = Train(key, options);
+    const std::string bytes = trained->Serialize();
+    const auto loaded = LoadColorizer(bytes, TheEncoder(), 1);
+    EXPECT_EQ(loaded->Colorize(key.luminance).data, trained->Colorize(key.luminance).data);
+    EXPECT_EQ(loaded->Serialize(), bytes);
+  }
+}
+
+TEST(ColorizerTest, FileKeepsNetworkSize) {
+  const Key key = MakeKey(96, 80);
+  ColorizerOptions options = Quick(3);
+  options.adapter_stages = 1;
+  const size_t usual = Train(key, options)->Serialize().size();
+  options.decoder_width = 0.5;
+  const auto trained = Train(key, options);
+  const std::string bytes = trained->Serialize();
+  EXPECT_LT(bytes.size(), usual);
+  EXPECT_NE(bytes.find("adapters.4."), std::string::npos);
+  EXPECT_EQ(bytes.find("adapters.3."), std::string::npos) << "only the deepest stage has them";
+  EXPECT_EQ(LoadColorizer(bytes, TheEncoder(), 1)->Colorize(key.luminance).data,
+            trained->Colorize(key.luminance).data);
+}
+
+TEST(ColorizerTest, RefusesNetworkSizeOutOfRange) {
+  ColorizerOptions options;
+  options.adapter_stages = 9;
+  EXPECT_THROW(options.Validate(), Error);
+  options.adapter_stages = 8;
+  options.decoder_width = 0.1;
+  EXPECT_THROW(options.Validate(), Error);
+}
+
+TEST(ColorizerTest, IsRepeatableForSameSeed) {
+  const Key key = MakeKey(96, 80);
+  ColorizerOptions options = Quick(5);
+  // Without neighbors, since their colours do not depend on the seed.
+  options.recipe = ColorizerOptions::Recipe::kPaper;
+  const Image first = Train(key, options)->Colorize(key.luminance);
+  EXPECT_EQ(Train(key, options)->Colorize(key.luminance).data, first.data);
+  options.seed = 2;
+  EXPECT_NE(Train(key, options)->Colorize(key.luminance).data, first.data);
+}
+
+TEST(ColorizerTest, ColorizesPicturesOfAnySize) {
+  const auto colorizer = Train(MakeKey(96, 80), Quick(1));
+  Random random(1);
+  for (const auto& [width, height] :
+       {std::pair{1, 1}, {1, 50}, {33, 31}, {401, 299}, {900, 600}, {2000, 3}}) {
+    Image luminance(width, height, 1);
+    for (float& value : luminance.data) value = static_cast<float>(random.NextUniform(0.0, 100.0));
+    const Image ab = colorizer->Colorize(luminance);
+    ASSERT_EQ(ab.width, width);
+    ASSERT_EQ(ab.height, height);
+    ASSERT_EQ(ab.channels, 2);
+    for (float value : ab.data) ASSERT_TRUE(std::isfinite(value) && std::abs(value) < 500.0f);
+  }
+  for (float l : {0.0f, 50.0f, 100.0f}) {
+    for (float value : colorizer->Colorize(Image(64, 64, 1, l)).data) {
+      ASSERT_TRUE(std::isfinite(value));
+    }
+  }
+}
+
+TEST(ColorizerTest, RefusesBadPictures) {
+  const auto colorizer = Train(MakeKey(96, 80), Quick(0));
+  EXPECT_THROW(colorizer->Colorize(Image(4, 4, 3)), Error);
+  EXPECT_THROW(colorizer->Colorize(Image()), Error);
+  Image broken(8, 8, 1, 50.0f);
+  broken.data[3] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(colorizer->Colorize(broken), Error);
+}
+
+TEST(ColorizerTest, GivesSameColorsOnSeveralThreads) {
+  const Key key = MakeKey(96, 80);
+  const auto colorizer = Train(key, Quick(2));
+  const Image expected = colorizer->Colorize(key.luminance);
+  std::vector<Image> answers(4);
+  std::vector<std::thread> threads;
+  for (Image& answer : answers) {
+    threads.emplace_back([&] { answer = colorizer->Colorize(key.luminance); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const Image& answer : answers) {
+    for (size_t i = 0; i < expected.data.size(); ++i) {
+      ASSERT_NEAR(answer.data[i], expected.data[i], 1e-2f);
+    }
+  }
+}
+
+TEST(ColorizerTest, RefusesDamagedFiles) {
+  const std::string bytes = Train(MakeKey(64, 64), Quick(0))->Serialize();
+  ExpectRefused("");
+  ExpectRefused("C3DCOLR1");
+  ExpectRefused(std::string(200, 'x'));
+  for (size_t length : {size_t{20}, bytes.size() / 2, bytes.size() - 1}) {
+    ExpectRefused(bytes.substr(0, length));
+  }
+  Random random(1);
+  for (int i = 0; i < 20; ++i) {
+    std::string changed = bytes;
+    changed[random.NextBelow(static_cast<uint32_t>(bytes.size()))] ^= 0x10;
+    ExpectRefused(changed);
+  }
+}
+
+TEST(ColorizerTest, RefusesOtherEncoder) {
+  const Key key = MakeKey(64, 64);
+  const std::string bytes = Train(key, Quick(0))->Serialize();
+  EXPECT_THROW(LoadColorizer(bytes, std::make_shared<OtherEncoder>()), Error);
+  EXPECT_THROW(LoadColorizer(bytes, nullptr), Error);
+  ThreadPool pool(1);
+  NoCheckpoints checkpoints;
+  NullObserver progress;
+  const CancellationToken cancel;
+  const RunControl control{pool, checkpoints, progress, cancel};
+  EXPECT_THROW(
+      TrainColorizer(
+          std::make_shared<OtherEncoder>(), {{"key", key.luminance, key.ab}}, Quick(0), control),
+      Error);
+}
+
+TEST(ColorizerTest, RefusesBadOptionsAndKeyViews) {
+  const Key key = MakeKey(64, 64);
+  auto refused = [&](auto change) {
+    ColorizerOptions options = Quick(0);
+    change(options);
+    EXPECT_THROW(Train(key, options), Error);
+  };
+  refused([](ColorizerOptions& o) { o.iterations = -1; });
+  refused([](ColorizerOptions& o) { o.iterations = 100001; });
+  refused([](ColorizerOptions& o) { o.max_side_px = 63; });
+  refused([](ColorizerOptions& o) { o.crop_px = 2000; });
+  refused([](ColorizerOptions& o) { o.consistency_weight = -1.0; });
+  refused([](ColorizerOptions& o) { o.time_limit_seconds = std::nan(""); });
+  EXPECT_THROW(Train({Image(64, 64, 1), Image(63, 64, 2)}, Quick(0)), Error);
+  EXPECT_THROW(Train({Image(64, 64, 3), Image(64, 64, 2)}, Quick(0)), Error);
+  Key broken = key;
+  broken.ab.data[9] = std::numeric_limits<float>::infinity();
+  EXPECT_THROW(Train(broken, Quick(0)), Error);
+}
+
+TEST(ColorizerTest, TrainsOnDegenerateKeyViews) {
+  for (const auto& [width, height] : {std::pair{1, 1}, {64, 64}, {7, 200}}) {
+    const Key flat{Image(width, height, 1, 50.0f), Image(width, height, 2, 20.0f)};
+    const Image ab = Train(flat, Quick(2))->Colorize(flat.luminance);
+    for (float value : ab.data) ASSERT_NEAR(value, 20.0f, 4.0f) << width << "x" << height;
+  }
+}
+
+}  // namespace
+}  // namespace color3d

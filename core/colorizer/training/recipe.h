@@ -1,0 +1,30 @@
+// Parameters of each ColorizerOptions::Recipe. Torch in the interface; used inside core/colorizer
+// only.
+#pragma once
+
+#include "core/augment/augment.h"
+#include "core/colorizer/colorizer.h"
+#include "core/colorizer/model/personal_model.h"
+#include "core/colorizer/neighbors/feature_neighbors.h"
+
+namespace color3d {
+
+struct TrainingRecipe {
+  PersonalModelConfig model;
+  AugmentOptions augment;
+  double first_learning_rate = 1e-3;
+  double last_learning_rate = 1e-6;  // cosine
+  int warmup_iterations = 20;
+  double max_gradient_norm = 1.0;
+  bool neighbors = true;
+  FeatureNeighborsOptions neighbor_options;
+  // Share of the neighbors in the blend with the decoder, by their agreement on a colour:
+  // certainty = doubt^2 / (doubt^2 + variance of the matches' ab). A decoder trained for few
+  // iterations is trusted less: share = 1 - (1 - certainty) (1 - exp(-iterations / trust)).
+  double neighbor_doubt = 4.0;  // Lab units
+  double trust_iterations = 100.0;
+};
+
+TrainingRecipe RecipeFor(const ColorizerOptions& options);
+
+}  // namespace color3d
