@@ -46,7 +46,7 @@ class CoreLiveEngine : public LiveEngine {
   };
   Picture Prepare(const Request& request);
   // Colours pictures of any scenes; pictures of equal size share a pass of the encoder.
-  static std::vector<Image> Together(const std::vector<Picture>& group);
+  static std::vector<Image> ColorizeBatch(const std::vector<Picture>& group);
   // Colours and answers the group, then empties it.
   void Finish(std::vector<Picture>& group);
   void Answer(const Picture& picture, const Image& ab, internal::v1::ColorizeImageResponse* answer);

@@ -84,7 +84,7 @@ void Supervisor::StartWorker(Slot* slot) {
   ::posix_spawnattr_setflags(
       &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
   // Without tokens and keys, because workers decode untrusted files.
-  std::vector<std::string> variables = EnvironmentToHandOn();
+  std::vector<std::string> variables = InheritedEnvironment();
   std::vector<char*> environment;
   for (std::string& variable : variables) environment.push_back(variable.data());
   environment.push_back(nullptr);

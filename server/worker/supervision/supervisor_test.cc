@@ -1,5 +1,5 @@
 // Workers without reports are killed unless the disk is full.
-#include "server/worker/supervisor.h"
+#include "server/worker/supervision/supervisor.h"
 
 #include <atomic>
 #include <fstream>
