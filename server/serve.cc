@@ -77,26 +77,26 @@ void CheckOptions(const ServeOptions& options) {
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   for (const std::string& target : options.notify_allow) CheckNotifyTarget(target);
   if (options.notify_allow.empty() == !options.notify_secret.empty()) {
-    throw InvalidArgument("--notify-allow and --notify-secret need each other");
+    throw InvalidArgument("--notify-allow and --notify-secret require each other");
   }
   if (!options.metrics_listen.empty() && !IsLoopback(options.metrics_listen) &&
       !options.insecure_any_address) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "refusing to show metrics on {} to everybody who reaches the port; say "
-                "--metrics-listen 127.0.0.1:PORT, or --insecure-any-address in a network you trust",
+                "refusing to serve metrics on {} without authentication; use --metrics-listen "
+                "127.0.0.1:PORT, or --insecure-any-address in a trusted network",
                 options.metrics_listen);
   }
   if (!options.certificate_roles.empty() && options.tls_client_ca.empty()) {
     throw InvalidArgument(
-        "--certificate-roles needs --tls-client-ca: no client shows a certificate");
+        "--certificate-roles requires --tls-client-ca: clients present no certificates without it");
   }
   if (!options.tls_client_ca.empty() && options.certificate_roles.empty() &&
       options.tokens.empty()) {
     throw Error(
         ErrorCode::kFailedPrecondition,
-        "refusing to let every certificate of {} drain the server and see all projects; say "
-        "who may what with --certificate-roles FILE (lines NAME ROLE [PROJECT]; '* submit' "
-        "for all others), or give --tokens",
+        "refusing to let every certificate of {} drain the server and see all projects; set roles "
+        "with --certificate-roles FILE (lines NAME ROLE [PROJECT]; '* submit' for all others), or "
+        "use --tokens",
         options.tls_client_ca.string());
   }
   const bool is_safe = !options.tls_certificate.empty() &&
@@ -104,10 +104,9 @@ void CheckOptions(const ServeOptions& options) {
   if (!IsLoopback(options.listen) && !is_safe && !options.insecure_any_address) {
     throw Error(
         ErrorCode::kFailedPrecondition,
-        "refusing to listen on {}: anybody who reaches the port could use it, or read along; "
-        "give --tls-cert, --tls-key and --tokens (or --tls-client-ca and --certificate-roles), "
-        "listen on 127.0.0.1, "
-        "or say --insecure-any-address in a network you trust",
+        "refusing to listen on {} without encryption and authentication; use --tls-cert, --tls-key "
+        "and --tokens (or --tls-client-ca and --certificate-roles), listen on 127.0.0.1, or use "
+        "--insecure-any-address in a trusted network",
         options.listen);
   }
 }
@@ -119,7 +118,7 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   if (options.workers > 0 && ::access(setup.program.c_str(), X_OK) != 0) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot find the worker program {}; install color3d-worker beside color3d-server, "
-                "or say --workers 0",
+                "or use --workers 0",
                 setup.program.string());
   }
   setup.workers = options.workers;

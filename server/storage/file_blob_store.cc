@@ -158,16 +158,16 @@ void FileBlobStore::ThrowFull(int64_t bytes, int64_t free) const {
   std::error_code error;
   if (!fs::exists(folder_, error)) {
     throw Error(ErrorCode::kUnavailable,
-                "the folder {} is gone; is its disk still there?",
+                "the folder {} does not exist; check that its disk is mounted",
                 folder_.string());
   }
-  throw ServiceError(ErrorReason::kStorageFull,
-                     "{} more bytes do not fit: {} are free on the server's disk and promised to "
-                     "nobody, of which {} are kept in reserve; delete jobs or scenes, or add disk "
-                     "space",
-                     bytes,
-                     free,
-                     options_.reserve_bytes);
+  throw ServiceError(
+      ErrorReason::kStorageFull,
+      "{} more bytes do not fit: {} are free and unreserved on the server's disk, of "
+      "which {} must stay free; delete jobs or scenes, or add disk space",
+      bytes,
+      free,
+      options_.reserve_bytes);
 }
 
 bool FileBlobStore::IsThere(const FileDigest& digest) {

@@ -182,7 +182,7 @@ TEST_F(FileBlobStoreTest, MissingFolderIsNotFullDisk) {
     FAIL() << "there is no folder";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kUnavailable);
-    EXPECT_NE(std::string(e.what()).find("is gone"), std::string::npos);
+    EXPECT_NE(std::string(e.what()).find("is mounted"), std::string::npos);
   }
 }
 
