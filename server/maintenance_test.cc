@@ -1,4 +1,4 @@
-// Chores, at a pace that a test can wait for, under clocks that it sets.
+// Chores with short periods and controlled clocks.
 #include "server/maintenance.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ class MaintenanceTest : public JobStoreTest {
     timing.reap = timing.sweep = timing.sweep_again = milliseconds(5);
     return timing;
   }
-  // Chores run until `done` says so.
+  // Runs chores until `done` returns true.
   void RunUntil(const std::function<bool()>& done, const MaintenanceTiming& timing = Quick()) {
     Maintenance chores(
         *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, timing);
@@ -63,7 +63,7 @@ TEST_F(MaintenanceTest, RemovesUnreferencedBlobsByTheSteadyClock) {
   EXPECT_TRUE(fs::exists(blobs_.Fetch(named.sha256)));
 }
 
-// The disk does not list its blobs when it is asked first.
+// The first listing of blobs fails.
 class BusyDiskBlobs : public FileBlobStore {
  public:
   explicit BusyDiskBlobs(const fs::path& folder) : FileBlobStore(folder, {0}) {}
@@ -133,7 +133,7 @@ TEST_F(MaintenanceTest, DeletesOldJobsWithScenesAndLogs) {
   timing.keep_jobs = std::chrono::hours(24 * 30);
   wall_ += int64_t{31} * 24 * 3600 * 1000;
   store_->Pin(old.name, true);
-  const auto a_day = [&] {  // of sweeps, as the steady clock sees it
+  const auto a_day = [&] {  // a day of sweeps by the steady clock
     Maintenance chores(
         *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, timing);
     for (int i = 0; i < 25; ++i) {
@@ -144,7 +144,7 @@ TEST_F(MaintenanceTest, DeletesOldJobsWithScenesAndLogs) {
   a_day();
   EXPECT_EQ(StateOf(old.name), JobState::kSucceeded) << "pinned";
   store_->Pin(old.name, false);
-  RunBriefly();  // one more sweep begins where the last one ended
+  RunBriefly();  // another sweep continues after the last one
   const auto gone = [&] { return ReasonThrown([&] { store_->GetJob(old.name); }); };
   EXPECT_EQ(gone(), "nothing");
   a_day();
@@ -228,7 +228,7 @@ TEST_F(MaintenanceTest, SetsDamagedBlobsAside) {
   const auto go_on = [] { return false; };
   std::vector<std::string> found;
   int64_t bytes = 0;
-  for (int round = 0; round < 10; ++round) {  // a few blobs each
+  for (int round = 0; round < 10; ++round) {  // a few blobs per round
     const Scrubber::Result result = scrubber.Scrub(ListBlobs(blobs_, go_on).blobs, 14, go_on);
     EXPECT_LE(result.bytes, 14 + 7);
     bytes += result.bytes;
@@ -265,7 +265,7 @@ TEST_F(MaintenanceTest, ServerRunsAndStartsOnFullDisk) {
   EXPECT_GE(lives, 3) << "systemd's watchdog would have ended a server that answers";
 }
 
-// A sweep that hangs keeps no lost job from going on.
+// A hanging sweep does not delay lost jobs.
 TEST_F(MaintenanceTest, ReapsLeasesDuringSweep) {
   class HangingBlobs : public FileBlobStore {
    public:

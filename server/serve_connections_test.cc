@@ -1,5 +1,5 @@
-// The real server beside those who open connections and do not use them: it goes on to answer
-// others, and when it cannot, it says so and ends.
+// The real server with clients that open connections without using them: it still answers others,
+// and reports and ends if it cannot.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,10 +25,10 @@ using std::chrono::steady_clock;
 
 constexpr int kIdle = 1'100;
 constexpr rlim_t kFewDescriptors = 1'024;
-// HTTP/2: the client's preface and empty settings.
+// HTTP/2 client preface and empty settings.
 constexpr std::string_view kPreface("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0", 33);
 
-// Connections that say so much and then nothing.
+// Connections that send this and then nothing.
 class IdleConnections {
  public:
   IdleConnections(const std::string& server, int count, std::string_view words) {
@@ -54,7 +54,7 @@ class IdleConnections {
       EXPECT_GE(fd, 0) << "this process needs more descriptors: ulimit -n";
       EXPECT_EQ(::connect(fd, reinterpret_cast<sockaddr*>(&address), size), 0)
           << std::strerror(errno);
-      // Some are closed by then.
+      // Some are already closed.
       [[maybe_unused]] const ssize_t sent =
           ::send(fd, words.data(), words.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
       sockets_.push_back(fd);
@@ -76,7 +76,7 @@ std::shared_ptr<grpc::Channel> OwnConnection(const std::string& address) {
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
 
-// How long somebody who comes now waits for an answer.
+// Returns the time until a new client is answered.
 milliseconds NewClientLatency(const std::string& address) {
   const auto start = steady_clock::now();
   TestClient client(OwnConnection(address));
@@ -125,7 +125,7 @@ TEST_F(ConnectionsTest, ServesOthersBesideSilentOnesOnUnixSocket) {
   Attack(few, "");
 }
 
-// They are clients by all appearances; the one with a call stays.
+// These look like clients; the one with a call stays open.
 TEST_F(ConnectionsTest, ServesOthersBesideHttpConnectionsWithoutCalls) {
   ServerProcess few(scratch_.path(), {}, 1, kFewDescriptors);
   TestClient watcher(OwnConnection(few.address()));
@@ -172,7 +172,7 @@ TEST_F(ConnectionsTest, SecondServerDoesNotTakeOverSocket) {
   EXPECT_THAT(::testing::internal::GetCapturedStderr(),
               ::testing::HasSubstr("another server listens there"));
   EXPECT_LT(NewClientLatency(address), milliseconds(1'000));
-  // One that was killed leaves its socket, which the next one replaces.
+  // A killed server leaves its socket, which the next one replaces.
   first.Signal(SIGKILL);
   first.Wait();
   ServerProcess third(other, {"--listen", address}, 0);

@@ -42,7 +42,7 @@ struct LiveStream {
     EXPECT_TRUE(stream->Read(&response)) << "the stream ended";
     return response;
   }
-  // Until `count` answers are here.
+  // Reads until `count` answers have arrived.
   std::map<std::string, Response> ReadAll(int count) {
     std::map<std::string, Response> answers;
     for (int i = 0; i < count; ++i) {
@@ -79,7 +79,7 @@ class LiveProcessTest : public ::testing::Test {
     *request.mutable_example() = client().Upload("example");
     return request;
   }
-  // A scene that has been personalized; the blob's digest is what its scripted answers begin with.
+  // A personalized scene; its scripted answers begin with the digest of the blob.
   v1::Colorizer MakeColorizer() {
     v1::JobSpec spec;
     spec.set_scene(client().MakeScene().name());
@@ -223,7 +223,7 @@ TEST_F(LiveProcessTest, PictureThatKilledWorkerIsNotSentAgain) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-// A client that sends what was lost again, as it is told to.
+// A client that resends lost pictures as requested.
 TEST_F(LiveProcessTest, PictureThatKillsWorkersIsIsolated) {
   Start();
   LiveStream live(client());
@@ -255,7 +255,7 @@ TEST_F(LiveProcessTest, PictureThatKillsWorkersIsIsolated) {
 
 TEST_F(LiveProcessTest, SlowReaderUsesBoundedMemoryAndLosesNothing) {
   Start();
-  constexpr int kPictures = 150;  // of 1 MiB each when coloured
+  constexpr int kPictures = 150;  // coloured, 1 MiB each
   LiveStream live(client());
   const Request example = Example();
   live.Send(example, "warm", "x");
@@ -347,7 +347,7 @@ TEST_F(LiveProcessTest, WorkerEndsWithKilledServer) {
   EXPECT_FALSE(live.Read().image().empty()) << "the old worker took the new one's socket away";
 }
 
-// A Unix socket's path has at most 107 bytes.
+// The path of a Unix socket has at most 107 bytes.
 TEST_F(LiveProcessTest, AcceptsLongPathOfDataFolder) {
   Start({}, std::string(120, 'd') + "/" + std::string(120, 'e'));
   LiveStream live(client());

@@ -95,7 +95,7 @@ TEST_F(ProcessTest, ReportsFailuresWithReason) {
   EXPECT_EQ(run("steps=1").state(), v1::Job::STATE_SUCCEEDED) << "the service lives on";
 }
 
-// A name says nothing of what it stands for.
+// The name of a model does not identify its weights.
 TEST_F(ProcessTest, NewWeightsUnderSameNameMissTheCache) {
   const fs::path weights = scratch_.path() / "weights";
   WriteFileAtomic(weights, "first");
@@ -258,9 +258,9 @@ TEST_F(ProcessTest, IdleServerIsSmall) {
   EXPECT_GT(info.memory_bytes(), int64_t{1} << 20);
 }
 
-// Stops the process at a moment when it does not hold the store's write lock.
+// Stops the process while it does not hold the write lock of the store.
 void StopOutsideTransaction(TestClient& client, pid_t pid) {
-  v1::CancelJobRequest probe;  // begins a write, then finds no such job
+  v1::CancelJobRequest probe;  // starts a write, then finds no such job
   probe.set_name("jobs/none");
   for (int i = 0; i < 50; ++i) {
     ::kill(pid, SIGSTOP);
@@ -275,8 +275,8 @@ void StopOutsideTransaction(TestClient& client, pid_t pid) {
   FAIL() << "the worker always holds the lock";
 }
 
-// The sharpest case for the fence: the owner sleeps past its lease, an idle worker takes the job
-// over and is well ahead when the old owner wakes up in the middle of a step.
+// Hardest case of the fence: the owner sleeps past its lease, and resumes in the middle of a step
+// while another worker has taken the job over.
 TEST_F(ProcessTest, ThawedZombieChangesNothing) {
   const fs::path effects = scratch_.path() / "effects";
   ::setenv("COLOR3D_TEST_EFFECTS", effects.c_str(), 1);
@@ -308,7 +308,7 @@ TEST_F(ProcessTest, ThawedZombieChangesNothing) {
       << "negative control: what is not fenced does repeat";
 }
 
-// Found by the chaos test: a process that is stopped inside a transaction blocks the whole store.
+// Found by the chaos test: a process stopped inside a transaction blocks the whole store.
 TEST_F(ProcessTest, FrozenWorkerIsKilled) {
   ServerProcess server(scratch_.path(), {}, 1);
   TestClient& client = server.client();
@@ -319,7 +319,7 @@ TEST_F(ProcessTest, FrozenWorkerIsKilled) {
   EXPECT_EQ(client.WaitFinished(name).state(), v1::Job::STATE_SUCCEEDED);
 }
 
-// One worker that stops in the middle of a write must not cost the others their attempts.
+// A worker that stops in the middle of a write must not cost others their attempts.
 TEST_F(ProcessTest, WorkerFrozenInWriteCostsOthersNoAttempt) {
   ServerProcess server(scratch_.path(), {"--lease-seconds", "6", "--heartbeat-seconds", "1"}, 2);
   TestClient& client = server.client();
@@ -328,7 +328,7 @@ TEST_F(ProcessTest, WorkerFrozenInWriteCostsOthersNoAttempt) {
   WaitForStep(client, healthy, 2);
   const std::string freezing =
       client.Create(ScriptedSpec(scene, "freeze_writing,steps=2", 2)).name();
-  // Reads are answered all the while.
+  // Reads are still answered.
   for (int i = 0; i < 20; ++i) {
     const auto start = std::chrono::steady_clock::now();
     client.Get(healthy);
@@ -341,7 +341,7 @@ TEST_F(ProcessTest, WorkerFrozenInWriteCostsOthersNoAttempt) {
   EXPECT_EQ(client.WaitFinished(freezing).state(), v1::Job::STATE_SUCCEEDED);
 }
 
-// The service manager, the server and the kernel may each tell a worker to end.
+// The service manager, the server and the kernel may each terminate a worker.
 TEST_F(ProcessTest, WorkersDrainOnRepeatedSignals) {
   ServerProcess server(scratch_.path(), {});
   TestClient& client = server.client();

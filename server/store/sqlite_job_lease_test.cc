@@ -208,7 +208,7 @@ TEST_F(SqliteJobLeaseTest, StageCacheFindsSucceededJobsByKey) {
   EXPECT_FALSE(store_->FindStage(""));
 }
 
-// No file can be opened while one is there.
+// Prevents opening of files during its lifetime.
 class NoFurtherFiles {
  public:
   NoFurtherFiles() {
@@ -227,7 +227,7 @@ class NoFurtherFiles {
   rlimit before_ = {};
 };
 
-// A worker that is locked in may not write where SQLite would put them.
+// A sandboxed worker may not write the temporary files of SQLite.
 TEST_F(SqliteJobLeaseTest, PublishesManyArtifactsWithoutTemporaryFiles) {
   for (const char* film : {"first", "second"}) {
     CreateSingle();

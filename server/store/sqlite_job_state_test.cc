@@ -60,7 +60,7 @@ TEST_F(SqliteJobStateTest, FailureSkipsDependantsAndFailsRoot) {
   EXPECT_THAT(failed.error->message, HasSubstr("it broke"));
   EXPECT_EQ(Child(root, "right").state, JobState::kQueued) << "independent work goes on";
 
-  // A job of its own that reads the failed one is skipped, with the reason.
+  // A separate job that reads the failed one is skipped, with the reason.
   const JobRecord second = CreateDiamond();
   NewGraph reader;
   reader.scene = "scenes/test";

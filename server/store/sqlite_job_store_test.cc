@@ -53,7 +53,7 @@ TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
   store_.reset();
   Open();
   EXPECT_EQ(Child(root, "import").state, JobState::kRunning);
-  Succeed(import);  // the worker lived on
+  Succeed(import);  // the worker survived
   EXPECT_EQ(Child(root, "left").state, JobState::kQueued);
   EXPECT_GT(store_->NewestRevision(), 0);
 }

@@ -45,7 +45,7 @@ class StoreSchemaTest : public JobStoreTest {
     SqliteStatement version(db, "select version from schema_version");
     return version.Step() ? version.Int(0) : 0;
   }
-  // What a program of version 1 has written.
+  // Makes a store of version 1.
   void MakeOld() {
     store_.reset();
     SqliteDatabase old(File(), SqliteAccess::kWrite);
@@ -113,7 +113,7 @@ TEST_F(StoreSchemaTest, ServerMigratesOldStoreAndKeepsCopy) {
   const fs::path copy = File().string() + ".v1";
   EXPECT_EQ(VersionOf(copy), 1);
   fs::remove(copy);
-  Open();  // nothing is left to be done
+  Open();  // nothing to migrate
   EXPECT_FALSE(fs::exists(copy));
   EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 1u);
 }
@@ -143,7 +143,8 @@ TEST_F(StoreSchemaTest, MigratesEveryEarlierVersion) {
 TEST_F(StoreSchemaTest, TablesChangeOnlyWithTheVersion) {
   std::string text = std::to_string(kSchemaVersion);
   for (const std::string& line : DescribeTables(File())) text += "\n" + line;
-  EXPECT_EQ(Sha256Hex(text), "TABLES_DIGEST") << text;
+  EXPECT_EQ(Sha256Hex(text), "b5ae7c37e0b8dbb22a94b6d9976cc9de67afcc54b14708a1f5fea7046dfdfc8a")
+      << text;
 }
 
 TEST_F(StoreSchemaTest, RefusesStoreOfNewerVersion) {
@@ -158,7 +159,7 @@ TEST_F(StoreSchemaTest, RefusesStoreOfNewerVersion) {
   }
 }
 
-// Free pages of the database, and how long its file is once the log is folded into it.
+// Returns the number of free pages of the database after a checkpoint.
 int64_t FreePages(const fs::path& file) {
   SqliteDatabase db(file, SqliteAccess::kWrite);
   db.Run("pragma wal_checkpoint(truncate)");
@@ -238,7 +239,7 @@ TEST_F(StoreSchemaTest, RebootEndsAllLeases) {
   now_ = int64_t{1} << 40;
   const JobRecord running = (CreateSingle(), ClaimOne());
   const JobRecord waiting = (CreateSingle(), ClaimOne());
-  FailWith(waiting, ErrorCode::kUnavailable);  // to be tried again in a while
+  FailWith(waiting, ErrorCode::kUnavailable);  // retried later
   store_.reset();
   now_ = 5;
   boot_id_ = "boot 2";
@@ -249,7 +250,7 @@ TEST_F(StoreSchemaTest, RebootEndsAllLeases) {
   EXPECT_EQ(ClaimOne().name, running.name);
 }
 
-// As on a full disk: nothing can be written, but whoever reads is served.
+// Like a full disk: writes fail, reads are answered.
 TEST_F(StoreSchemaTest, RestartWritesNothing) {
   SqliteDatabase other(File(), SqliteAccess::kWrite);
   const SqliteTransaction held(other);
@@ -266,7 +267,7 @@ TEST_F(StoreSchemaTest, ReadsDoNotWaitForWriter) {
   EXPECT_EQ(store_->GetJob(job.name).priority, 100);
   EXPECT_EQ(store_->ListJobs({}, 0, 10, {}).size(), 1u);
   EXPECT_EQ(store_->CountJobs().queued, 1);
-  // ... nor do they wait for a thread of ours that waits for it (its time-out is 10 s).
+  // Nor do they wait for another thread that waits for it (its time-out is 10 s).
   std::thread writer([&] { ReasonThrown([&] { store_->Cancel(job.name, {}); }); });
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   EXPECT_EQ(store_->GetJob(job.name).state, JobState::kQueued);
@@ -276,10 +277,10 @@ TEST_F(StoreSchemaTest, ReadsDoNotWaitForWriter) {
   EXPECT_EQ(StateOf(job.name), JobState::kCancelled);
 }
 
-// What the service does all day costs as much after many finished jobs as after few.
+// The cost of frequent calls does not depend on the number of finished jobs.
 class StoreCostTest : public JobStoreTest {
  protected:
-  // As clients see it.
+  // The store as seen by clients.
   ProjectStore Mine() { return ProjectStore(*store_, "attic"); }
   NewGraph Personalize(const std::string& scene) {
     NewGraph graph;
@@ -296,7 +297,7 @@ class StoreCostTest : public JobStoreTest {
       Succeed(ClaimOne());
     }
   }
-  // Makes two jobs, works at them and deletes them; the steps that each call took.
+  // Creates, runs and deletes two jobs; returns the steps of each call.
   std::map<std::string, int64_t> Costs() {
     std::map<std::string, int64_t> costs;
     const auto count = [&](const char* call, const auto& body) {
