@@ -124,7 +124,7 @@ void MakePrivate(const fs::path& folder) {
   std::error_code error, unknown;
   if (!fs::create_directories(folder, error) && !fs::is_directory(folder, unknown)) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot create {}: {}; name another folder, or change who may write there",
+                "cannot create {}: {}; name another folder, or change its permissions",
                 folder.string(),
                 error.message());
   }

@@ -51,8 +51,7 @@ std::optional<struct stat> StatusOf(const fs::path& path) {
   if (error == ENOENT || error == ENOTDIR) return std::nullopt;
   throw ServiceError(
       ErrorReason::kBlobUnreadable,
-      "cannot look at the blob {}: {}; its owner, rights and disk on the server need "
-      "a look",
+      "cannot read the blob {}: {}; check its owner, permissions and disk on the server",
       path.filename().string(),
       std::strerror(error));
 }

@@ -296,7 +296,7 @@ JobRecord SqliteJobStore::Pin(const std::string& name, bool pinned) {
   WriteTransaction db(connections_);
   const JobRecord job = RequireJob(db, name);
   if (!job.parent.empty()) {
-    throw InvalidArgument("{} is a stage of {}; pin that", name, job.parent);
+    throw InvalidArgument("{0} is a stage of {1}; pin {1}", name, job.parent);
   }
   db.Run("update job set pinned=? where job_id=?", pinned, job.id);
   JobRecord result = RequireJob(db, name);
@@ -308,7 +308,7 @@ void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, boo
   SqliteStatement lost(db, "select lost_input from job where job_id=?", job.id);
   if (lost.Step() && !lost.Text(0).empty()) {
     throw ServiceError(ErrorReason::kInputDeleted,
-                       "{} reads results of {}, which was deleted; submit the work anew",
+                       "{} reads results of {}, which was deleted; submit the job again",
                        job.name,
                        lost.Text(0));
   }
@@ -350,7 +350,7 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
   const std::vector<JobRecord> graph = GraphOf(db, root);
   for (const JobRecord& member : graph) {
     if (member.state == JobState::kRunning && member.cancel_requested) {
-      throw WrongState(member, "it is about to stop; retry when it is cancelled");
+      throw WrongState(member, "it is being cancelled; retry when it has stopped");
     }
   }
   const auto retried = std::count_if(graph.begin(), graph.end(), CanBeRetried);

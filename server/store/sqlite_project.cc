@@ -122,14 +122,14 @@ QueuePlace SqliteJobStore::PlaceInQueue(const JobRecord& job) {
   const int64_t pause_ms = first.Int(2) - SteadyNow();
   if (holds.Step()) {
     place.waits_for = holds.Text(0) == NameOf(Hold::kPaused)
-                          ? "the server's operator, who has paused the queue"
+                          ? "the operator, who has paused the queue"
                           : "space on the server's disk, which is nearly full";
   } else if (!SqliteStatement(db, "select 1 from worker limit 1").Step()) {
-    place.waits_for = "a worker: none runs";
+    place.waits_for = "a worker; none is running";
   } else if (pause_ms > 0) {
-    place.waits_for = fmt::format("its next try, in {} s", (pause_ms + 999) / 1000);
+    place.waits_for = fmt::format("its next attempt, in {} s", (pause_ms + 999) / 1000);
   } else if (!first.Text(3).empty()) {
-    place.waits_for = "equal work, which another job does now";
+    place.waits_for = "a running job with equal work";
   }
   return place;
 }

@@ -26,7 +26,7 @@ TEST_F(QueueTest, HeldQueueGivesNoJobAndReason) {
 TEST_F(QueueTest, WaitingJobHasPlaceAndTime) {
   const JobRecord first = CreateSingle(), second = CreateSingle();
   const JobRecord root = CreateDiamond();
-  EXPECT_EQ(store_->PlaceInQueue(first).waits_for, "a worker: none runs");
+  EXPECT_EQ(store_->PlaceInQueue(first).waits_for, "a worker; none is running");
   store_->UpdateWorker({"w", 1, "", 0, 0});
   EXPECT_EQ(store_->PlaceInQueue(first).position, 1);
   EXPECT_EQ(store_->PlaceInQueue(second).position, 2);
@@ -36,7 +36,7 @@ TEST_F(QueueTest, WaitingJobHasPlaceAndTime) {
   FailWith(ClaimOne(), ErrorCode::kUnavailable);
   const JobRecord waiting = store_->GetJob(first.name);
   EXPECT_EQ(waiting.queued_ms, 700);
-  EXPECT_EQ(store_->PlaceInQueue(waiting).waits_for, "its next try, in 1 s");
+  EXPECT_EQ(store_->PlaceInQueue(waiting).waits_for, "its next attempt, in 1 s");
   wall_ += 300;
   now_ += 1000;
   const JobRecord running = ClaimOne();

@@ -42,7 +42,7 @@ void SqliteJobStore::RequireRoomForScene(SqliteDatabase& db,
         {{"project:" + project + " scenes", fmt::format("{} of {}", count, most)}});
   };
   if (select.Int(0) >= limits.all) {
-    refuse("scenes", select.Int(0), limits.all, "delete scenes that you need no more");
+    refuse("scenes", select.Int(0), limits.all, "delete unneeded scenes");
   }
   if (select.Int(1) >= limits.uncommitted) {
     refuse("scenes that are not committed",

@@ -130,12 +130,11 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
   if (role == StoreRole::kWorker) {
     if (!version) {
       throw ServiceError(ErrorReason::kStoreNotReady,
-                         "{} has no tables; start color3d-server serve, which makes them",
+                         "{} has no tables; start color3d-server serve, which creates them",
                          file.string());
     }
     if (*version < kSchemaVersion) {
-      throw WrongVersion(
-          *version, "the server that runs is of an older release than this worker: restart it");
+      throw WrongVersion(*version, "the running server is older than this worker: restart it");
     }
     return;
   }
