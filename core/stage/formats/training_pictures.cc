@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/stage/formats/artifact_io.h"

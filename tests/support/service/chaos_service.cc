@@ -134,7 +134,7 @@ void ChaosService::CheckLeases() {
 
 int64_t ChaosService::Count(const char* sql) const {
   SqliteDatabase db(folder_ / "data" / "jobs.db", SqliteAccess::kRead);
-  SqliteStatement select(db.handle(), sql);
+  SqliteStatement select(db, sql);
   return select.Step() ? select.Int(0) : -1;
 }
 
