@@ -12,7 +12,7 @@
 namespace color3d::client {
 namespace {
 
-// Signal handlers reach nothing but globals.
+// Global, because signal handlers can access nothing else.
 CancellationToken interrupt;
 
 void OnInterrupt(int) { interrupt.Cancel(); }
@@ -24,8 +24,8 @@ void HandleInterrupt() {
   ::sigaction(SIGINT, &action, nullptr);
 }
 
-// CLI11 calls a mistyped command a missing one. Empty when the first word is a command or an
-// option.
+// Returns the error for a mistyped command, which CLI11 reports as a missing one; empty if the
+// first word is a command or an option.
 std::string UnknownCommand(const CLI::App& app, const Context& context) {
   if (context.arguments.empty() || context.arguments[0].starts_with('-')) return "";
   for (const CLI::App* command : app.get_subcommands({})) {
@@ -34,7 +34,7 @@ std::string UnknownCommand(const CLI::App& app, const Context& context) {
   return "unknown command '" + context.arguments[0] + "'";
 }
 
-// Never on the command line, where others of the machine could read it.
+// Reads the token from a file or the environment, since other users can read command lines.
 std::string TokenFrom(const std::filesystem::path& file) {
   const char* given = std::getenv("COLOR3D_TOKEN");
   std::string token = !file.empty() ? ReadFile(file) : given != nullptr ? given : "";
@@ -47,7 +47,7 @@ std::string TokenFrom(const std::filesystem::path& file) {
 }
 
 int Main(int argc, char** argv) {
-  // Our own words say more than gRPC's log does.
+  // Our own messages replace gRPC's log.
   ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   Context context;
   context.interrupt = &interrupt;

@@ -188,7 +188,7 @@ struct KeepingArguments {
 };
 
 // Exit status 1: the copy lacks blobs, which are listed.
-int SayWhatLacks(const CopiedBlobs& copied, const std::filesystem::path& from) {
+int ReportMissingBlobs(const CopiedBlobs& copied, const std::filesystem::path& from) {
   for (const std::string& sha256 : copied.missing) std::cout << "missing: " << sha256 << "\n";
   for (const std::string& sha256 : copied.damaged) std::cout << "damaged: " << sha256 << "\n";
   for (const std::string& what : copied.unreadable) std::cout << "unreadable: " << what << "\n";
@@ -223,7 +223,7 @@ int RunBackUp(const KeepingArguments& arguments) {
       copied.mended > 0
           ? fmt::format("; {} that were damaged there are copied again", copied.mended)
           : "");
-  return SayWhatLacks(copied, arguments.data_folder);
+  return ReportMissingBlobs(copied, arguments.data_folder);
 }
 
 int RunRestore(const KeepingArguments& arguments) {
@@ -231,7 +231,7 @@ int RunRestore(const KeepingArguments& arguments) {
   std::cout << fmt::format("{}: {} blobs, read and whole; start color3d-server serve on it\n",
                            arguments.data_folder.string(),
                            copied.copied);
-  return SayWhatLacks(copied, arguments.copy);
+  return ReportMissingBlobs(copied, arguments.copy);
 }
 
 int RunFsck(const KeepingArguments& arguments) {

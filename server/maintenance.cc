@@ -109,7 +109,7 @@ std::chrono::milliseconds Maintenance::Reap() {
     const int reaped = store_.ReapExpired();
     counts_.attempts_lost += reaped;
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
-    HoldBackWhenSpaceIsLow();
+    PauseWhenSpaceIsLow();
     GiveBackSpace();
   } catch (const std::exception& e) {
     spdlog::error("cannot look after leases: {}", e.what());
@@ -129,7 +129,7 @@ void Maintenance::GiveBackSpace() {
   if (blobs_.FreeBytes() >= timing_.reserve_bytes + 2 * ballast->bytes()) ballast->Make();
 }
 
-void Maintenance::HoldBackWhenSpaceIsLow() {
+void Maintenance::PauseWhenSpaceIsLow() {
   const bool held = store_.Holds().contains(Hold::kStorage);
   const int64_t free = blobs_.FreeBytes();
   const int64_t wanted = timing_.low_space_bytes + (held ? timing_.low_space_bytes / 10 : 0);
@@ -215,7 +215,7 @@ void Maintenance::ExpireJobs() {
   const auto remove = [&](const auto& body) {
     if (IsStopping()) return;
     try {
-      WithRoomMade(make_room, body);
+      RetryAfterMakingRoom(make_room, body);
     } catch (const Error& e) {
       // Used, retried, read or deleted meanwhile.
       if (e.code() != ErrorCode::kFailedPrecondition && e.code() != ErrorCode::kNotFound) throw;

@@ -84,7 +84,7 @@ class Maintenance {
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
-  void HoldBackWhenSpaceIsLow();
+  void PauseWhenSpaceIsLow();
   void GiveBackSpace();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void ExpireJobs();

@@ -34,7 +34,7 @@ class MaintenanceTest : public JobStoreTest {
     for (int i = 0; i < 1000 && !done(); ++i) std::this_thread::sleep_for(milliseconds(5));
     EXPECT_TRUE(done());
   }
-  void RunForAWhile() {
+  void RunBriefly() {
     Maintenance chores(
         *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, Quick());
     std::this_thread::sleep_for(milliseconds(100));
@@ -52,10 +52,10 @@ TEST_F(MaintenanceTest, RemovesUnreferencedBlobsByTheSteadyClock) {
   Publication publication;
   publication.artifacts = {{"result", named, "text/plain"}};
   store_->Publish(LeaseOf(ClaimOne()), publication);
-  RunForAWhile();
+  RunBriefly();
   EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256))) << "noted, not removed";
   wall_ += int64_t{100} * 24 * 3600 * 1000;
-  RunForAWhile();
+  RunBriefly();
   EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256))) << "a clock that was set says nothing";
   wall_ -= int64_t{100} * 24 * 3600 * 1000;
   now_ += int64_t{25} * 3600 * 1000;
@@ -64,9 +64,9 @@ TEST_F(MaintenanceTest, RemovesUnreferencedBlobsByTheSteadyClock) {
 }
 
 // The disk does not list its blobs when it is asked first.
-class BlobsOfABusyDisk : public FileBlobStore {
+class BusyDiskBlobs : public FileBlobStore {
  public:
-  explicit BlobsOfABusyDisk(const fs::path& folder) : FileBlobStore(folder, {0}) {}
+  explicit BusyDiskBlobs(const fs::path& folder) : FileBlobStore(folder, {0}) {}
   std::vector<std::string> ForEach(
       const std::function<bool(const StoredBlob&)>& visit) const override {
     if (++sweeps == 1) throw Error(ErrorCode::kUnavailable, "the disk does not answer");
@@ -76,7 +76,7 @@ class BlobsOfABusyDisk : public FileBlobStore {
 };
 
 TEST_F(MaintenanceTest, RetriesFailedSweepsSoon) {
-  BlobsOfABusyDisk blobs(paths_.Blobs());
+  BusyDiskBlobs blobs(paths_.Blobs());
   MaintenanceTiming timing = Quick();
   timing.sweep = std::chrono::hours(1);
   const Maintenance chores(
@@ -108,7 +108,7 @@ TEST_F(MaintenanceTest, DryRunNotesNothing) {
 TEST_F(MaintenanceTest, TouchRestartsTheAge) {
   const FileDigest orphan = blobs_.PutBytes("orphan");
   for (int day = 0; day < 5; ++day) {
-    RunForAWhile();
+    RunBriefly();
     now_ += int64_t{23} * 3600 * 1000;
     EXPECT_TRUE(blobs_.Touch(orphan)) << day;
   }
@@ -116,12 +116,12 @@ TEST_F(MaintenanceTest, TouchRestartsTheAge) {
 
 TEST_F(MaintenanceTest, RebootAddsNoAge) {
   const FileDigest orphan = blobs_.PutBytes("orphan");
-  RunForAWhile();
+  RunBriefly();
   store_.reset();
   now_ += int64_t{1} << 40;
   boot_id_ = "boot 2";
   Open();
-  RunForAWhile();
+  RunBriefly();
   EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256)));
 }
 
@@ -144,7 +144,7 @@ TEST_F(MaintenanceTest, OldJobsGoWithTheirScenesAndLogs) {
   a_day();
   EXPECT_EQ(StateOf(old.name), JobState::kSucceeded) << "pinned";
   store_->Pin(old.name, false);
-  RunForAWhile();  // one more sweep begins where the last one ended
+  RunBriefly();  // one more sweep begins where the last one ended
   const auto gone = [&] { return ReasonThrown([&] { store_->GetJob(old.name); }); };
   EXPECT_EQ(gone(), "nothing");
   a_day();
@@ -159,7 +159,7 @@ TEST_F(MaintenanceTest, DeletesUncommittedScenes) {
   scene.name = "scenes/abandoned";
   store_->CreateScene(scene, {}, {});
   wall_ += int64_t{8} * 24 * 3600 * 1000;
-  RunForAWhile();
+  RunBriefly();
   EXPECT_EQ(store_->GetScene(scene.name).name, scene.name) << "noted, not deleted";
   now_ += int64_t{25} * 3600 * 1000;
   RunUntil(
@@ -175,7 +175,7 @@ TEST_F(UnreadableMaintenanceTest, ReportsUnreadableFolders) {
   const fs::path folder = blobs_.Fetch(hidden.sha256).parent_path().parent_path();
   ASSERT_NE(folder, blobs_.Fetch(orphan.sha256).parent_path().parent_path());
   fs::permissions(folder, fs::perms::none);
-  RunForAWhile();
+  RunBriefly();
   now_ += int64_t{25} * 3600 * 1000;
   {
     const Maintenance chores(

@@ -219,7 +219,7 @@ ServerSample SampleOf(const ServeOptions& options,
 }
 
 // As a client would find us. While there is no room for it the gate has spoken for itself.
-std::string ProbeOurselves(const RpcServer& server,
+std::string ProbeOwnServer(const RpcServer& server,
                            const TlsFiles& tls,
                            std::chrono::milliseconds limit) {
   const int64_t refused = server.connections().refused;
@@ -300,7 +300,7 @@ void Serve(const ServeOptions& options) {
   const auto probe = std::make_unique<SelfProbe>(
       probe_timing,
       [&](std::chrono::milliseconds limit) {
-        const std::string why = ProbeOurselves(server, tls, limit);
+        const std::string why = ProbeOwnServer(server, tls, limit);
         return draining ? "" : why;  // who drains closes his port, too
       },
       [&](const std::string& why) {

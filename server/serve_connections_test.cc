@@ -77,7 +77,7 @@ std::shared_ptr<grpc::Channel> OwnConnection(const std::string& address) {
 }
 
 // How long somebody who comes now waits for an answer.
-milliseconds TimeOfANewClient(const std::string& address) {
+milliseconds NewClientLatency(const std::string& address) {
   const auto start = steady_clock::now();
   TestClient client(OwnConnection(address));
   grpc::ClientContext context;
@@ -93,11 +93,11 @@ class ConnectionsTest : public ::testing::Test {
   void Attack(ServerProcess& server, std::string_view words) {
     {
       const IdleConnections idle(server.address(), kIdle, words);
-      EXPECT_LT(TimeOfANewClient(server.address()), milliseconds(1'000)) << "while they are open";
+      EXPECT_LT(NewClientLatency(server.address()), milliseconds(1'000)) << "while they are open";
       SleepMs(1'000);
-      EXPECT_LT(TimeOfANewClient(server.address()), milliseconds(1'000)) << "while they are open";
+      EXPECT_LT(NewClientLatency(server.address()), milliseconds(1'000)) << "while they are open";
     }
-    EXPECT_LT(TimeOfANewClient(server.address()), milliseconds(1'000)) << "when they are closed";
+    EXPECT_LT(NewClientLatency(server.address()), milliseconds(1'000)) << "when they are closed";
   }
   const ScratchFolder scratch_;
 };
@@ -153,7 +153,7 @@ TEST_F(ConnectionsTest, AServerThatNobodyReachesSaysSoAndEnds) {
   ServerProcess server(scratch_.path(),
                        {"--listen", "unix:" + socket.string(), "--probe-seconds", "0.2"});
   SleepMs(1'000);
-  EXPECT_LT(TimeOfANewClient(server.address()), milliseconds(1'000));
+  EXPECT_LT(NewClientLatency(server.address()), milliseconds(1'000));
   ASSERT_TRUE(fs::remove(socket)) << "it did not survive its own looks";
   const int status = server.Wait();
   const std::string said = ::testing::internal::GetCapturedStderr();
@@ -171,12 +171,12 @@ TEST_F(ConnectionsTest, ASecondServerDoesNotTakeTheSocketOver) {
   EXPECT_EQ(second.Wait(), 2);
   EXPECT_THAT(::testing::internal::GetCapturedStderr(),
               ::testing::HasSubstr("another server listens there"));
-  EXPECT_LT(TimeOfANewClient(address), milliseconds(1'000));
+  EXPECT_LT(NewClientLatency(address), milliseconds(1'000));
   // One that was killed leaves its socket, which the next one replaces.
   first.Signal(SIGKILL);
   first.Wait();
   ServerProcess third(other, {"--listen", address}, 0);
-  EXPECT_LT(TimeOfANewClient(address), milliseconds(1'000));
+  EXPECT_LT(NewClientLatency(address), milliseconds(1'000));
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ class SecretsTest : public ::testing::Test {
     context.AddMetadata("x-request-id", "id-of-a-call");
     return (stub.*method)(&context, request, response);
   }
-  std::string AllThatIsWritten() const {
+  std::string WrittenText() const {
     std::string text = ReadFile(scratch_.path() / "stderr");
     const fs::path logs = scratch_.path() / "data" / "logs";
     for (const std::string& file : ListFiles(logs)) text += ReadFile(logs / file);
@@ -101,7 +101,7 @@ TEST_F(SecretsTest, NoLogHoldsATokenOrAKey) {
     server.Signal(SIGTERM);
     EXPECT_EQ(server.Wait(), 0);
   }
-  const std::string text = AllThatIsWritten();
+  const std::string text = WrittenText();
   EXPECT_THAT(text, HasSubstr("id-of-a-call")) << "calls are not logged: the test proves nothing";
   EXPECT_THAT(text, HasSubstr("unknown token"));
   EXPECT_THAT(text, HasSubstr("worker"));

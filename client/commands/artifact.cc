@@ -70,22 +70,23 @@ void AddArtifactCommands(CLI::App& app, Context& context) {
   artifact->require_subcommand(1)->fallthrough();
   const auto options = std::make_shared<ArtifactOptions>();
 
-  CLI::App* list = artifact->add_subcommand("list", "List the results of a job with their sizes");
-  list->fallthrough()->add_option("JOB", options->job, "jobs/ID")->required();
-  list->callback([&context, options] {
-    context.action = [&context, options] { return RunList(context, *options); };
-  });
+  AddCommand(*artifact,
+             context,
+             "list",
+             "List the results of a job with their sizes",
+             [&context, options] { return RunList(context, *options); })
+      ->add_option("JOB", options->job, "jobs/ID")
+      ->required();
 
-  CLI::App* download = artifact->add_subcommand("download", "Download one result of a job, or all");
-  download->fallthrough();
+  CLI::App* download = AddCommand(
+      *artifact, context, "download", "Download one result of a job, or all", [&context, options] {
+        return RunDownload(context, *options);
+      });
   download->add_option("JOB", options->job, "jobs/ID")->required();
   download->add_option("NAME",
                        options->name,
                        fmt::format("Name of the result, e.g. {}; default: all", artifact::kPly));
   download->add_option("-o,--out", options->out, "Folder to write to")->required();
-  download->callback([&context, options] {
-    context.action = [&context, options] { return RunDownload(context, *options); };
-  });
 }
 
 }  // namespace color3d::client

@@ -20,7 +20,7 @@
 namespace color3d::client {
 namespace {
 
-constexpr int kPhotosToLookAt = 5;
+constexpr int kInspectedPhotos = 5;
 constexpr size_t kMinPhotos = 3;
 
 struct BenchmarkView {
@@ -43,7 +43,7 @@ std::vector<BenchmarkView> ParseViews(const std::string& scene_json) {
   }
 }
 
-// In the order in which they were chosen.
+// Returns the key views in the order in which they were chosen.
 std::vector<std::string> ParseKeyViews(const std::string& key_view_json) {
   try {
     const auto json = nlohmann::json::parse(key_view_json);
@@ -65,7 +65,7 @@ struct Selection {
   std::vector<std::string> key_views;  // in the order in which they were chosen
 
   bool IsKey(const std::string& view) const {
-    return std::find(key_views.begin(), key_views.end(), view) != key_views.end();
+    return std::ranges::find(key_views, view) != key_views.end();
   }
 };
 
@@ -112,7 +112,7 @@ const BenchmarkView* FindView(const std::vector<BenchmarkView>& views, const std
   return nullptr;
 }
 
-// The checks of carry_color, before the time for the geometry is spent.
+// Makes the checks of carry_color before time is spent on geometry.
 void CheckAdditionalKeyViews(const ColorizeOptions& options, const Selection& selection) {
   for (const std::string& text : options.additional_key_views) {
     const AdditionalKeyView key = ParseAdditionalKeyView(text);
@@ -147,7 +147,7 @@ std::vector<UploadFile> AddTrueColors(const ColorizeOptions& options,
   std::map<std::string, v1::Digest> color_of_key;
   for (const BenchmarkView& view : selection.views) {
     const auto original = originals.find(view.image_file);
-    const bool is_key = selection.IsKey(view.name) && !options.color.Given();
+    const bool is_key = selection.IsKey(view.name) && !options.color.HasSource();
     const bool is_bound = options.bound && !view.held_out;
     if (original == originals.end() || !(is_key || is_bound || view.held_out)) continue;
     if (!copies.in_color.contains(view.image_file)) {
@@ -189,10 +189,10 @@ void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& canc
                           folder.photos.size(),
                           kMinPhotos);
   }
-  const ColorCount count = CountColorPhotos(folder, kPhotosToLookAt, cancel);
+  const ColorCount count = CountColorPhotos(folder, kInspectedPhotos, cancel);
   if (count.MostlyColor()) return;
   throw InvalidArgument(
-      "the photographs in {} are monochrome ({} of {} looked at); --benchmark drops the colour of "
+      "the photographs in {} are monochrome ({} of {} inspected); --benchmark drops the colour of "
       "colour photos and scores against it: leave it out",
       root,
       count.looked_at - count.in_color,
@@ -205,7 +205,8 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
                              const PhotoFolder& folder,
                              ProgressDisplay& display) {
   const ScratchFolder scratch;
-  display.Say(fmt::format("benchmark: dropping the colour of {} photos", folder.photos.size()));
+  display.PrintLine(
+      fmt::format("benchmark: dropping the colour of {} photos", folder.photos.size()));
   const GrayCopies copies = MakeGrayCopies(folder, scratch.path(), *context.interrupt);
   const v1::Scene scene = UploadScene(
       connection,
@@ -218,7 +219,7 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   v1::JobSpec spec = ColorizeSpec(options, scene.name());
   v1::ColorizeSceneSpec* colorize = spec.mutable_colorize_scene();
   colorize->set_key_view(selection.key_views[0]);
-  if (options.color.Given()) {
+  if (options.color.HasSource()) {
     *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
   }
   AddKeyViews(connection, options, colorize);
@@ -226,10 +227,10 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);
   });
-  display.Say(fmt::format("key {} {}; {} views are held out and scored",
-                          selection.key_views.size() == 1 ? "view" : "views",
-                          fmt::join(selection.key_views, ", "),
-                          colorize->truth_size()));
+  display.PrintLine(fmt::format("key {} {}; {} views are held out and scored",
+                                selection.key_views.size() == 1 ? "view" : "views",
+                                fmt::join(selection.key_views, ", "),
+                                colorize->truth_size()));
   return spec;
 }
 

@@ -18,7 +18,7 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
                              const PhotoFolder& folder,
                              ProgressDisplay& display);
 
-// The same checks without the server, with the same errors.
+// Throws the errors of PrepareBenchmark for grey or too few photos, without a server.
 void RequireColorPhotos(const PhotoFolder& folder, const CancellationToken& cancel);
 
 }  // namespace color3d::client

@@ -8,6 +8,7 @@
 #include "client/lib/text.h"
 #include "core/base/digest.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 
@@ -17,15 +18,13 @@ namespace {
 
 constexpr int kPageSize = 200;
 
-const v1::Artifact* ModelOf(const v1::Job& job) {
-  const auto found =
-      std::find_if(job.artifacts().begin(), job.artifacts().end(), [](const v1::Artifact& a) {
-        return a.name() == artifact::kModel;
-      });
+const v1::Artifact* FindModel(const v1::Job& job) {
+  const auto found = std::ranges::find_if(
+      job.artifacts(), [](const v1::Artifact& a) { return a.name() == artifact::kModel; });
   return found != job.artifacts().end() ? &*found : nullptr;
 }
 
-[[noreturn]] void RefuseFilm(const std::string& results) {
+[[noreturn]] void RejectFilm(const std::string& results) {
   throw Error(
       ErrorCode::kFailedPrecondition,
       "{}: this film was coloured without poses, so no camera can move through it. Its "
@@ -36,7 +35,7 @@ const v1::Artifact* ModelOf(const v1::Job& job) {
       artifact::kMovie);
 }
 
-v1::Job WithModel(v1::Job job) {
+v1::Job RequireModel(v1::Job job) {
   if (job.state() != v1::Job::STATE_SUCCEEDED) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "{} has no results: it is {}; see `color3d job show {}`",
@@ -44,8 +43,8 @@ v1::Job WithModel(v1::Job job) {
                 StateName(job.state()),
                 job.name());
   }
-  if (ModelOf(job) != nullptr) return job;
-  if (job.kind() == kind::kColorizeScene) RefuseFilm(job.name());
+  if (FindModel(job) != nullptr) return job;
+  if (job.kind() == kind::kColorizeScene) RejectFilm(job.name());
   throw Error(ErrorCode::kFailedPrecondition,
               "{} is a {} job and has no {}; name a {} job",
               job.name(),
@@ -54,19 +53,17 @@ v1::Job WithModel(v1::Job job) {
               kind::kColorizeScene);
 }
 
-fs::path ModelFileIn(const fs::path& folder) {
-  std::error_code none;
-  if (!fs::is_directory(folder, none)) {
+fs::path FindModelFile(const fs::path& folder) {
+  if (!IsFolder(folder)) {
     throw Error(ErrorCode::kNotFound,
                 "there is no folder {}; name the one that `color3d colorize` wrote to (-o), "
                 "jobs/ID or scenes/ID",
                 folder.string());
   }
   const fs::path model = folder / artifact::kModel;
-  if (fs::is_regular_file(model, none)) return model;
-  if (fs::is_regular_file(folder / artifact::kReport, none) &&
-      fs::is_regular_file(folder / artifact::kMovie, none)) {
-    RefuseFilm(folder.string());
+  if (IsFile(model)) return model;
+  if (IsFile(folder / artifact::kReport) && IsFile(folder / artifact::kMovie)) {
+    RejectFilm(folder.string());
   }
   throw Error(ErrorCode::kFailedPrecondition,
               "{} has no {}: it holds no finished results of `color3d colorize`; when the job is "
@@ -76,7 +73,7 @@ fs::path ModelFileIn(const fs::path& folder) {
               folder.string());
 }
 
-v1::Job JobOfModel(Connection& connection, const fs::path& model) {
+v1::Job FindJobOfModel(Connection& connection, const fs::path& model) {
   const FileDigest digest = DigestFile(model);
   v1::ListJobsRequest request;
   request.set_page_size(kPageSize);
@@ -84,7 +81,7 @@ v1::Job JobOfModel(Connection& connection, const fs::path& model) {
     const auto jobs = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
     for (const v1::Job& job : jobs.jobs()) {
       if (job.state() != v1::Job::STATE_SUCCEEDED || !job.parent().empty()) continue;
-      const v1::Artifact* theirs = ModelOf(job);
+      const v1::Artifact* theirs = FindModel(job);
       if (theirs != nullptr && theirs->digest().sha256() == digest.sha256) return job;
     }
     request.set_page_token(jobs.next_page_token());
@@ -105,9 +102,7 @@ bool IsOnServer(const std::string& target) {
 }
 
 v1::Job NewestResult(Connection& connection, const std::string& scene) {
-  v1::GetSceneRequest known;
-  known.set_name(scene);
-  connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), known);
+  GetScene(connection, scene);
   v1::ListJobsRequest request;
   request.set_parent(scene);
   request.set_page_size(kPageSize);
@@ -134,9 +129,9 @@ v1::Job NewestResult(Connection& connection, const std::string& scene) {
 }
 
 v1::Job FindColoredScene(Connection& connection, const std::string& target) {
-  if (!IsOnServer(target)) return JobOfModel(connection, ModelFileIn(target));
-  if (target.starts_with("scenes/")) return WithModel(NewestResult(connection, target));
-  return WithModel(GetJob(connection, ResourceName(target, "jobs")));
+  if (!IsOnServer(target)) return FindJobOfModel(connection, FindModelFile(target));
+  if (target.starts_with("scenes/")) return RequireModel(NewestResult(connection, target));
+  return RequireModel(GetJob(connection, ResourceName(target, "jobs")));
 }
 
 }  // namespace color3d::client

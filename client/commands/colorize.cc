@@ -39,7 +39,7 @@ class Colorize {
     if (!options_.scene.empty()) return RunStored();
     folder_ = CollectPhotos(options_.photos, options_.film);
     if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
-    if (options_.film) TakeAsFrames(&folder_);
+    if (options_.film) UsePhotosAsFrames(&folder_);
     const CaptureLayoutInfo& layout = InfoOf(folder_.Layout());
     if (options_.poses && layout.views != ViewSource::kFrames && folder_.camera_films.empty()) {
       throw InvalidArgument(
@@ -63,7 +63,7 @@ class Colorize {
         throw InvalidArgument("--add-key-view {}: this is already the key view", key.view);
       }
     }
-    RequireOutBesidePhotos(out_, folder_);
+    RequireSeparateOutFolder(out_, folder_);
     RequireAugmentFiles(options_, folder_);
     if (!WantsAugmentFiles(options_) && !folder_.augment_files.empty()) {
       folder_.notes.push_back(
@@ -84,7 +84,7 @@ class Colorize {
                                 ? ", each camera's in a folder of its own, with --film"
                                 : ", named in transforms.json with their times");
     }
-    if (options_.benchmark && folder_.film) TakeFilmForBenchmark();
+    if (options_.benchmark && folder_.film) DecodeFilmForBenchmark();
     if (options_.benchmark) RequireColorPhotos(folder_, *context_.interrupt);
     for (const std::string& note : folder_.notes) PrintNote(context_, note);
     Connect();
@@ -92,7 +92,7 @@ class Colorize {
       return Finish(PrepareBenchmark(*connection_, context_, options_, folder_, display_));
     }
     const std::string scene = UploadFolder(*connection_, context_, folder_, display_);
-    return options_.color.Given() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
+    return options_.color.HasSource() ? Finish(ColorSpec(scene)) : SelectOnly(scene);
   }
 
  private:
@@ -102,7 +102,7 @@ class Colorize {
   }
 
   // Replaces the film by its frames as pictures, so that their colour can be dropped.
-  void TakeFilmForBenchmark() {
+  void DecodeFilmForBenchmark() {
     frames_.emplace();
     const v1::ImportSceneSpec import = ImportSpec(options_, "").import_scene();
     FilmAsFrames film = DecodeFilmFrames(
@@ -117,11 +117,11 @@ class Colorize {
         fmt::format("import_scene.film_frames_per_second={}", film.frames_per_second));
   }
 
-  // A scene on the server: coloured from the given source, else from the accepted key view.
+  // Colours a scene on the server from the given source, else from its accepted key view.
   ExitCode RunStored() {
     Connect();
     const std::string scene = ResourceName(options_.scene, "scenes");
-    return Finish(options_.color.Given() ? ColorSpec(scene) : AcceptedSpec(scene));
+    return Finish(options_.color.HasSource() ? ColorSpec(scene) : AcceptedSpec(scene));
   }
 
   v1::JobSpec AcceptedSpec(const std::string& scene) {
@@ -143,31 +143,29 @@ class Colorize {
     for (const std::string& input : JobAndInputs(*connection_, *state.accepted)) {
       spec.add_inputs(input);
     }
-    display_.Say(fmt::format("key view {}, as accepted ({})",
-                             ReadChoice(*connection_, *state.accepted).view,
-                             state.accepted->name()));
+    display_.PrintLine(fmt::format("key view {}, as accepted ({})",
+                                   ReadChoice(*connection_, *state.accepted).view,
+                                   state.accepted->name()));
     return spec;
   }
 
-  // The key view of an earlier selection in the folder of results; may be empty.
+  // Returns the key view of an earlier selection in the folder of results; may be empty.
   std::string SelectedView() const {
     const auto key_view = ReadResult(out_, artifact::kKeyView);
     const auto view = key_view.find("view");
     return view != key_view.end() && view->is_string() ? view->get<std::string>() : "";
   }
 
-  // The view that the given colour belongs to; empty: the server selects it.
+  // Returns the view that the given colour belongs to; empty: the server selects it.
   std::string KeyView() const {
     if (!options_.key_view.empty()) return options_.key_view;
     // A file with the name of a photo is that photo, regardless of an earlier selection.
-    const std::string same_stem = PhotoOfSameStem(folder_, options_.color.FileOfView());
+    const std::string same_stem = FindPhotoByStem(folder_, options_.color.PictureOfView());
     if (!same_stem.empty()) return same_stem;
     const std::string view = SelectedView();
     // The selection may be of another scene.
-    const bool known =
-        std::any_of(folder_.photos.begin(), folder_.photos.end(), [&](const LocalFile& photo) {
-          return Stem(photo.path) == Stem(view);
-        });
+    const bool known = std::ranges::any_of(
+        folder_.photos, [&](const LocalFile& photo) { return Stem(photo.path) == Stem(view); });
     return known ? view : "";
   }
 
@@ -177,28 +175,34 @@ class Colorize {
     colorize->set_key_view(KeyView());
     *colorize->mutable_key_color() = UploadKeyColor(*connection_, options_.color);
     AddKeyViews(*connection_, options_, colorize);
-    display_.Say("key view " + (colorize->key_view().empty() ? std::string("will be selected")
-                                                             : colorize->key_view()));
+    display_.PrintLine("key view " + (colorize->key_view().empty() ? std::string("will be selected")
+                                                                   : colorize->key_view()));
     return spec;
   }
 
-  // Submits the job, follows it and downloads the results; with --detach submits only.
   ExitCode Finish(const v1::JobSpec& spec) {
+    return Submit(spec, {}, [&](nlohmann::ordered_json result) {
+      if (!context_.json) return PrintText(Summary(out_));
+      result["metrics"] = ReadResult(out_, artifact::kMetrics);
+      PrintJson(result);
+    });
+  }
+
+  // Submits the job, follows it and `earlier` ones, and downloads its results. With --detach
+  // submits only. `print` receives the facts that --json prints.
+  ExitCode Submit(const v1::JobSpec& spec,
+                  std::vector<std::string> earlier,
+                  const std::function<void(nlohmann::ordered_json)>& print) {
     const v1::Job submitted = SubmitJob(*connection_, spec, options_.notify);
     if (options_.detach) return Detached(submitted);
-    const v1::Job job =
-        FollowToSuccess(*connection_, context_, {submitted.name()}, out_.string(), display_);
+    earlier.push_back(submitted.name());
+    const v1::Job job = FollowToSuccess(*connection_, context_, earlier, out_.string(), display_);
     const auto files = DownloadResults(*connection_, context_, job, out_, display_);
-    if (context_.json) {
-      PrintJson({{"job", job.name()},
-                 {"scene", spec.scene()},
-                 {"state", StateName(job.state())},
-                 {"out", out_.string()},
-                 {"files", files},
-                 {"metrics", ReadResult(out_, artifact::kMetrics)}});
-    } else {
-      PrintText(Summary(out_));
-    }
+    print({{"job", job.name()},
+           {"scene", spec.scene()},
+           {"state", StateName(job.state())},
+           {"out", out_.string()},
+           {"files", files}});
     return ExitCode::kOk;
   }
 
@@ -210,23 +214,12 @@ class Colorize {
       jobs.push_back(SubmitJob(*connection_, import).name());
       spec.add_inputs(jobs.back());
     }
-    const v1::Job submitted = SubmitJob(*connection_, spec, options_.notify);
-    if (options_.detach) return Detached(submitted);
-    jobs.push_back(submitted.name());
-    const v1::Job job = FollowToSuccess(*connection_, context_, jobs, out_.string(), display_);
-    const auto files = DownloadResults(*connection_, context_, job, out_, display_);
-    const std::string view = SelectedView();
-    if (context_.json) {
-      PrintJson({{"job", job.name()},
-                 {"scene", scene},
-                 {"state", StateName(job.state())},
-                 {"out", out_.string()},
-                 {"files", files},
-                 {"key_view", view}});
-    } else {
-      PrintText(NextCommands(view));
-    }
-    return ExitCode::kOk;
+    return Submit(spec, std::move(jobs), [&](nlohmann::ordered_json result) {
+      const std::string view = SelectedView();
+      if (!context_.json) return PrintText(NextCommands(view));
+      result["key_view"] = view;
+      PrintJson(result);
+    });
   }
 
   std::string NextCommands(const std::string& view) const {
@@ -263,15 +256,14 @@ class Colorize {
 
 void AddColorizeCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<ColorizeOptions>();
-  CLI::App* colorize = app.add_subcommand(
+  CLI::App* colorize = AddCommand(
+      app,
+      context,
       "colorize",
       "Make a coloured 3D scene from photos, or colour a film. Without a source of colour: select "
-      "the photo to colour");
-  colorize->fallthrough();
+      "the photo to colour",
+      [&context, options] { return Colorize(context, *options).Run(); });
   DeclareOptions(*colorize, options.get());
-  colorize->callback([&context, options] {
-    context.action = [&context, options] { return Colorize(context, *options).Run(); };
-  });
 }
 
 }  // namespace color3d::client

@@ -24,13 +24,6 @@ struct ColorizerOptions {
   LiveOptions live;
 };
 
-v1::Colorizer GetColorizer(Connection& connection, const std::string& name) {
-  v1::GetColorizerRequest request;
-  request.set_name(ResourceName(name, "colorizers"));
-  return connection.Call(
-      &v1::ColorizerService::Stub::GetColorizer, connection.colorizers(), request);
-}
-
 ExitCode List(const Context& context, const ColorizerOptions& options) {
   Connection connection(context.server, *context.interrupt);
   v1::ListColorizersResponse all;
@@ -43,10 +36,6 @@ ExitCode List(const Context& context, const ColorizerOptions& options) {
     all.mutable_colorizers()->MergeFrom(page.colorizers());
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty() && all.colorizers_size() < options.limit);
-  if (context.json) {
-    PrintJson(all);
-    return ExitCode::kOk;
-  }
   std::vector<std::vector<std::string>> rows = {{"COLORIZER", "SCENE", "SIZE", "MADE"}};
   for (const v1::Colorizer& colorizer : all.colorizers()) {
     rows.push_back({colorizer.name(),
@@ -54,24 +43,23 @@ ExitCode List(const Context& context, const ColorizerOptions& options) {
                     HumanBytes(colorizer.file().size_bytes()),
                     HumanTime(colorizer.create_time())});
   }
-  PrintText(Table(rows));
-  return ExitCode::kOk;
+  return PrintAnswer(context, all, Table(rows));
 }
 
 ExitCode Show(const Context& context, const ColorizerOptions& options) {
   Connection connection(context.server, *context.interrupt);
-  const v1::Colorizer colorizer = GetColorizer(connection, options.name);
-  if (context.json) {
-    PrintJson(colorizer);
-    return ExitCode::kOk;
-  }
-  PrintText(fmt::format("{}\nscene  {}\njob    {}\nsize   {}\nmade   {}\n",
-                        colorizer.name(),
-                        colorizer.scene(),
-                        colorizer.job(),
-                        HumanBytes(colorizer.file().size_bytes()),
-                        HumanTime(colorizer.create_time())));
-  return ExitCode::kOk;
+  v1::GetColorizerRequest request;
+  request.set_name(ResourceName(options.name, "colorizers"));
+  const v1::Colorizer colorizer =
+      connection.Call(&v1::ColorizerService::Stub::GetColorizer, connection.colorizers(), request);
+  return PrintAnswer(context,
+                     colorizer,
+                     fmt::format("{}\nscene  {}\njob    {}\nsize   {}\nmade   {}\n",
+                                 colorizer.name(),
+                                 colorizer.scene(),
+                                 colorizer.job(),
+                                 HumanBytes(colorizer.file().size_bytes()),
+                                 HumanTime(colorizer.create_time())));
 }
 
 ExitCode Apply(const Context& context, const ColorizerOptions& options) {
@@ -99,11 +87,8 @@ void AddColorizerCommands(CLI::App& app, Context& context) {
   const auto command = [&](const char* name,
                            const char* help,
                            ExitCode (*run)(const Context&, const ColorizerOptions&)) {
-    CLI::App* sub = group->add_subcommand(name, help)->fallthrough();
-    sub->callback([&context, options, run] {
-      context.action = [&context, options, run] { return run(context, *options); };
-    });
-    return sub;
+    return AddCommand(
+        *group, context, name, help, [&context, options, run] { return run(context, *options); });
   };
   CLI::App* list = command("list", "List colorizers, newest first", &List);
   list->add_option("--scene", options->scene, "Only colorizers of this scene");

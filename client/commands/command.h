@@ -33,6 +33,19 @@ class CommandFailure : public std::runtime_error {
   ExitCode code_;
 };
 
+// Adds a command that runs `run`. Options of its parents may follow it. Requires: `context`
+// outlives the command.
+inline CLI::App* AddCommand(CLI::App& parent,
+                            Context& context,
+                            const std::string& name,
+                            const std::string& help,
+                            std::function<ExitCode()> run) {
+  CLI::App* command = parent.add_subcommand(name, help);
+  command->fallthrough();
+  command->callback([&context, run] { context.action = run; });
+  return command;
+}
+
 // Each declares its commands in `app`. Requires: `context` outlives `app`.
 void AddColorizeCommand(CLI::App& app, Context& context);
 void AddInspectCommand(CLI::App& app, Context& context);

@@ -69,6 +69,17 @@ nlohmann::ordered_json ToJson(const google::protobuf::Message& message) {
 
 void PrintJson(const google::protobuf::Message& message) { PrintJson(ToJson(message)); }
 
+ExitCode PrintAnswer(const Context& context,
+                     const google::protobuf::Message& answer,
+                     const std::string& text) {
+  if (context.json) {
+    PrintJson(answer);
+  } else {
+    PrintText(text);
+  }
+  return ExitCode::kOk;
+}
+
 void PrintNote(const Context& context, const std::string& text) {
   if (!context.json) std::cerr << "color3d: note: " << EscapeControls(text) << std::endl;
 }

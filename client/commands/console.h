@@ -18,6 +18,10 @@ void PrintJson(const nlohmann::ordered_json& value);
 // In Protobuf's JSON mapping, fields with default values included.
 void PrintJson(const google::protobuf::Message& message);
 nlohmann::ordered_json ToJson(const google::protobuf::Message& message);
+// Prints the answer of a server as JSON with --json, else as `text`. Returns kOk.
+ExitCode PrintAnswer(const Context& context,
+                     const google::protobuf::Message& answer,
+                     const std::string& text);
 
 // Prints "color3d: note: ..." on stderr; nothing with --json.
 void PrintNote(const Context& context, const std::string& text);

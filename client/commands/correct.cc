@@ -27,7 +27,7 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr char kAllOfThem[] = "all";
+constexpr char kAllCorrections[] = "all";
 
 struct CorrectOptions {
   std::string target;  // folder of results, jobs/ID or scenes/ID
@@ -37,22 +37,22 @@ struct CorrectOptions {
   std::string at;       // "X,Y" px of the photo
   std::string color;    // "#rrggbb"
   double radius = 8.0;  // px
-  std::string undo;     // a number of corrections, or kAllOfThem
+  std::string undo;     // a number of corrections, or kAllCorrections
   std::optional<double> saturation, tint, warmth;
   std::optional<int> proposals;
 
-  bool Paints() const { return paint.Given() || !at.empty(); }
-  bool ChangesWhole() const { return saturation || tint || warmth; }
+  bool Paints() const { return paint.HasSource() || !at.empty(); }
+  bool ChangesScene() const { return saturation || tint || warmth; }
 };
 
-// A disc, in the format of hints.
+// Returns a disc in the format of hints.
 std::string PointHints(const CorrectOptions& options) {
   double x = 0.0, y = 0.0;
   int end = 0;
   if (std::sscanf(options.at.c_str(), "%lf,%lf%n", &x, &y, &end) != 2 ||
       static_cast<size_t>(end) != options.at.size()) {
-    throw InvalidArgument("--at {} is not a place; give X,Y in px of the photo, e.g. --at 320,180",
-                          options.at);
+    throw InvalidArgument(
+        "--at {} is not a position; give X,Y in px of the photo, e.g. --at 320,180", options.at);
   }
   const nlohmann::json hints = {
       {{"x", x}, {"y", y}, {"radius", options.radius}, {"color", options.color}}};
@@ -62,7 +62,7 @@ std::string PointHints(const CorrectOptions& options) {
 void Check(const CorrectOptions& options) {
   options.paint.Check();
   if (!options.at.empty()) {
-    if (options.paint.Given()) {
+    if (options.paint.HasSource()) {
       throw InvalidArgument("--at cannot be combined with --hints or --image; give one of them");
     }
     if (options.color.empty()) {
@@ -84,10 +84,10 @@ void Check(const CorrectOptions& options) {
 }
 
 // Removes the last corrections. Throws Error{kInvalidArgument} if there are fewer.
-void Undo(const std::string& how_many, v1::CorrectColorsSpec* correct) {
+void RemoveCorrections(const std::string& how_many, v1::CorrectColorsSpec* correct) {
   const int count = correct->corrections_size();
   int drop = 0, end = 0;
-  if (how_many == kAllOfThem) {
+  if (how_many == kAllCorrections) {
     drop = count;
   } else if (std::sscanf(how_many.c_str(), "%d%n", &drop, &end) != 1 || drop < 1 ||
              static_cast<size_t>(end) != how_many.size()) {
@@ -103,7 +103,7 @@ void Undo(const std::string& how_many, v1::CorrectColorsSpec* correct) {
   for (int i = 0; i < drop; ++i) correct->mutable_corrections()->RemoveLast();
 }
 
-// Writes the place as a file of hints, which stays among the results.
+// Writes the disc as a file of hints, which stays among the results.
 v1::KeyColorSource Upload(Connection& connection, const CorrectOptions& options) {
   if (options.at.empty()) return UploadKeyColor(connection, options.paint);
   const fs::path file = fs::path(options.out) / "point.json";
@@ -113,21 +113,21 @@ v1::KeyColorSource Upload(Connection& connection, const CorrectOptions& options)
   return UploadKeyColor(connection, flags);
 }
 
-v1::JobSpec SpecOf(Connection& connection, const CorrectOptions& options, const v1::Job& job) {
+v1::JobSpec MakeSpec(Connection& connection, const CorrectOptions& options, const v1::Job& job) {
   v1::JobSpec spec = job.spec();
   spec.set_skip_cache(false);
   v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
   v1::CorrectColorsSpec* correct = scene->mutable_correct_colors();
-  if (!options.undo.empty()) Undo(options.undo, correct);
+  if (!options.undo.empty()) RemoveCorrections(options.undo, correct);
   if (options.Paints()) {
     v1::FurtherKeyView* correction = correct->add_corrections();
     correction->set_view(options.view);
     *correction->mutable_color() = Upload(connection, options);
   }
   if (options.proposals) correct->set_proposals(*options.proposals);
-  // Changes of the whole scene need no stage for places.
+  // Changes of the whole scene need no correct_colors stage.
   if (correct->corrections().empty() && !options.proposals &&
-      (options.ChangesWhole() || !options.undo.empty())) {
+      (options.ChangesScene() || !options.undo.empty())) {
     scene->clear_correct_colors();
   }
   v1::SolveChromaSpec* solve = scene->mutable_solve_chroma();
@@ -152,10 +152,9 @@ void ClearPaintFolder(const Context& context, const fs::path& out, const v1::Job
   for (const fs::path& file : files) {
     const std::string name = artifact::kPaint + file.filename().string();
     const std::string digest = DigestFile(file).sha256;
-    const bool ours = std::any_of(
-        before.artifacts().begin(), before.artifacts().end(), [&](const v1::Artifact& artifact) {
-          return artifact.name() == name && artifact.digest().sha256() == digest;
-        });
+    const bool ours = std::ranges::any_of(before.artifacts(), [&](const v1::Artifact& artifact) {
+      return artifact.name() == name && artifact.digest().sha256() == digest;
+    });
     if (ours) {
       fs::remove(file);
       continue;
@@ -180,11 +179,12 @@ void FetchScene(Connection& connection,
   const v1::Job fresh = GetJob(connection, exported.name());
   for (const v1::Artifact& artifact : fresh.artifacts()) {
     const auto same_name = [&](const char* name) { return artifact.name() == name; };
-    if (std::any_of(results.begin(), results.end(), same_name)) files.push_back(artifact);
+    if (std::ranges::any_of(results, same_name)) files.push_back(artifact);
   }
   const auto fetched = DownloadArtifacts(connection, files, out, display);
-  if (std::find(fetched.begin(), fetched.end(), artifact::kViewPage) == fetched.end()) return;
-  display.Say((out / artifact::kViewPage).string() + " shows the corrected scene; metrics follow");
+  if (std::ranges::find(fetched, artifact::kViewPage) == fetched.end()) return;
+  display.PrintLine((out / artifact::kViewPage).string() +
+                    " shows the corrected scene; metrics follow");
 }
 
 std::string ProposalText(const Context& context,
@@ -228,7 +228,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
   const bool folder = !IsOnServer(options.target);
   if (options.out.empty()) options.out = folder ? options.target : "corrected";
   // Without a correction: proposals only.
-  if (!options.Paints() && !options.ChangesWhole() && options.undo.empty() && !options.proposals) {
+  if (!options.Paints() && !options.ChangesScene() && options.undo.empty() && !options.proposals) {
     options.proposals = 3;
   }
   Connection connection(context.server, *context.interrupt);
@@ -241,7 +241,7 @@ ExitCode RunCorrect(const Context& context, CorrectOptions options) {
                 kind::kColorizeScene);
   }
   PrepareOut(options.out);
-  const v1::Job submitted = SubmitJob(connection, SpecOf(connection, options, before));
+  const v1::Job submitted = SubmitJob(connection, MakeSpec(connection, options, before));
   ProgressDisplay display(context.json);
   // The corrected scene can be viewed before it is scored and reported.
   const auto fetch_scene = [&](const v1::Job& stage) {
@@ -288,14 +288,14 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
       ->required();
   command->add_option(
       "-o,--out", options->out, "Folder for the results; default: RESULTS if that is a folder");
-  const char* place = "One place: the colour spreads to similar surfaces nearby, in all views";
-  command->add_option("--view", options->view, "The photo that was painted on")->group(place);
+  const char* place = "One place (its colour spreads to similar surfaces nearby, in all views)";
+  command->add_option("--view", options->view, "Name of the photo that was painted on")
+      ->group(place);
   command
       ->add_option("--hints,--strokes,--points",
                    options->paint.hints,
                    "Colour strokes (PNG with the aspect ratio of the photo, transparent "
-                   "elsewhere), or points, "
-                   "lines and regions (JSON)")
+                   "elsewhere), or points, lines and regions (JSON)")
       ->group(place);
   command
       ->add_option("--labels",
@@ -305,12 +305,13 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
   command
       ->add_option("--image",
                    options->paint.image,
-                   "The photo in its right colours, e.g. RESULTS/paint/NAME.png after painting on "
-                   "it; only changed pixels count")
+                   "Corrected copy of the photo, e.g. RESULTS/paint/NAME.png after painting on it; "
+                   "only changed pixels count")
       ->group(place);
-  command->add_option("--at", options->at, "X,Y: the place, px of the photo")->group(place);
-  command->add_option("--color", options->color, "\"#rrggbb\": the colour at --at")->group(place);
-  command->add_option("--radius", options->radius, "Radius of the place at --at, px")
+  command->add_option("--at", options->at, "Position of a disc to correct: X,Y in px of the photo")
+      ->group(place);
+  command->add_option("--color", options->color, "Colour of the disc: \"#rrggbb\"")->group(place);
+  command->add_option("--radius", options->radius, "Radius of the disc, px")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->group(place);
@@ -329,7 +330,7 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
           "--tint", options->tint, "White balance, green to red: a of a middle grey, -50 to 50")
       ->group(whole);
   command->add_option(
-      "--undo", options->undo, "Remove this many corrections of places, the last first, or all");
+      "--undo", options->undo, "Number of corrections to remove, the last first; or all");
   command->add_option("--proposals",
                       options->proposals,
                       "Number of places to propose for a stroke (default without a correction: 3)");
@@ -339,13 +340,12 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
 
 void AddCorrectCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<CorrectOptions>();
-  CLI::App* command =
-      app.add_subcommand("correct", "Correct the colours of a coloured scene; its geometry is kept")
-          ->fallthrough();
-  DeclareOptions(command, options.get());
-  command->callback([&context, options] {
-    context.action = [&context, options] { return RunCorrect(context, *options); };
-  });
+  DeclareOptions(AddCommand(app,
+                            context,
+                            "correct",
+                            "Correct the colours of a coloured scene; its geometry is kept",
+                            [&context, options] { return RunCorrect(context, *options); }),
+                 options.get());
 }
 
 }  // namespace color3d::client

@@ -51,13 +51,13 @@ ExitCode RunInspect(const Context& context, const std::string& photos) {
 
 void AddInspectCommand(CLI::App& app, Context& context) {
   auto photos = std::make_shared<std::string>();
-  CLI::App* inspect =
-      app.add_subcommand("inspect", "Tell whether photos are in colour or monochrome");
-  inspect->fallthrough();
-  inspect->add_option("PHOTOS", *photos, "Folder of photos")->required();
-  inspect->callback([&context, photos] {
-    context.action = [&context, photos] { return RunInspect(context, *photos); };
-  });
+  AddCommand(app,
+             context,
+             "inspect",
+             "Report whether photos are in colour or monochrome",
+             [&context, photos] { return RunInspect(context, *photos); })
+      ->add_option("PHOTOS", *photos, "Folder of photos")
+      ->required();
 }
 
 }  // namespace color3d::client

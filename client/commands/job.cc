@@ -34,12 +34,9 @@ std::vector<std::string> JobRow(const v1::Job& job) {
 const std::vector<std::string> kJobHeading = {
     "JOB", "KIND", "STATE", "STEP", "SECONDS", "CREATED (UTC)"};
 
-void PrintJob(const Context& context, const v1::Job& job) {
-  if (context.json) {
-    PrintJson(job);
-  } else {
-    PrintText(fmt::format("{}  {}  {}\n", job.name(), job.kind(), StateName(job.state())));
-  }
+ExitCode PrintJob(const Context& context, const v1::Job& job) {
+  return PrintAnswer(
+      context, job, fmt::format("{}  {}  {}\n", job.name(), job.kind(), StateName(job.state())));
 }
 
 ExitCode RunSubmit(const Context& context, const std::string& file, const std::string& notify) {
@@ -51,8 +48,7 @@ ExitCode RunSubmit(const Context& context, const std::string& file, const std::s
     throw InvalidArgument("{} is not a JobSpec in JSON: {}", file, std::string(status.message()));
   }
   Connection connection(context.server, *context.interrupt);
-  PrintJob(context, SubmitJob(connection, spec, notify));
-  return ExitCode::kOk;
+  return PrintJob(context, SubmitJob(connection, spec, notify));
 }
 
 struct AllInOneArguments {
@@ -77,8 +73,7 @@ ExitCode RunAllInOne(const Context& context, const AllInOneArguments& arguments)
   if (arguments.iterations) scenes->mutable_options()->set_iterations(*arguments.iterations);
   spec.set_scene(scenes->routes(0).scene());
   Connection connection(context.server, *context.interrupt);
-  PrintJob(context, SubmitJob(connection, spec, arguments.notify));
-  return ExitCode::kOk;
+  return PrintJob(context, SubmitJob(connection, spec, arguments.notify));
 }
 
 ExitCode RunList(const Context& context, const std::string& parent, int limit) {
@@ -92,14 +87,9 @@ ExitCode RunList(const Context& context, const std::string& parent, int limit) {
     all.mutable_jobs()->MergeFrom(page.jobs());
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty() && all.jobs_size() < limit);
-  if (context.json) {
-    PrintJson(all);
-    return ExitCode::kOk;
-  }
   std::vector<std::vector<std::string>> rows = {kJobHeading};
   for (const v1::Job& job : all.jobs()) rows.push_back(JobRow(job));
-  PrintText(Table(rows));
-  return ExitCode::kOk;
+  return PrintAnswer(context, all, Table(rows));
 }
 
 ExitCode RunShow(const Context& context, const std::string& name) {
@@ -154,8 +144,7 @@ ExitCode RunWatch(const Context& context, const std::string& text) {
   }
   const v1::Job job = GetJob(connection, name);
   RequireSuccess(connection, context, job);
-  PrintJob(context, job);
-  return ExitCode::kOk;
+  return PrintJob(context, job);
 }
 
 ExitCode RunCancel(const Context& context, const std::string& name) {
@@ -163,8 +152,8 @@ ExitCode RunCancel(const Context& context, const std::string& name) {
   v1::CancelJobRequest request;
   request.set_name(ResourceName(name, "jobs"));
   request.set_request_id(NewUuid());
-  PrintJob(context, connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), request));
-  return ExitCode::kOk;
+  return PrintJob(context,
+                  connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), request));
 }
 
 ExitCode RunRetry(const Context& context, const std::string& name, bool from_scratch) {
@@ -173,8 +162,8 @@ ExitCode RunRetry(const Context& context, const std::string& name, bool from_scr
   request.set_name(ResourceName(name, "jobs"));
   request.set_from_scratch(from_scratch);
   request.set_request_id(NewUuid());
-  PrintJob(context, connection.Call(&v1::JobService::Stub::RetryJob, connection.jobs(), request));
-  return ExitCode::kOk;
+  return PrintJob(context,
+                  connection.Call(&v1::JobService::Stub::RetryJob, connection.jobs(), request));
 }
 
 ExitCode RunDelete(const Context& context, const std::string& name) {
@@ -182,14 +171,9 @@ ExitCode RunDelete(const Context& context, const std::string& name) {
   v1::DeleteJobRequest request;
   request.set_name(ResourceName(name, "jobs"));
   request.set_request_id(NewUuid());
-  const auto response =
-      connection.Call(&v1::JobService::Stub::DeleteJob, connection.jobs(), request);
-  if (context.json) {
-    PrintJson(response);
-  } else {
-    PrintText("deleted " + request.name() + "\n");
-  }
-  return ExitCode::kOk;
+  return PrintAnswer(context,
+                     connection.Call(&v1::JobService::Stub::DeleteJob, connection.jobs(), request),
+                     "deleted " + request.name() + "\n");
 }
 
 ExitCode RunPin(const Context& context, const std::string& name, bool pinned) {
@@ -197,16 +181,16 @@ ExitCode RunPin(const Context& context, const std::string& name, bool pinned) {
   v1::PinJobRequest request;
   request.set_name(ResourceName(name, "jobs"));
   request.set_pinned(pinned);
-  PrintJob(context, connection.Call(&v1::JobService::Stub::PinJob, connection.jobs(), request));
-  return ExitCode::kOk;
+  return PrintJob(context,
+                  connection.Call(&v1::JobService::Stub::PinJob, connection.jobs(), request));
 }
 
 ExitCode RunKill(const Context& context, const std::string& name) {
   Connection connection(context.server, *context.interrupt);
   v1::KillJobRequest request;
   request.set_name(ResourceName(name, "jobs"));
-  PrintJob(context, connection.Call(&v1::AdminService::Stub::KillJob, connection.admin(), request));
-  return ExitCode::kOk;
+  return PrintJob(context,
+                  connection.Call(&v1::AdminService::Stub::KillJob, connection.admin(), request));
 }
 
 // Continues at the same position after a lost connection.
@@ -245,11 +229,9 @@ CLI::App* AddNamed(CLI::App* job,
                    const std::string& help,
                    std::function<ExitCode(const Context&, const std::string&)> run) {
   const auto name = std::make_shared<std::string>();
-  CLI::App* app = job->add_subcommand(command, help);
-  app->fallthrough()->add_option("NAME", *name, "jobs/ID")->required();
-  app->callback([&context, name, run] {
-    context.action = [&context, name, run] { return run(context, *name); };
-  });
+  CLI::App* app = AddCommand(
+      *job, context, command, help, [&context, name, run] { return run(context, *name); });
+  app->add_option("NAME", *name, "jobs/ID")->required();
   return app;
 }
 
@@ -296,15 +278,14 @@ void AddJobCommands(CLI::App& app, Context& context) {
     };
   });
 
-  CLI::App* list = job->add_subcommand("list", "List jobs, newest first");
-  list->fallthrough();
+  CLI::App* list =
+      AddCommand(*job, context, "list", "List jobs, newest first", [&context, parent, limit] {
+        return RunList(context, *parent, *limit);
+      });
   list->add_option("PARENT", *parent, "Only the stages of jobs/ID, or the jobs of scenes/ID");
   list->add_option("--limit", *limit, "Maximum number of entries")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
-  list->callback([&context, parent, limit] {
-    context.action = [&context, parent, limit] { return RunList(context, *parent, *limit); };
-  });
 
   AddNamed(job, context, "show", "Show a job with its stages", RunShow);
   AddNamed(job, context, "watch", "Follow a job to its end", RunWatch);

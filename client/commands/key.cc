@@ -69,8 +69,8 @@ class Key {
   v1::Job Follow(const std::vector<std::string>& jobs) {
     return FollowToSuccess(connection_, context_, jobs, options_.out, display_);
   }
-  // Follows a submitted job to its end; downloads its files to options_.out. Warnings of the import
-  // are printed with those of its selection.
+  // A job that was followed to its end, and its files in options_.out. Warnings of the import are
+  // printed with those of its selection.
   struct Fetched {
     v1::Job job;
     KeyViewChoice choice;
@@ -86,12 +86,12 @@ class Key {
             ReadChoice(connection_, job),
             DownloadResults(connection_, context_, job, options_.out, display_)};
   }
-  // The selection for a new colour: the requested one, else the newest.
+  // Returns the jobs of the selection to colour: the requested one, else the newest.
   std::vector<std::string> SelectionFor(const std::string& scene);
   std::string Command(std::vector<std::string> arguments) const {
     return "  " + CommandLine(context_, std::move(arguments)) + "\n";
   }
-  // The next commands for the chosen view.
+  // Returns the commands that may follow, one a line.
   std::string NextCommands(const std::string& scene) const;
 
   const Context& context_;
@@ -185,7 +185,7 @@ std::vector<std::string> Key::SelectionFor(const std::string& scene) {
 
 ExitCode Key::Color() {
   options_.color.Check();
-  if (!options_.color.Given()) {
+  if (!options_.color.HasSource()) {
     throw InvalidArgument(
         "a source of colour is missing: --auto, --image, --hints, --reference, --prompt, "
         "--backend, --script or --edit");
@@ -286,14 +286,13 @@ ExitCode Key::Accept() {
 }
 
 void AddTarget(CLI::App* command, KeyOptions* options) {
-  command->fallthrough();
   command
       ->add_option(
           "SCENE",
           options->target,
           "scenes/ID, a folder of photos, a splat (.ply, .sog, .spz), or a film (.mp4, ...)")
       ->required();
-  command->add_flag("--film", options->film, "The photos are frames of a film");
+  command->add_flag("--film", options->film, "Treat the photos as frames of a film");
 }
 
 void AddView(CLI::App* command, KeyOptions* options) {
@@ -308,14 +307,15 @@ void AddKeyCommands(CLI::App& app, Context& context) {
   CLI::App* key = app.add_subcommand("key", "Select, colour and accept the key view of a scene");
   key->require_subcommand(1)->fallthrough();
   const auto options = std::make_shared<KeyOptions>();
-  const auto run = [&context, options](CLI::App* command, ExitCode (Key::*action)()) {
-    command->callback([&context, options, action] {
-      context.action = [&context, options, action] { return (Key(context, *options).*action)(); };
+  const auto add = [&](const char* name, const char* help, ExitCode (Key::*action)()) {
+    CLI::App* command = AddCommand(*key, context, name, help, [&context, options, action] {
+      return (Key(context, *options).*action)();
     });
+    AddTarget(command, options.get());
+    return command;
   };
 
-  CLI::App* select = key->add_subcommand("select", "Select the photo to colour");
-  AddTarget(select, options.get());
+  CLI::App* select = add("select", "Select the photo to colour", &Key::Select);
   AddView(select, options.get());
   select->add_option("--strategy", options->strategy, "coverage (default), tracks or entropy")
       ->check(CLI::IsMember({"coverage", "tracks", "entropy"}));
@@ -323,31 +323,22 @@ void AddKeyCommands(CLI::App& app, Context& context) {
       ->add_option("--count",
                    options->count,
                    "Number of key views, chosen together for the least expected error; for films "
-                   "one for each "
-                   "shot, the longest first")
+                   "one for each shot, the longest first")
       ->check(CLI::Range(1, kMaxAdditionalKeyViews + 1));
   select->add_option(
       "--encoder", options->encoder, "Encoder weights on the server to compare views with");
   select->add_option(
       "--features", options->features, "CLIP weights on the server to compare views with");
-  run(select, &Key::Select);
 
-  CLI::App* color = key->add_subcommand("color", "Colour the key view and download it");
+  CLI::App* color = add("color", "Colour the key view and download it", &Key::Color);
   color->alias("colour");
-  AddTarget(color, options.get());
   AddView(color, options.get());
   DeclareKeyColorFlags(*color, &options->color);
-  run(color, &Key::Color);
 
-  CLI::App* show = key->add_subcommand("show", "Show the selected, coloured and accepted key view");
-  AddTarget(show, options.get());
-  run(show, &Key::Show);
+  add("show", "Show the selected, coloured and accepted key view", &Key::Show);
 
-  CLI::App* accept =
-      key->add_subcommand("accept", "Accept the newest colours of the key view for the scene");
-  AddTarget(accept, options.get());
-  accept->add_option("--job", options->job, "Accept those of this job instead");
-  run(accept, &Key::Accept);
+  add("accept", "Accept the newest colours of the key view for the scene", &Key::Accept)
+      ->add_option("--job", options->job, "Job whose colours to accept instead");
 }
 
 }  // namespace color3d::client

@@ -39,9 +39,7 @@ void FindNewest(Connection& connection, KeyState* state) {
 
 KeyState ReadKeyState(Connection& connection, const std::string& scene) {
   KeyState state;
-  v1::GetSceneRequest request;
-  request.set_name(scene);
-  state.scene = connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request);
+  state.scene = GetScene(connection, scene);
   FindNewest(connection, &state);
   if (!state.scene.key_color_job().empty()) {
     state.accepted = GetJob(connection, state.scene.key_color_job());

@@ -10,8 +10,9 @@
 #include "client/lib/blob_transfer.h"
 #include "client/lib/names.h"
 #include "client/lib/out_folder.h"
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 #include "client/lib/text.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 
 namespace color3d::client {
@@ -21,21 +22,19 @@ namespace {
 constexpr size_t kShownErrors = 2;
 
 void AddFolder(const Context& context, const fs::path& folder, std::vector<LivePicture>* pictures) {
-  std::error_code none;
-  const bool nested = fs::is_directory(folder / "images", none);
+  const bool nested = IsFolder(folder / "images");
   const fs::path root = nested ? folder / "images" : folder;
-  PassedOver passed_over;
-  const std::vector<std::string> found =
-      ListPictures(root, /*with_subfolders=*/false, &passed_over);
+  SkippedFiles skipped;
+  const std::vector<std::string> found = ListPictures(root, /*with_subfolders=*/false, &skipped);
   if (found.empty()) {
-    throw InvalidArgument("there are no photos in {}{}", root.string(), passed_over.Clause());
+    throw InvalidArgument("there are no photos in {}{}", root.string(), skipped.Clause());
   }
-  for (const std::string& note : passed_over.Notes()) PrintNote(context, note);
+  for (const std::string& note : skipped.Notes()) PrintNote(context, note);
   for (const std::string& file : found) pictures->push_back({file, root / file, std::nullopt});
 }
 
 // Distinct names for the coloured pictures.
-std::vector<std::string> NamesFor(const std::vector<LivePicture>& pictures) {
+std::vector<std::string> OutputNames(const std::vector<LivePicture>& pictures) {
   std::set<std::string> taken;
   std::vector<std::string> names;
   for (const LivePicture& picture : pictures) {
@@ -69,10 +68,9 @@ std::vector<LivePicture> CollectPictures(const Context& context,
                                          const fs::path& out) {
   std::vector<LivePicture> pictures;
   for (const std::string& argument : arguments) {
-    std::error_code none;
-    if (fs::is_directory(argument, none)) {
+    if (IsFolder(argument)) {
       AddFolder(context, argument, &pictures);
-    } else if (fs::is_regular_file(argument, none)) {
+    } else if (IsFile(argument)) {
       pictures.push_back({fs::path(argument).filename().string(), argument, std::nullopt});
     } else {
       throw Error(ErrorCode::kNotFound, "there is no photo or folder {}", argument);
@@ -97,7 +95,7 @@ LiveSummary ColorizeToFiles(Connection& connection,
                             const LiveOptions& options,
                             const fs::path& out) {
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<std::string> names = NamesFor(pictures);
+  const std::vector<std::string> names = OutputNames(pictures);
   std::vector<std::string> written(pictures.size());
   std::vector<std::string> errors(pictures.size());
   LiveSummary summary;
@@ -127,8 +125,8 @@ LiveSummary ColorizeToFiles(Connection& connection,
     ColorizeLive(connection, source, pictures, options, on_answer);
   } catch (const Error& e) {
     if (e.code() != ErrorCode::kUnavailable) throw;
-    const auto there = std::count_if(
-        written.begin(), written.end(), [](const std::string& name) { return !name.empty(); });
+    const auto there =
+        std::ranges::count_if(written, [](const std::string& name) { return !name.empty(); });
     throw Error(ErrorCode::kUnavailable,
                 "{}; {} of {} pictures are complete in {}; run the command again for the rest",
                 e.what(),

@@ -12,7 +12,7 @@
 namespace color3d::client {
 
 // Returns the given files and the photos of the given folders (of images/ if there is one), by
-// name. Prints notes on files that are passed over. Throws Error: kNotFound for a missing file,
+// name. Prints notes on skipped files. Throws Error: kNotFound for a missing file,
 // kInvalidArgument for a file that is not a photo or that lies in `out` and would be overwritten.
 std::vector<LivePicture> CollectPictures(const Context& context,
                                          const std::vector<std::string>& arguments,

@@ -18,6 +18,7 @@
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
 #include "core/base/digest.h"
+#include "core/base/file_kind.h"
 #include "core/catalogue/artifacts.h"
 
 namespace color3d::client {
@@ -54,8 +55,7 @@ void Check(const MovieOptions& options) {
       (options.seconds || options.time_s || options.bounce || options.pictures)) {
     throw InvalidArgument(
         "--seconds, --at, --bounce and --png need a path: --path orbit, --path original, --path "
-        "still "
-        "or --path FILE");
+        "still or --path FILE");
   }
   if (options.path.empty() && IsMovieName(options.out)) {
     throw InvalidArgument(
@@ -75,14 +75,13 @@ void Check(const MovieOptions& options) {
   }
   if (options.out.empty() || IsMovieName(options.out)) return;
   std::error_code none;
-  if (fs::exists(options.out, none) && !fs::is_directory(options.out, none)) {
+  if (fs::exists(options.out, none) && !IsFolder(options.out)) {
     throw InvalidArgument("{} is not a folder; the name of a movie ends in .mp4", options.out);
   }
 }
 
 v1::Digest UploadCameras(Connection& connection, const std::string& path) {
-  std::error_code none;
-  if (!fs::is_regular_file(path, none)) {
+  if (!IsFile(path)) {
     throw Error(
         ErrorCode::kNotFound,
         "there is no file {}; --path takes {}, {}, {} or a file of cameras (transforms.json)",
@@ -97,7 +96,7 @@ v1::Digest UploadCameras(Connection& connection, const std::string& path) {
   return ToProto(upload.digest);
 }
 
-int FramesOf(const MovieOptions& options) {
+int FrameCount(const MovieOptions& options) {
   const double frames = options.seconds.value_or(kSeconds) * options.frames_per_second;
   if (!std::isfinite(frames) || frames > 1e9) {
     throw InvalidArgument("--seconds {} at --fps {} are more frames than can be counted",
@@ -107,7 +106,7 @@ int FramesOf(const MovieOptions& options) {
   return static_cast<int>(std::lround(frames));
 }
 
-v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1::Job& of) {
+v1::JobSpec MakeSpec(Connection& connection, const MovieOptions& options, const v1::Job& of) {
   v1::JobSpec spec;
   spec.set_scene(of.spec().scene());
   spec.set_skip_cache(options.skip_cache);
@@ -131,11 +130,11 @@ v1::JobSpec SpecOf(Connection& connection, const MovieOptions& options, const v1
     *render->mutable_cameras() = UploadCameras(connection, options.path);
   }
   // A path of the capture itself keeps its own speed unless another is given.
-  const bool as_in_the_file =
+  const bool keeps_speed =
       !options.seconds &&
       (render->has_cameras() || options.path == kStill ||
        (options.path == kOriginal && options.frames_per_second == kFramesPerSecond));
-  if (!as_in_the_file) render->set_frames(FramesOf(options));
+  if (!keeps_speed) render->set_frames(FrameCount(options));
   render->set_frames_per_second(options.frames_per_second);
   render->set_video(options.video);
   render->set_pictures(options.pictures);
@@ -170,7 +169,7 @@ ExitCode RunMovie(const Context& context, const MovieOptions& options) {
   Connection connection(context.server, *context.interrupt);
   const v1::Job of = FindColoredScene(connection, options.target);
   PrepareOut(folder.empty() ? fs::path(".") : folder);
-  const v1::Job submitted = SubmitJob(connection, SpecOf(connection, options, of));
+  const v1::Job submitted = SubmitJob(connection, MakeSpec(connection, options, of));
   ProgressDisplay display(context.json);
   const v1::Job job = FollowToSuccess(
       connection, context, {submitted.name()}, folder.empty() ? "." : folder.string(), display);
@@ -195,7 +194,6 @@ ExitCode RunMovie(const Context& context, const MovieOptions& options) {
 }
 
 void AddCommonOptions(CLI::App* command, MovieOptions* options) {
-  command->fallthrough();
   command
       ->add_option("RESULTS",
                    options->target,
@@ -207,7 +205,7 @@ void AddCommonOptions(CLI::App* command, MovieOptions* options) {
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str();
   command->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px");
-  command->add_option("--at", options->time_s, "Dynamic scenes: show this time throughout, s")
+  command->add_option("--at", options->time_s, "Dynamic scenes only: time to show throughout, s")
       ->check(CLI::Range(0.0, 86400.0));
   command->add_flag("--bounce", options->bounce, "Go back along the path at its end");
   command->add_flag(
@@ -218,40 +216,40 @@ void AddCommonOptions(CLI::App* command, MovieOptions* options) {
 
 void AddMovieCommands(CLI::App& app, Context& context) {
   const auto turning = std::make_shared<MovieOptions>();
-  CLI::App* turntable = app.add_subcommand("turntable", "Render a turntable movie");
+  CLI::App* turntable =
+      AddCommand(app, context, "turntable", "Render a turntable movie", [&context, turning] {
+        if (turning->out.empty()) {
+          turning->out = IsOnServer(turning->target) ? "." : turning->target;
+        }
+        return RunMovie(context, *turning);
+      });
   AddCommonOptions(turntable, turning.get());
   turning->path = kOrbit;
   turning->movie_name = "turntable.mp4";
   turntable->add_option("-o,--out",
                         turning->out,
                         "FILE.mp4 or a folder; default: turntable.mp4 in the folder of results");
-  turntable->callback([&context, turning] {
-    context.action = [&context, turning] {
-      if (turning->out.empty()) turning->out = IsOnServer(turning->target) ? "." : turning->target;
-      return RunMovie(context, *turning);
-    };
-  });
 
   const auto rendering = std::make_shared<MovieOptions>();
-  CLI::App* render =
-      app.add_subcommand("render", "Render a movie along a camera path, or pictures of views");
+  CLI::App* render = AddCommand(app,
+                                context,
+                                "render",
+                                "Render a movie along a camera path, or pictures of views",
+                                [&context, rendering] { return RunMovie(context, *rendering); });
   AddCommonOptions(render, rendering.get());
   rendering->out = "render";
-  render->add_option(
-      "--path",
-      rendering->path,
-      "orbit, original (through the cameras of the photos; for dynamic scenes along the key view's "
-      "camera), still (dynamic scenes: the key view's camera stands still while time passes) or a "
-      "file of cameras (transforms.json, for dynamic scenes with the `time` of each frame); "
-      "default: no movie, but pictures of views");
+  render->add_option("--path",
+                     rendering->path,
+                     "Camera path: orbit; original (through the cameras of the photos; in dynamic "
+                     "scenes along the camera of the key view); still (dynamic scenes only: the "
+                     "fixed camera of the key view); or a file of cameras (transforms.json; in "
+                     "dynamic scenes with the `time` of each frame). Default: pictures of views "
+                     "instead of a movie");
   render->add_option(
       "--views", rendering->views, "Names of the views to render, or to pass on the path original");
   render->add_option("-o,--out", rendering->out, "FILE.mp4 or a folder")->capture_default_str();
   render->add_flag("--png", rendering->pictures, "Also write every frame as a picture");
   render->add_flag("!--no-video", rendering->video, "With --png: write no movie");
-  render->callback([&context, rendering] {
-    context.action = [&context, rendering] { return RunMovie(context, *rendering); };
-  });
 }
 
 }  // namespace color3d::client

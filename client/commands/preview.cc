@@ -20,8 +20,8 @@ namespace {
 
 struct PreviewOptions {
   std::string target;     // folder of photos or scenes/ID
-  std::string key_color;  // a coloured key view
-  std::string key;        // the photo that it is of; empty: the one with its name
+  std::string key_color;  // the coloured key view
+  std::string key;        // the photo that it shows; empty: the one of the same name
   std::string out = "preview";
   int count = 5;
   int max_side_px = 500;
@@ -37,7 +37,7 @@ std::vector<LivePicture> PicturesOf(const v1::Scene& scene) {
   return pictures;
 }
 
-// Evenly spread over all photos but the key view.
+// Returns `count` photos, evenly spread, without the key view.
 std::vector<LivePicture> Spread(const std::vector<LivePicture>& all,
                                 const std::string& key,
                                 int count) {
@@ -62,7 +62,7 @@ v1::Digest UploadExample(Connection& connection, const fs::path& file) {
 }
 
 // The coloured key view of the scene: the accepted one, else the newest.
-v1::Digest ExampleOf(Connection& connection, const std::string& scene, std::string* key) {
+v1::Digest FindExample(Connection& connection, const std::string& scene, std::string* key) {
   const KeyState state = ReadKeyState(connection, scene);
   const std::optional<v1::Job>& job = state.accepted ? state.accepted : state.colored;
   if (!job) {
@@ -86,24 +86,19 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
   PrepareOut(options.out);
   Connection connection(context.server, *context.interrupt);
   WarmUpInference(connection);
-  if (stored) {
-    v1::GetSceneRequest request;
-    request.set_name(options.target);
-    pictures = PicturesOf(
-        connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request));
-  }
+  if (stored) pictures = PicturesOf(GetScene(connection, options.target));
   std::string key = options.key;
   LiveSource source;
   if (options.key_color.empty()) {
     std::string of_scene;
-    source.example = ExampleOf(connection, options.target, &of_scene);
+    source.example = FindExample(connection, options.target, &of_scene);
     if (key.empty()) key = of_scene;
   } else {
     source.example = UploadExample(connection, options.key_color);
     if (key.empty()) key = options.key_color;
   }
   pictures = Spread(pictures, key, options.count);
-  if (pictures.empty()) throw InvalidArgument("there is no photo but the key view");
+  if (pictures.empty()) throw InvalidArgument("there is no photo besides the key view");
   return PrintSummary(
       context,
       ColorizeToFiles(
@@ -114,10 +109,12 @@ ExitCode Preview(const Context& context, const PreviewOptions& options) {
 }  // namespace
 
 void AddPreviewCommand(CLI::App& app, Context& context) {
-  CLI::App* preview =
-      app.add_subcommand("preview", "Colour a few photos from a coloured key view within seconds")
-          ->fallthrough();
   const auto options = std::make_shared<PreviewOptions>();
+  CLI::App* preview = AddCommand(app,
+                                 context,
+                                 "preview",
+                                 "Colour a few photos from a coloured key view within seconds",
+                                 [&context, options] { return Preview(context, *options); });
   preview->add_option("photos", options->target, "Folder of photos, or scenes/ID")->required();
   preview->add_option("--key-color",
                       options->key_color,
@@ -125,8 +122,8 @@ void AddPreviewCommand(CLI::App& app, Context& context) {
   preview->add_option(
       "--key",
       options->key,
-      "The photo that the key view is, which is left out of the preview; default: the "
-      "one with the same name");
+      "Photo that the key view shows, which is left out of the preview; default: the photo of the "
+      "same name");
   preview->add_option("-o,--out", options->out, "Folder for the coloured pictures")
       ->capture_default_str();
   preview->add_option("--count", options->count, "Number of photos, evenly spread")
@@ -135,9 +132,6 @@ void AddPreviewCommand(CLI::App& app, Context& context) {
   preview->add_option("--max-side", options->max_side_px, "Longer side of the pictures, px")
       ->check(CLI::Range(16, 8192))
       ->capture_default_str();
-  preview->callback([&context, options] {
-    context.action = [&context, options] { return Preview(context, *options); };
-  });
 }
 
 }  // namespace color3d::client

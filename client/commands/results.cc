@@ -11,6 +11,7 @@
 #include "client/lib/blob_transfer.h"
 #include "client/lib/result_download.h"
 #include "client/lib/text.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/metrics.h"
@@ -30,8 +31,7 @@ FileDigest DigestOf(const v1::Artifact& artifact) {
 }  // namespace
 
 nlohmann::ordered_json ReadResult(const fs::path& out, const std::string& name) {
-  std::error_code none;
-  if (!fs::is_regular_file(out / name, none)) return nullptr;
+  if (!IsFile(out / name)) return nullptr;
   const auto json =
       nlohmann::ordered_json::parse(ReadFile(out / name), nullptr, /*allow_exceptions=*/false);
   return json.is_object() ? json : nlohmann::ordered_json();

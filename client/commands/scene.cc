@@ -2,6 +2,7 @@
 
 #include "client/commands/command.h"
 #include "client/commands/console.h"
+#include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/photos/mask_files.h"
 #include "client/lib/progress_display.h"
@@ -33,7 +34,7 @@ ExitCode RunCreate(const Context& context,
   if (film && !masks.empty()) {
     throw InvalidArgument("--masks cannot be combined with --film: frames of a film have no masks");
   }
-  if (film) TakeAsFrames(&folder);
+  if (film) UsePhotosAsFrames(&folder);
   if (!masks.empty()) AddMasks(masks, &folder);
   for (const std::string& note : folder.notes) PrintNote(context, note);
   Connection connection(context.server, *context.interrupt);
@@ -44,12 +45,7 @@ ExitCode RunCreate(const Context& context,
         display.OnTransfer("uploading", done, total);
       });
   display.Clear();
-  if (context.json) {
-    PrintJson(scene);
-  } else {
-    PrintText(scene.name() + "\n");
-  }
-  return ExitCode::kOk;
+  return PrintAnswer(context, scene, scene.name() + "\n");
 }
 
 ExitCode RunList(const Context& context, int limit) {
@@ -62,10 +58,6 @@ ExitCode RunList(const Context& context, int limit) {
     all.mutable_scenes()->MergeFrom(page.scenes());
     request.set_page_token(page.next_page_token());
   } while (!request.page_token().empty() && all.scenes_size() < limit);
-  if (context.json) {
-    PrintJson(all);
-    return ExitCode::kOk;
-  }
   std::vector<std::vector<std::string>> rows = {
       {"SCENE", "STATE", "LAYOUT", "PHOTOS", "CREATED (UTC)", "FOLDER"}};
   for (const v1::Scene& scene : all.scenes()) {
@@ -76,33 +68,27 @@ ExitCode RunList(const Context& context, int limit) {
                     HumanTime(scene.create_time()),
                     scene.display_name()});
   }
-  PrintText(Table(rows));
-  return ExitCode::kOk;
+  return PrintAnswer(context, all, Table(rows));
 }
 
 ExitCode RunShow(const Context& context, const std::string& name) {
   Connection connection(context.server, *context.interrupt);
-  v1::GetSceneRequest request;
-  request.set_name(ResourceName(name, "scenes"));
-  const auto scene =
-      connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request);
-  if (context.json) {
-    PrintJson(scene);
-    return ExitCode::kOk;
-  }
-  PrintText(fmt::format("{}\nstate    {}\nlayout   {}\nphotos   {}\nfolder   {}\ncreated  {}\n",
-                        scene.name(),
-                        SceneState(scene),
-                        LayoutName(scene.layout()),
-                        scene.photo_count(),
-                        scene.display_name(),
-                        HumanTime(scene.create_time())));
+  const v1::Scene scene = GetScene(connection, ResourceName(name, "scenes"));
   std::vector<std::vector<std::string>> rows = {{"FILE", "SIZE"}};
   for (const v1::SceneFile& file : scene.files()) {
     rows.push_back({file.path(), HumanBytes(file.digest().size_bytes())});
   }
-  PrintText(Table(rows));
-  return ExitCode::kOk;
+  return PrintAnswer(
+      context,
+      scene,
+      fmt::format("{}\nstate    {}\nlayout   {}\nphotos   {}\nfolder   {}\ncreated  {}\n{}",
+                  scene.name(),
+                  SceneState(scene),
+                  LayoutName(scene.layout()),
+                  scene.photo_count(),
+                  scene.display_name(),
+                  HumanTime(scene.create_time()),
+                  Table(rows)));
 }
 
 ExitCode RunDelete(const Context& context, const std::string& name) {
@@ -110,14 +96,10 @@ ExitCode RunDelete(const Context& context, const std::string& name) {
   v1::DeleteSceneRequest request;
   request.set_name(ResourceName(name, "scenes"));
   request.set_request_id(NewUuid());
-  const auto response =
-      connection.Call(&v1::SceneService::Stub::DeleteScene, connection.scenes(), request);
-  if (context.json) {
-    PrintJson(response);
-  } else {
-    PrintText("deleted " + request.name() + "\n");
-  }
-  return ExitCode::kOk;
+  return PrintAnswer(
+      context,
+      connection.Call(&v1::SceneService::Stub::DeleteScene, connection.scenes(), request),
+      "deleted " + request.name() + "\n");
 }
 
 }  // namespace
@@ -128,44 +110,47 @@ void AddSceneCommands(CLI::App& app, Context& context) {
   const auto text = std::make_shared<std::string>();
   const auto limit = std::make_shared<int>(50);
 
-  CLI::App* create =
-      scene->add_subcommand("create", "Upload a folder of photos, a splat or a film");
-  create->fallthrough()
+  const auto masks = std::make_shared<std::string>();
+  const auto film = std::make_shared<bool>(false);
+  CLI::App* create = AddCommand(
+      *scene,
+      context,
+      "create",
+      "Upload a folder of photos, a splat or a film",
+      [&context, text, masks, film] { return RunCreate(context, *text, *masks, *film); });
+  create
       ->add_option(
           "PHOTOS", *text, "Folder of photos, a splat (.ply, .sog, .spz), or a film (.mp4, ...)")
       ->required();
-  const auto masks = std::make_shared<std::string>();
-  create->add_option(
-      "--masks",
-      *masks,
-      "Folder of masks with the names of the photos: white counts, black is ignored");
-  const auto film = std::make_shared<bool>(false);
-  create->add_flag("--film", *film, "The photos are frames of a film");
-  create->callback([&context, text, masks, film] {
-    context.action = [&context, text, masks, film] {
-      return RunCreate(context, *text, *masks, *film);
-    };
-  });
+  create->add_option("--masks",
+                     *masks,
+                     "Folder of PNG masks named like the photos: white is used, black is ignored");
+  create->add_flag("--film", *film, "Treat the photos as frames of a film");
 
-  CLI::App* list = scene->add_subcommand("list", "List scenes, newest first");
-  list->fallthrough();
-  list->add_option("--limit", *limit, "Maximum number of entries")
+  AddCommand(*scene,
+             context,
+             "list",
+             "List scenes, newest first",
+             [&context, limit] { return RunList(context, *limit); })
+      ->add_option("--limit", *limit, "Maximum number of entries")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
-  list->callback([&context, limit] {
-    context.action = [&context, limit] { return RunList(context, *limit); };
-  });
 
-  CLI::App* show = scene->add_subcommand("show", "Show a scene with its files");
-  show->fallthrough()->add_option("NAME", *text, "scenes/ID")->required();
-  show->callback(
-      [&context, text] { context.action = [&context, text] { return RunShow(context, *text); }; });
+  AddCommand(*scene,
+             context,
+             "show",
+             "Show a scene with its files",
+             [&context, text] { return RunShow(context, *text); })
+      ->add_option("NAME", *text, "scenes/ID")
+      ->required();
 
-  CLI::App* remove = scene->add_subcommand("delete", "Delete a scene");
-  remove->fallthrough()->add_option("NAME", *text, "scenes/ID")->required();
-  remove->callback([&context, text] {
-    context.action = [&context, text] { return RunDelete(context, *text); };
-  });
+  AddCommand(*scene,
+             context,
+             "delete",
+             "Delete a scene",
+             [&context, text] { return RunDelete(context, *text); })
+      ->add_option("NAME", *text, "scenes/ID")
+      ->required();
 }
 
 }  // namespace color3d::client

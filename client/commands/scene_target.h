@@ -1,5 +1,5 @@
-// The scene that a user names: a folder of photos, a film or a splat on this machine, or a scene on
-// the server.
+// Finds the scene that a user names: a folder of photos, a film or a splat on this machine, or a
+// scene on the server.
 #pragma once
 
 #include <string>
@@ -17,7 +17,7 @@ std::string UploadFolder(Connection& connection,
                          ProgressDisplay& display);
 
 // `text`: "scenes/...", or a folder, splat or film to upload. `film`: the pictures of the folder
-// are frames of a film (TakeAsFrames). Throws Error: kNotFound if `text` is none of these,
+// are frames of a film (UsePhotosAsFrames). Throws Error: kNotFound if `text` is none of these,
 // kInvalidArgument for a scene on the server with `film`.
 std::string ResolveScene(Connection& connection,
                          const Context& context,

@@ -26,11 +26,9 @@ std::string DescribeBackend(const v1::BackendStatus& backend) {
                                  backend.address(),
                                  backend.ready() ? "ready" : backend.problem());
   if (!backend.description().empty()) text += ", " + backend.description();
-  std::string takes;
-  for (const std::string& capability : backend.capabilities()) {
-    takes += (takes.empty() ? "" : ", ") + capability;
+  if (!backend.capabilities().empty()) {
+    text += fmt::format(", takes {}", fmt::join(backend.capabilities(), ", "));
   }
-  if (!takes.empty()) text += ", takes " + takes;
   if (backend.max_pixels() > 0) {
     text += fmt::format(", up to {} pixels", backend.max_pixels());
   }
@@ -57,8 +55,6 @@ std::string DescribeUsage(const v1::ProjectUsage& usage,
 }
 
 std::string Describe(const v1::ServerInfo& info) {
-  std::string kinds;
-  for (const std::string& kind : info.job_kinds()) kinds += (kinds.empty() ? "" : ", ") + kind;
   std::string text = fmt::format(
       "version    {}{}\nmemory     {}\ndisk free  {}\njobs       {} running, {} queued\n"
       "kinds      {}\n",
@@ -68,7 +64,7 @@ std::string Describe(const v1::ServerInfo& info) {
       HumanBytes(info.disk_free_bytes()),
       info.running_jobs(),
       info.queued_jobs(),
-      kinds);
+      fmt::join(info.job_kinds(), ", "));
   if (!info.waits_for().empty()) text += "queue      waits for: " + info.waits_for() + "\n";
   text += DescribeUsage(info.usage(), "you are   ", info.role());
   for (const v1::ModelInfo& model : info.models()) text += DescribeModel(model);
@@ -86,20 +82,13 @@ std::string Describe(const v1::ServerInfo& info) {
 
 ExitCode RunServerInfo(const Context& context) {
   Connection connection(context.server, *context.interrupt);
-  const auto info = connection.Call(
-      &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
-  if (context.json) {
-    PrintJson(info);
-  } else {
-    PrintText(Describe(info));
-  }
-  return ExitCode::kOk;
+  const v1::ServerInfo info = GetServerInfo(connection);
+  return PrintAnswer(context, info, Describe(info));
 }
 
 ExitCode RunServerPresets(const Context& context, const std::string& name) {
   Connection connection(context.server, *context.interrupt);
-  const auto info = connection.Call(
-      &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
+  const v1::ServerInfo info = GetServerInfo(connection);
   v1::ServerInfo asked_for;
   std::string known;
   for (const v1::PresetInfo& preset : info.presets()) {
@@ -125,57 +114,41 @@ ExitCode RunServerPresets(const Context& context, const std::string& name) {
   return ExitCode::kOk;
 }
 
-// Calls an RPC of AdminService without a result and prints `said`.
+// Calls an RPC of AdminService without a result and prints `done`.
 template <typename Request, typename Response>
 ExitCode RunAdmin(const Context& context,
                   grpc::Status (v1::AdminService::Stub::*method)(grpc::ClientContext*,
                                                                  const Request&,
                                                                  Response*),
-                  const std::string& said) {
+                  const std::string& done) {
   Connection connection(context.server, *context.interrupt);
-  const Response response = connection.Call(method, connection.admin(), Request());
-  if (context.json) {
-    PrintJson(response);
-  } else {
-    PrintText(said + "\n");
-  }
-  return ExitCode::kOk;
+  return PrintAnswer(context, connection.Call(method, connection.admin(), Request()), done + "\n");
 }
 
 ExitCode RunCollect(const Context& context, const v1::CollectRequest& request) {
   Connection connection(context.server, *context.interrupt);
   const v1::CollectResponse gone = connection.Call(
       &v1::AdminService::Stub::Collect, connection.admin(), request, std::chrono::minutes(10));
-  if (context.json) {
-    PrintJson(gone);
-  } else {
-    PrintText(fmt::format("{} unreferenced blobs ({}) {}\n",
-                          gone.blobs(),
-                          HumanBytes(gone.bytes()),
-                          request.dry_run() ? "would be removed" : "were removed"));
-  }
-  return ExitCode::kOk;
+  return PrintAnswer(context,
+                     gone,
+                     fmt::format("{} unreferenced blobs ({}) {}\n",
+                                 gone.blobs(),
+                                 HumanBytes(gone.bytes()),
+                                 request.dry_run() ? "would be removed" : "were removed"));
 }
 
 ExitCode RunProjects(const Context& context) {
   Connection connection(context.server, *context.interrupt);
   const v1::ListProjectsResponse all = connection.Call(
       &v1::AdminService::Stub::ListProjects, connection.admin(), v1::ListProjectsRequest());
-  if (context.json) {
-    PrintJson(all);
-    return ExitCode::kOk;
-  }
   std::string text;
   for (const v1::ProjectUsage& usage : all.projects()) text += DescribeUsage(usage, "-", "");
-  PrintText(text);
-  return ExitCode::kOk;
+  return PrintAnswer(context, all, text);
 }
 
 void AddAdminCommands(CLI::App* server, Context& context) {
   const auto add = [&](const char* name, const char* help, std::function<ExitCode()> run) {
-    CLI::App* command = server->add_subcommand(name, help);
-    command->fallthrough()->callback([&context, run] { context.action = run; });
-    return command;
+    return AddCommand(*server, context, name, help, std::move(run));
   };
   using Admin = v1::AdminService::Stub;
   add("pause", "Pause the queue: running jobs continue, no job starts (role admin)", [&context] {
@@ -211,18 +184,17 @@ void AddServerCommands(CLI::App& app, Context& context) {
   CLI::App* server =
       app.add_subcommand("server", "Show and manage the server")->require_subcommand(1);
   server->fallthrough();
-  server->add_subcommand("info", "Show version, job kinds, workers and memory")
-      ->fallthrough()
-      ->callback([&context] { context.action = [&context] { return RunServerInfo(context); }; });
+  AddCommand(*server, context, "info", "Show version, job kinds, workers and memory", [&context] {
+    return RunServerInfo(context);
+  });
   AddAdminCommands(server, context);
   const auto name = std::make_shared<std::string>();
-  CLI::App* presets = server->add_subcommand(
-      "presets",
-      "Print the options of the presets, in the format of `color3d colorize --preset FILE`");
-  presets->add_option("NAME", *name, "Only this preset");
-  presets->fallthrough()->callback([&context, name] {
-    context.action = [&context, name] { return RunServerPresets(context, *name); };
-  });
+  AddCommand(*server,
+             context,
+             "presets",
+             "Print the options of the presets, in the format of `color3d colorize --preset FILE`",
+             [&context, name] { return RunServerPresets(context, *name); })
+      ->add_option("NAME", *name, "Only this preset");
 }
 
 }  // namespace color3d::client

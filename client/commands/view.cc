@@ -18,6 +18,7 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/text.h"
+#include "core/base/file_kind.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 
@@ -31,27 +32,27 @@ struct ViewOptions {
   bool open = true;
 };
 
-constexpr const char* kHowToGetPage =
+constexpr const char* kPageRemedy =
     "the scene is of an older version, or the worker was built without the viewer; build it where "
     "npm reaches its registry, and run `color3d colorize` again";
 
-fs::path PageIn(const fs::path& target) {
+fs::path FindPage(const fs::path& target) {
   std::error_code none;
-  if (fs::is_regular_file(target, none) && target.extension() == ".html") return target;
-  if (!fs::is_directory(target, none)) {
+  if (IsFile(target) && target.extension() == ".html") return target;
+  if (!IsFolder(target)) {
     throw Error(ErrorCode::kNotFound,
                 "there is no folder {}; name the one that `color3d colorize` wrote to (-o), "
                 "jobs/ID or scenes/ID",
                 target.string());
   }
   const fs::path page = target / artifact::kViewPage;
-  if (fs::is_regular_file(page, none)) return page;
+  if (IsFile(page)) return page;
   if (fs::exists(target / artifact::kReport, none)) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "{} has results, but no {}: {}",
                 target.string(),
                 artifact::kViewPage,
-                kHowToGetPage);
+                kPageRemedy);
   }
   throw Error(ErrorCode::kFailedPrecondition,
               "{} has no {}: it holds no finished results of `color3d colorize`; when the job is "
@@ -91,7 +92,7 @@ fs::path Download(const Context& context, const ViewOptions& options) {
               "{} has results, but no {}: {}",
               job.name(),
               artifact::kViewPage,
-              kHowToGetPage);
+              kPageRemedy);
 }
 
 // Starts `program` on a file in a session of its own, because it may become the browser and must
@@ -135,7 +136,7 @@ bool OpenInBrowser(const fs::path& page) {
 
 ExitCode RunView(const Context& context, const ViewOptions& options) {
   const fs::path page = fs::absolute(IsOnServer(options.target) ? Download(context, options)
-                                                                : PageIn(options.target));
+                                                                : FindPage(options.target));
   const bool opened = options.open && OpenInBrowser(page);
   if (context.json) {
     PrintJson({{"page", page.string()}, {"opened", opened}});
@@ -153,7 +154,9 @@ ExitCode RunView(const Context& context, const ViewOptions& options) {
 void AddViewCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<ViewOptions>();
   CLI::App* view =
-      app.add_subcommand("view", "Show a coloured scene in the browser")->fallthrough();
+      AddCommand(app, context, "view", "Show a coloured scene in the browser", [&context, options] {
+        return RunView(context, *options);
+      });
   view->add_option("RESULTS",
                    options->target,
                    "Folder of results, or jobs/ID or scenes/ID, whose page is downloaded")
@@ -161,9 +164,6 @@ void AddViewCommand(CLI::App& app, Context& context) {
   view->add_option("-o,--out", options->out, "Folder for the downloaded page")
       ->capture_default_str();
   view->add_flag("!--no-open", options->open, "Only print the path of the page");
-  view->callback([&context, options] {
-    context.action = [&context, options] { return RunView(context, *options); };
-  });
 }
 
 }  // namespace color3d::client

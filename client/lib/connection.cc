@@ -69,8 +69,8 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
   const bool is_here = IsLoopback(address);
   if (!server.token.empty() && !server.UsesTls() && !is_here) {
     throw InvalidArgument(
-        "the token would travel to {} for everybody to read; say --server https://{}, with --ca "
-        "where the server's certificate is of your own making",
+        "the token would be sent to {} unencrypted; give --server https://{}, with --ca if the "
+        "server's certificate is self-signed",
         address,
         address);
   }
@@ -108,7 +108,7 @@ RpcError WithRequestId(const RpcError& error,
 }
 
 // Error of a call without a connection; over TLS, the reason why the certificate is rejected.
-std::string WhyUnreachable(const std::shared_ptr<grpc::Channel>& channel) {
+std::string UnreachableReason(const std::shared_ptr<grpc::Channel>& channel) {
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + std::chrono::seconds(2));
   v1::ServerInfo info;
@@ -170,10 +170,10 @@ Connection::Connection(const ServerTarget& server, const CancellationToken& canc
   }
   if (!connected && server.UsesTls()) {
     throw Error(ErrorCode::kUnavailable,
-                "cannot reach a server at {} over TLS: {}; look at --server, --ca and, where the "
-                "server asks for it, --client-cert",
+                "cannot reach a server at {} over TLS: {}; check --server, --ca and, if the server "
+                "requires one, --client-cert",
                 server.address,
-                WhyUnreachable(channel_));
+                UnreachableReason(channel_));
   }
   if (!connected) throw UnreachableError(server.address);
   scenes_ = v1::SceneService::NewStub(channel_);
@@ -205,10 +205,15 @@ void Connection::Retry(const std::function<grpc::Status(grpc::ClientContext*)>& 
     if (error.IsTransient() && backoff->Wait(cancel_, error.RetryDelay())) continue;
     if (turned_away.Wait(error)) continue;
     if (error.grpc_code() == grpc::StatusCode::UNAVAILABLE && error.IsUnreachable()) {
-      throw LostServerError(address_);
+      throw ConnectionLostError(address_);
     }
     throw WithRequestId(error, status, context);
   }
+}
+
+v1::ServerInfo GetServerInfo(Connection& connection) {
+  return connection.Call(
+      &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
 }
 
 Error UnreachableError(const std::string& address) {
@@ -218,10 +223,10 @@ Error UnreachableError(const std::string& address) {
                address);
 }
 
-Error LostServerError(const std::string& address) {
+Error ConnectionLostError(const std::string& address) {
   return Error(ErrorCode::kUnavailable,
-               "lost the server at {}, which was there before; run the command again when it is "
-               "back (what it was sent is kept)",
+               "lost the server at {}; run the command again when it is back (uploaded files are "
+               "kept)",
                address);
 }
 

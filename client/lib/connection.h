@@ -46,7 +46,7 @@ class Backoff {
 struct ServerTarget {
   std::string address = kDefaultServer;    // HOST:PORT, unix:PATH, or https://HOST:PORT for TLS
   std::filesystem::path ca;                // PEM: roots in place of the system's; TLS
-  std::filesystem::path certificate, key;  // PEM: our own, where the server asks for one; TLS
+  std::filesystem::path certificate, key;  // PEM, for servers that require one; TLS
   std::string token;                       // empty: none
   // Called when a busy server makes the client wait; may be empty.
   std::function<void(const std::string&)> on_wait = {};
@@ -134,10 +134,13 @@ class FullServerWait {
   std::chrono::steady_clock::time_point since_;
 };
 
+// Returns version, limits, models and presets of the server. Throws RpcError.
+v1::ServerInfo GetServerInfo(Connection& connection);
+
 // "cannot reach a server at ...: start one with ...".
 Error UnreachableError(const std::string& address);
 
 // "lost the server at ...": for a server that answered before.
-Error LostServerError(const std::string& address);
+Error ConnectionLostError(const std::string& address);
 
 }  // namespace color3d::client

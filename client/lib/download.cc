@@ -20,7 +20,7 @@ class Download {
   Download(Connection& connection, const FileDigest& digest, fs::path part)
       : connection_(connection), digest_(digest), part_(std::move(part)) {}
 
-  // Writes the whole verified blob to the part file.
+  // Writes the verified blob to the part file.
   void Run(const std::function<void(int64_t)>& progress) {
     RemoveUnlessPlainFile(part_);
     std::error_code none;
@@ -39,11 +39,11 @@ class Download {
           status.error_code() != grpc::StatusCode::DEADLINE_EXCEEDED) {
         throw RpcError(status);
       }
-      if (!backoff.Wait(connection_.cancel())) throw LostServerError(connection_.address());
+      if (!backoff.Wait(connection_.cancel())) throw ConnectionLostError(connection_.address());
     }
     if (digest_.size_bytes == 0) std::ofstream(part_, std::ios::binary);
     if (DigestFile(part_).sha256 == digest_.sha256) return;
-    if (digest_.size_bytes > 0) ReceiveWhole(progress);
+    if (digest_.size_bytes > 0) ReceiveAll(progress);
     if (fs::exists(part_, none) && DigestFile(part_).sha256 == digest_.sha256) return;
     fs::remove(part_, none);
     throw Error(ErrorCode::kDataLoss,
@@ -54,7 +54,7 @@ class Download {
  private:
   // The server notices that a blob is damaged only if it sends all of it in one stream; it then
   // moves it aside, so that the next upload or run replaces it. Throws the error of the server.
-  void ReceiveWhole(const std::function<void(int64_t)>& progress) {
+  void ReceiveAll(const std::function<void(int64_t)>& progress) {
     std::error_code none;
     fs::remove(part_, none);
     received_ = 0;
@@ -101,7 +101,7 @@ class Download {
   int64_t received_ = 0;
 };
 
-bool HoldsAlready(const fs::path& path, const FileDigest& digest) {
+bool HasSameContent(const fs::path& path, const FileDigest& digest) {
   std::error_code none;
   if (!fs::is_regular_file(fs::symlink_status(path, none))) return false;
   if (static_cast<int64_t>(fs::file_size(path, none)) != digest.size_bytes) return false;
@@ -116,13 +116,12 @@ void DownloadBlob(Connection& connection,
                   const std::function<void(int64_t)>& progress) {
   if (!IsSha256Hex(digest.sha256) || digest.size_bytes < 0) {
     throw Error(ErrorCode::kDataLoss,
-                "the server names the bytes of {} by '{}', {} bytes, which is no digest; nothing "
-                "was written",
+                "the server sent a malformed digest of {}: '{}', {} bytes; nothing was written",
                 path.filename().string(),
                 digest.sha256,
                 digest.size_bytes);
   }
-  if (HoldsAlready(path, digest)) return progress(digest.size_bytes);
+  if (HasSameContent(path, digest)) return progress(digest.size_bytes);
   std::error_code error;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
   if (error) {

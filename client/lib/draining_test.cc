@@ -1,4 +1,4 @@
-// Unary calls while the server ends and another takes its place.
+// Unary calls while one server stops and another replaces it.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ grpc::Status StatusOf(grpc::StatusCode code, const char* reason) {
   return {code, reason, details.SerializeAsString()};
 }
 
-// Refuses so many calls, and then answers.
+// Refuses a number of calls, then answers.
 class EndingJobs final : public v1::JobService::Service {
  public:
   grpc::Status CreateJob(grpc::ServerContext*,

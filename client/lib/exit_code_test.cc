@@ -9,7 +9,7 @@
 namespace color3d::client {
 namespace {
 
-TEST(ExitCode, OfErrors) {
+TEST(ExitCode, MapsErrors) {
   EXPECT_EQ(ExitCodeOf(ErrorCode::kInvalidArgument), ExitCode::kBadInput);
   EXPECT_EQ(ExitCodeOf(ErrorCode::kFailedPrecondition), ExitCode::kBadInput);
   EXPECT_EQ(ExitCodeOf(ErrorCode::kNotFound), ExitCode::kBadInput);
@@ -22,7 +22,7 @@ TEST(ExitCode, OfErrors) {
   EXPECT_EQ(static_cast<int>(ExitCode::kDetached), 130);
 }
 
-TEST(ExitCode, OfJobs) {
+TEST(ExitCode, MapsJobs) {
   v1::Job job;
   job.set_state(v1::Job::STATE_SUCCEEDED);
   EXPECT_EQ(ExitCodeOf(job), ExitCode::kOk);

@@ -143,6 +143,12 @@ v1::Job GetJob(Connection& connection, const std::string& name) {
   return connection.Call(&v1::JobService::Stub::GetJob, connection.jobs(), request);
 }
 
+v1::Scene GetScene(Connection& connection, const std::string& name) {
+  v1::GetSceneRequest request;
+  request.set_name(name);
+  return connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request);
+}
+
 std::vector<v1::Job> ListChildren(Connection& connection, const std::string& name) {
   std::vector<v1::Job> jobs;
   v1::ListJobsRequest request;
@@ -153,7 +159,7 @@ std::vector<v1::Job> ListChildren(Connection& connection, const std::string& nam
     for (v1::Job& job : *response.mutable_jobs()) jobs.push_back(std::move(job));
     request.set_page_token(response.next_page_token());
   } while (!request.page_token().empty());
-  std::reverse(jobs.begin(), jobs.end());
+  std::ranges::reverse(jobs);
   return jobs;
 }
 

@@ -26,6 +26,8 @@ WatchEnd WatchJobs(Connection& connection,
 
 // Returns the current state of a job.
 v1::Job GetJob(Connection& connection, const std::string& name);
+// Returns a scene. Throws RpcError if there is none of this name.
+v1::Scene GetScene(Connection& connection, const std::string& name);
 // Returns the jobs whose parent is `name`, oldest first.
 std::vector<v1::Job> ListChildren(Connection& connection, const std::string& name);
 

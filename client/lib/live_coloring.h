@@ -20,14 +20,15 @@ struct LiveSource {
 };
 
 struct LivePicture {
-  std::string label;                 // of messages and files
-  std::filesystem::path file;        // or
+  std::string label;                 // for messages and file names
+  std::filesystem::path file;        // empty: `stored` is set
   std::optional<v1::Digest> stored;  // a blob that the server has
 };
 
 struct LiveOptions {
-  int max_side_px = 0;  // of the answers; 0: as the pictures
-  int in_flight = 0;  // pictures sent and not yet answered, at most; 0: as many as the server takes
+  int max_side_px = 0;  // longer side of the answers; 0: that of the pictures
+  // Maximum number of pictures that are sent and not yet answered; 0: the limit of the server.
+  int in_flight = 0;
 };
 
 // Opens and closes a stream, so that the server starts its inference worker.

@@ -31,7 +31,7 @@ TEST(Names, AcceptsShortResourceNames) {
   EXPECT_THROW(ResourceName("jobs/", "jobs"), Error);
 }
 
-TEST(Names, ByteStreamResources) {
+TEST(Names, FormatsByteStreamResources) {
   const FileDigest digest{std::string(64, 'a'), 12};
   EXPECT_EQ(BlobResource(digest), "blobs/" + std::string(64, 'a') + "/12");
   EXPECT_EQ(UploadResource("u-1", digest), "uploads/u-1/blobs/" + std::string(64, 'a') + "/12");

@@ -1,6 +1,5 @@
-// Paths of files from the server in a folder of the user: nothing is written outside of it,
-// whatever the server's names are and whatever symbolic links it contains. Pure functions of the
-// file system.
+// Paths of files from the server in a folder of the user. Nothing is written outside of it, even
+// for malicious names and if it contains symbolic links. Pure functions of the file system.
 #pragma once
 
 #include <filesystem>

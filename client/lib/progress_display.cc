@@ -47,7 +47,7 @@ void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
     // The failure of the last stage repeats one that was printed before.
     const bool failed = job.state() == v1::Job::STATE_FAILED;
     const bool repeated = failed && failure_told_ && job.kind() == kind::kColorizeScene;
-    if (!ended && !repeated) Say(EndLine(job));
+    if (!ended && !repeated) PrintLine(EndLine(job));
     failure_told_ = failure_told_ || failed;
     ended = true;
     if (unfinished_.erase(job.name()) > 0) idle_since_ = steady_clock::now();
@@ -58,15 +58,14 @@ void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
   if (job.state() == v1::Job::STATE_RUNNING) Draw(ProgressLine(job, Width()));
 }
 
-bool ProgressDisplay::SomethingRuns() const {
-  return std::any_of(unfinished_.begin(), unfinished_.end(), [](const auto& job) {
-    return job.second == v1::Job::STATE_RUNNING;
-  });
+bool ProgressDisplay::IsAnyStageRunning() const {
+  return std::ranges::any_of(unfinished_,
+                             [](const auto& job) { return job.second == v1::Job::STATE_RUNNING; });
 }
 
 void ProgressDisplay::OnTick(const std::function<v1::Job()>& look) {
   const auto now = steady_clock::now();
-  if (unfinished_.empty() || SomethingRuns() || now - idle_since_ < kIdle) return;
+  if (unfinished_.empty() || IsAnyStageRunning() || now - idle_since_ < kIdle) return;
   if (now - last_look_ >= kIdle) {
     last_look_ = now;
     try {
@@ -90,7 +89,7 @@ void ProgressDisplay::OnCount(const std::string& what, int64_t done, int64_t tot
   if (total > 0) Draw(fmt::format("{} {} of {}", what, done, total));
 }
 
-void ProgressDisplay::Say(const std::string& line) {
+void ProgressDisplay::PrintLine(const std::string& line) {
   if (quiet_) return;
   Clear();
   std::cerr << EscapeControls(line) << std::endl;

@@ -30,14 +30,14 @@ class ProgressDisplay {
   // Progress of a loop in the client; `what`: plural noun of its items.
   void OnCount(const std::string& what, int64_t done, int64_t total);
   // Prints a separate line.
-  void Say(const std::string& line);
+  void PrintLine(const std::string& line);
   // Erases the redrawn line.
   void Clear();
 
  private:
   void Draw(const std::string& line);
   int Width() const;
-  bool SomethingRuns() const;
+  bool IsAnyStageRunning() const;
 
   const bool quiet_;
   const bool terminal_;

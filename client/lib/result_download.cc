@@ -22,7 +22,7 @@ void DownloadBelow(Connection& connection,
     } catch (const Error& e) {
       if (e.code() != ErrorCode::kUnavailable) throw;
       throw Error(ErrorCode::kUnavailable,
-                  "lost the server at {}: {} of {} files are in {}, whole; when it is back, {}",
+                  "lost the server at {}: {} of {} files are complete in {}; when it is back, {}",
                   connection.address(),
                   i,
                   files.size(),

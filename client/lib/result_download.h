@@ -1,4 +1,4 @@
-// Several files from the server into a folder of the user's. Not thread-safe.
+// Downloads several files into a folder of the user. Not thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -12,14 +12,14 @@
 namespace color3d::client {
 
 struct ResultFile {
-  std::string name;  // a relative path, as the server says it
+  std::string name;  // relative path, as sent by the server
   FileDigest digest;
 };
 
-// Writes them to out/NAME, in order, each whole or not at all; those that are there already are
-// kept. `go_on` completes "when the server is back, ...". Throws what SafePathBelow and
-// DownloadBlob throw; when the server is gone, Error{kUnavailable} that says how many files are
-// there and how to go on.
+// Writes the files to out/NAME, in order, each atomically. Files that are already there are kept.
+// `go_on`: the remedy after a lost connection, completing "when it is back, ...". Throws as
+// SafePathBelow and DownloadBlob; Error{kUnavailable} with the number of complete files and the
+// remedy if the connection is lost.
 void DownloadBelow(Connection& connection,
                    const std::vector<ResultFile>& files,
                    const std::filesystem::path& out,

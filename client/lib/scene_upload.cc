@@ -7,6 +7,7 @@
 #include <optional>
 #include <system_error>
 
+#include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/text.h"
 #include "core/base/files.h"
@@ -63,10 +64,8 @@ std::string Shortened(const std::string& name) {
 }
 
 std::optional<v1::Scene> FindScene(Connection& connection, const std::string& name) {
-  v1::GetSceneRequest request;
-  request.set_name(name);
   try {
-    return connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request);
+    return GetScene(connection, name);
   } catch (const RpcError& e) {
     if (e.code() != ErrorCode::kNotFound) throw;
     return std::nullopt;
@@ -83,11 +82,7 @@ v1::Digest ToProto(const FileDigest& digest) {
 }
 
 int64_t MaxFileBytes(Connection& connection) {
-  return connection
-      .Call(
-          &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest())
-      .limits()
-      .max_blob_bytes();
+  return GetServerInfo(connection).limits().max_blob_bytes();
 }
 
 std::vector<SceneEntry> BuildManifest(const PhotoFolder& folder,

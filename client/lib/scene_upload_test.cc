@@ -16,7 +16,7 @@ TEST(SceneUploadTest, NamesTooLargeFilmBeforeReadingIt) {
   const ScratchFolder folder;
   const std::filesystem::path film = folder.path() / "reel.mov";
   WriteFileAtomic(film, "a film");
-  std::filesystem::resize_file(film, kMost + 1);  // of holes: no room is taken
+  std::filesystem::resize_file(film, kMost + 1);  // sparse: takes no disk space
   try {
     BuildManifest(CollectPhotos(film), kMost, CancellationToken());
     FAIL();

@@ -22,8 +22,8 @@ std::string Padded(std::string text, size_t columns) {
 
 // Control characters of a message would break the redrawn line.
 std::string OneLine(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 32; }, ' ');
+  std::ranges::replace_if(
+      text, [](unsigned char c) { return c < 32; }, ' ');
   return text;
 }
 

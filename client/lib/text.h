@@ -12,7 +12,7 @@ namespace color3d::client {
 
 std::string HumanBytes(int64_t bytes);     // "812 B", "3.2 MB"
 std::string HumanSeconds(double seconds);  // "0.4 s", "72 s", "1 h 02 min"
-std::string HumanClock(double seconds);    // "0:09", "12:34", "1:02:03", for what is left
+std::string HumanClock(double seconds);    // "0:09", "12:34", "1:02:03", remaining time
 std::string HumanTime(
     const google::protobuf::Timestamp& time);  // "2026-01-31 12:00:05" (UTC) or "-"
 

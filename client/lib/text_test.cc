@@ -10,7 +10,7 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-TEST(Text, Numbers) {
+TEST(Text, FormatsNumbers) {
   EXPECT_EQ(HumanBytes(0), "0 B");
   EXPECT_EQ(HumanBytes(999), "999 B");
   EXPECT_EQ(HumanBytes(1000), "1.0 kB");
@@ -62,7 +62,7 @@ TEST(Text, ClampsProgressBar) {
   EXPECT_THAT(ProgressLine(job, 200), HasSubstr("[####################] 500/100"));
 }
 
-TEST(Text, EndLines) {
+TEST(Text, FormatsEndLines) {
   v1::Job job = Running();
   job.mutable_progress()->set_seconds(12.3);
   job.set_state(v1::Job::STATE_SUCCEEDED);
@@ -87,10 +87,10 @@ TEST(Text, ShellLineQuotesIfNeeded) {
   EXPECT_EQ(ShellLine({""}), "''");
 }
 
-TEST(Text, TablesAlign) {
+TEST(Text, AlignsTables) {
   EXPECT_EQ(Table({{"NAME", "STATE"}, {"jobs/1", "X"}}), "NAME    STATE\njobs/1  X\n");
   EXPECT_EQ(Table({{"A"}, {"x\njobs/2\x1b[2J"}}), "A\nx\\njobs/2\\x1b[2J\n")
-      << "a name must not be a row of its own, or reach the terminal";
+      << "control characters of names are escaped";
 }
 
 }  // namespace

@@ -60,9 +60,9 @@ class Upload {
       best = std::max(best, committed_);
       if (status.ok() || !turned_away.Wait(RpcError(status))) {
         if (!status.ok()) ThrowIfFinal(status);
-        if (!backoff.Wait(connection_.cancel())) GiveUp(status);
+        if (!backoff.Wait(connection_.cancel())) ThrowFinalError(status);
       }
-      AskCommitted();
+      QueryCommittedSize();
     }
   }
 
@@ -104,7 +104,7 @@ class Upload {
     return status;
   }
 
-  void AskCommitted() {
+  void QueryCommittedSize() {
     bs::QueryWriteStatusRequest request;
     request.set_resource_name(resource_);
     const auto response =
@@ -122,9 +122,9 @@ class Upload {
     if (!again) throw error;
   }
 
-  [[noreturn]] void GiveUp(const grpc::Status& status) const {
+  [[noreturn]] void ThrowFinalError(const grpc::Status& status) const {
     if (status.ok() || RpcError(status).IsUnreachable()) {
-      throw LostServerError(connection_.address());
+      throw ConnectionLostError(connection_.address());
     }
     throw RpcError(status);
   }

@@ -17,7 +17,7 @@ TEST_F(UploadTest, ResumesAfterBrokenConnection) {
   EXPECT_EQ(blobs_.writes, 3);
   EXPECT_EQ(blobs_.uploads.size(), 1u);
   EXPECT_EQ(last_done_, digest_.size_bytes);
-  Upload(bytes_);  // it is there: nothing is sent
+  Upload(bytes_);  // the server has it: nothing is sent
   EXPECT_EQ(blobs_.writes, 3);
 }
 

@@ -11,7 +11,7 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-// "10-14.5", "10-" or "-14.5"; false for other text.
+// Parses "10-14.5", "10-" or "-14.5". Returns false for other text.
 bool ParseRange(std::string_view text, AdditionalKeyView* key) {
   const auto seconds = [](std::string_view number, std::optional<double>* to) {
     if (number.empty()) return true;
@@ -26,9 +26,9 @@ bool ParseRange(std::string_view text, AdditionalKeyView* key) {
          seconds(text.substr(dash + 1), &key->end_s) && key->HasRange();
 }
 
-// Takes the range of time off the end of `value`, where it has one. A file may be called
+// Moves a range of time at the end of `value`, if there is one, to `key`. A file may be called
 // "a@2x.png".
-void TakeRange(std::string* value, AdditionalKeyView* key) {
+void ExtractRange(std::string* value, AdditionalKeyView* key) {
   const size_t at = value->rfind('@');
   if (at == std::string::npos) return;
   const std::string range = value->substr(at + 1);
@@ -58,13 +58,12 @@ AdditionalKeyView ParseAdditionalKeyView(const std::string& text) {
     throw InvalidArgument(
         "--add-key-view wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
         "VIEW=POINTS.json, VIEW=auto), of a film also VIEW=COLOURED.png@BEGIN-END, in seconds; "
-        "'{}' "
-        "is not of that form",
+        "'{}' is not of that form",
         text);
   }
   std::string value = text.substr(equals + 1);
   AdditionalKeyView key{text.substr(0, equals), {}};
-  TakeRange(&value, &key);
+  ExtractRange(&value, &key);
   if (value == "auto") {
     key.color.automatic = true;
   } else if (fs::path(value).extension() == ".json") {

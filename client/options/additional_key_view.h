@@ -17,8 +17,8 @@ struct AdditionalKeyView {
   std::optional<double> end_s = {};
   bool HasRange() const { return begin_s || end_s; }
 };
-// "VIEW=COLOURED.png", "VIEW=POINTS.json" or "VIEW=auto", and "@BEGIN-END" behind it or not. Throws
-// Error{kInvalidArgument} for other text, and what checking the file throws.
+// Parses "VIEW=COLOURED.png", "VIEW=POINTS.json" or "VIEW=auto", optionally followed by
+// "@BEGIN-END". Throws Error{kInvalidArgument} for other text, and the errors of checking the file.
 AdditionalKeyView ParseAdditionalKeyView(const std::string& text);
 
 }  // namespace color3d::client

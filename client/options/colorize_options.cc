@@ -150,10 +150,10 @@ void ColorizeOptions::Check() const {
   color.Check();
   if (keys > 1 && !benchmark) {
     throw InvalidArgument(
-        "--keys needs --benchmark, where photos have true colours. To "
-        "colour several photos, see `color3d key select --count` and --add-key-view");
+        "--keys needs --benchmark, where photos have true colours. To colour several photos, see "
+        "`color3d key select --count` and --add-key-view");
   }
-  if (keys > 1 && (!additional_key_views.empty() || color.Given())) {
+  if (keys > 1 && (!additional_key_views.empty() || color.HasSource())) {
     throw InvalidArgument(
         "--keys chooses the key views and takes their true colours; leave out {}",
         additional_key_views.empty() ? "the other source of colour" : "--add-key-view");
@@ -165,7 +165,7 @@ void ColorizeOptions::Check() const {
   }
   for (const std::string& text : additional_key_views) ParseAdditionalKeyView(text);
   // A picture of a certain view cannot be scored against that view.
-  const bool for_one_view = !color.FileOfView().empty() || !color.mask.empty();
+  const bool for_one_view = !color.PictureOfView().empty() || !color.mask.empty();
   if (benchmark && for_one_view) {
     throw InvalidArgument(
         "--benchmark colours the key view with its own true colours, or by --auto, --prompt, "
@@ -300,8 +300,7 @@ v1::JobSpec ImportSpec(const ColorizeOptions& options, const std::string& scene)
 v1::ColorizeSceneSpec MergeWithPreset(Connection& connection, const ColorizeOptions& options) {
   const v1::ColorizeSceneSpec chosen = RequestedOptions(options);
   v1::ColorizeSceneSpec spec;
-  const auto info = connection.Call(
-      &v1::ServerService::Stub::GetServerInfo, connection.server(), v1::GetServerInfoRequest());
+  const v1::ServerInfo info = GetServerInfo(connection);
   for (const v1::PresetInfo& preset : info.presets()) {
     if (preset.options().preset() == std::max(chosen.preset(), v1::PRESET_FAST)) {
       spec = preset.options();
@@ -360,7 +359,7 @@ v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scen
   return spec;
 }
 
-void RequireOutBesidePhotos(const fs::path& out, const PhotoFolder& folder) {
+void RequireSeparateOutFolder(const fs::path& out, const PhotoFolder& folder) {
   const fs::path folder_out = Canonical(out);
   bool inside = false;
   for (const LocalFile& photo : folder.photos) {

@@ -71,6 +71,6 @@ v1::JobSpec SelectSpec(Connection& connection,
 v1::JobSpec ColorizeSpec(const ColorizeOptions& options, const std::string& scene);
 
 // Throws Error{kInvalidArgument} if the next run would take results in `out` for photos.
-void RequireOutBesidePhotos(const std::filesystem::path& out, const PhotoFolder& folder);
+void RequireSeparateOutFolder(const std::filesystem::path& out, const PhotoFolder& folder);
 
 }  // namespace color3d::client

@@ -91,7 +91,7 @@ TEST_F(ColorizeOptionsTest, UsesAugmentFilesOnRequest) {
   options.settings = {"generate_augmentations.files=true"};
   try {
     RequireAugmentFiles(options, folder);
-    FAIL() << "there are none";
+    FAIL() << "there are no pictures";
   } catch (const Error& e) {
     EXPECT_THAT(e.what(), HasSubstr("photos/augment"));
   }
@@ -136,7 +136,7 @@ TEST_F(ColorizeOptionsTest, SelectionImportsFilmWithItsOptions) {
     app.parse(arguments);
     return ImportSpec(options, "scenes/s").import_scene();
   };
-  EXPECT_EQ(import({}).ByteSizeLong(), 0u) << "the server's own will do";
+  EXPECT_EQ(import({}).ByteSizeLong(), 0u) << "the server imports by default";
   const v1::ImportSceneSpec spec = import({"--poses",
                                            "--deflicker",
                                            "--set=import_scene.film_stride=3",

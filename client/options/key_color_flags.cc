@@ -7,6 +7,7 @@
 #include "client/lib/scene_upload.h"
 #include "core/base/digest.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/image/probe/probe.h"
 
@@ -15,8 +16,7 @@ namespace fs = std::filesystem;
 namespace {
 
 void RequireImage(const std::string& option, const std::string& file) {
-  std::error_code none;
-  if (!fs::is_regular_file(file, none)) {
+  if (!IsFile(file)) {
     throw Error(ErrorCode::kNotFound, "{}: there is no file {}; give a picture", option, file);
   }
   try {
@@ -158,9 +158,9 @@ v1::KeyColorSource MakeSource(const KeyColorFlags& flags, Uploads* uploads) {
 
 }  // namespace
 
-bool KeyColorFlags::Given() const { return !Sources(*this).empty(); }
+bool KeyColorFlags::HasSource() const { return !Sources(*this).empty(); }
 
-std::string KeyColorFlags::FileOfView() const {
+std::string KeyColorFlags::PictureOfView() const {
   for (const std::string& file : {image, hints, edit}) {
     if (!file.empty()) return file;
   }

@@ -24,10 +24,10 @@ struct KeyColorFlags {
   std::string model;
 
   // Returns whether a source is given.
-  bool Given() const;
+  bool HasSource() const;
   // Returns the file of a source that is drawn for a certain view, whose name may give the view;
   // empty for other sources.
-  std::string FileOfView() const;
+  std::string PictureOfView() const;
   // Checks that need no server. Throws Error{kInvalidArgument} if flags exclude each other, and the
   // errors of reading the files.
   void Check() const;

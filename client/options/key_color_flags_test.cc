@@ -67,10 +67,10 @@ TEST_F(KeyColorFlagsTest, AcceptsEachSource) {
                                                 "--mask",
                                                 "PNG"}}) {
     EXPECT_EQ(Complaint(line), "") << line[0];
-    EXPECT_TRUE(flags_.Given()) << line[0];
+    EXPECT_TRUE(flags_.HasSource()) << line[0];
   }
   EXPECT_EQ(Complaint({}), "");
-  EXPECT_FALSE(flags_.Given());
+  EXPECT_FALSE(flags_.HasSource());
 }
 
 TEST_F(KeyColorFlagsTest, RefusesTwoSources) {

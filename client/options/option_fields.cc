@@ -104,9 +104,8 @@ std::string PrefixOf(const EnumDescriptor* values) {
 }
 
 const EnumValueDescriptor* FindValue(const EnumDescriptor* values, std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) {
-    return static_cast<char>(std::toupper(c));
-  });
+  std::ranges::transform(
+      text, text.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
   const EnumValueDescriptor* value = values->FindValueByName(PrefixOf(values) + text);
   if (value == nullptr) value = values->FindValueByName(text);
   return value != nullptr && value->number() != 0 ? value : nullptr;

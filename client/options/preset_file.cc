@@ -10,6 +10,7 @@
 
 #include "client/options/option_fields.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/json_text.h"
 #include "core/base/text/lower_case.h"
@@ -60,7 +61,7 @@ std::string WithRemedy(const std::string& complaint) {
   return complaint + "; `color3d server presets fast` prints a valid preset";
 }
 
-struct FirstComplaint : public google::protobuf::io::ErrorCollector {
+struct FirstError : public google::protobuf::io::ErrorCollector {
   void AddError(int at, google::protobuf::io::ColumnNumber, const std::string& what) override {
     if (!text.empty()) return;
     line = at;
@@ -99,7 +100,7 @@ void CheckValues(const Message& message,
   }
 }
 
-void RequireNothingOfOneScene(const v1::ColorizeSceneSpec& spec, const std::string& file) {
+void RejectSceneSpecificFields(const v1::ColorizeSceneSpec& spec, const std::string& file) {
   const bool one_scene = !spec.key_view().empty() || spec.has_key_color() ||
                          spec.colorize_key_view().has_source() || !spec.truth().empty() ||
                          !spec.training_truth().empty();
@@ -113,12 +114,12 @@ void RequireNothingOfOneScene(const v1::ColorizeSceneSpec& spec, const std::stri
 }  // namespace
 
 std::string PresetNames() {
-  std::string names;
+  std::vector<std::string> names;
   const auto* presets = v1::Preset_descriptor();
   for (int i = 1; i < presets->value_count(); ++i) {
-    names += (i > 1 ? ", " : "") + LowerCase(presets->value(i)->name().substr(kPrefix.size()));
+    names.push_back(LowerCase(presets->value(i)->name().substr(kPrefix.size())));
   }
-  return names;
+  return fmt::format("{}", fmt::join(names, ", "));
 }
 
 v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
@@ -128,14 +129,13 @@ v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
     spec.set_preset(preset);
     return spec;
   }
-  std::error_code none;
-  if (!fs::is_regular_file(name_or_file, none)) {
+  if (!IsFile(name_or_file)) {
     throw Error(ErrorCode::kNotFound,
                 "--preset {}: there is no such preset (there are {}) and no such file",
                 name_or_file,
                 PresetNames());
   }
-  FirstComplaint complaint;
+  FirstError complaint;
   TextFormat::ParseInfoTree lines;
   TextFormat::Parser parser;
   parser.RecordErrorsTo(&complaint);
@@ -145,7 +145,7 @@ v1::ColorizeSceneSpec ReadPreset(const std::string& name_or_file) {
     Complain(name_or_file, complaint.line, WithRemedy(complaint.text));
   }
   CheckValues(spec, lines, name_or_file);
-  RequireNothingOfOneScene(spec, name_or_file);
+  RejectSceneSpecificFields(spec, name_or_file);
   return spec;
 }
 

@@ -110,7 +110,7 @@ class SamplingMap {
     source.max_x = width_ - 1;
     source.max_y = height_ - 1;
     if (!cells_.empty()) Unshuffle(p, source);
-    Unturn(p, source);
+    UndoRotation(p, source);
     source.position = {p.x - 0.5, p.y - 0.5};
     return source;
   }
@@ -152,7 +152,7 @@ class SamplingMap {
   }
 
   // Inverts rotation and flip: maps coordinates of the rotated picture to the source.
-  void Unturn(Point& p, Source& source) const {
+  void UndoRotation(Point& p, Source& source) const {
     int width = width_;
     int height = height_;
     for (int i = 0; i < quarter_turns_; ++i) {

@@ -93,7 +93,7 @@ class ForwardWarp {
   size_t Index(int x, int y) const { return static_cast<size_t>(y) * key_.depth.width + x; }
   Corner At(int x, int y) const { return {&vertices_[Index(x, y)], x, y}; }
 
-  bool OneSurface(const std::array<Corner, 3>& corners) const {
+  bool IsOneSurface(const std::array<Corner, 3>& corners) const {
     float least = std::numeric_limits<float>::max(), most = 0.0f;
     for (const Corner& corner : corners) {
       if (corner.vertex->depth <= 0.0) return false;
@@ -105,7 +105,7 @@ class ForwardWarp {
   }
 
   void Draw(const std::array<Corner, 3>& corners) {
-    if (!OneSurface(corners)) return;
+    if (!IsOneSurface(corners)) return;
     const Vertex &a = *corners[0].vertex, &b = *corners[1].vertex, &c = *corners[2].vertex;
     const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
     // Back-facing, or at a grazing angle that would smear it.

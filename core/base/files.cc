@@ -50,7 +50,7 @@ class FileDescriptor {
 
 // Gives the new file the mode and owner of the file that it replaces. Without permission to change
 // the owner, keeps the mode only.
-void TakeAfter(int fd, const fs::path& replaced) {
+void CopyModeAndOwner(int fd, const fs::path& replaced) {
   struct stat before {
   }, now{};
   if (::stat(replaced.c_str(), &before) != 0 || !S_ISREG(before.st_mode)) return;
@@ -131,7 +131,7 @@ void WriteFileAtomic(const fs::path& path, std::string_view bytes) {
       ::unlink(temporary.c_str());
       FileDescriptor fd(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
       if (fd.get() < 0) ThrowErrno("cannot create", temporary);
-      TakeAfter(fd.get(), path);
+      CopyModeAndOwner(fd.get(), path);
       size_t done = 0;
       while (done < bytes.size()) {
         const ssize_t put = ::write(fd.get(), bytes.data() + done, bytes.size() - done);

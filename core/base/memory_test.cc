@@ -83,7 +83,7 @@ int InLimitedProcess(int64_t memory_bytes, const std::function<bool()>& check) {
   if (child == 0) {
     ProcessLimits limits;
     limits.memory_bytes = memory_bytes;
-    const bool limited = LimitProcess(limits) && BeEndedFirstWhenMemoryRunsOut();
+    const bool limited = LimitProcess(limits) && PreferAsOomVictim();
     ::_exit(limited && check() ? 0 : 1);
   }
   int status = 0;

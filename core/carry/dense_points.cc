@@ -136,16 +136,16 @@ SweepPlan PlanSweeps(const Scene& scene, size_t most) {
   SweepPlan plan;
   plan.candidates.resize(scene.views.size());
   if (by_time.size() == 1 || by_time.size() == training.size()) {
-    plan.views = EvenlyOf(training, most);
+    plan.views = PickEvenly(training, most);
     for (const int view : plan.views) plan.candidates[view] = plan.views;
     return plan;
   }
   const size_t few = std::max<size_t>(1, most * by_time.size() / training.size());
   std::vector<std::vector<int>> groups;
   for (auto& [time, views] : by_time) groups.push_back(std::move(views));
-  groups = EvenlyOf(std::move(groups), few);
+  groups = PickEvenly(std::move(groups), few);
   for (std::vector<int>& views : groups) {
-    views = EvenlyOf(std::move(views), most);
+    views = PickEvenly(std::move(views), most);
     plan.views.insert(plan.views.end(), views.begin(), views.end());
   }
   std::sort(plan.views.begin(), plan.views.end());
@@ -182,7 +182,7 @@ std::vector<SparsePoint> DensePoints(const Scene& scene,
   for (std::vector<SparsePoint>& points : by_view) {
     std::move(points.begin(), points.end(), std::back_inserter(all));
   }
-  return EvenlyOf(std::move(all), options.max_points);
+  return PickEvenly(std::move(all), options.max_points);
 }
 
 }  // namespace color3d

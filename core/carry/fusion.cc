@@ -44,7 +44,7 @@ struct GuessShare {
   double color = 0.0;  // factor of the guess in the prior
 };
 
-GuessShare ShareOfGuess(double distance, double chroma, const FusionOptions& options) {
+GuessShare InferredShare(double distance, double chroma, const FusionOptions& options) {
   const double faded =
       options.max_guessed * SmoothStep(distance, options.guess_begins, options.guess_ends);
   const double bold =
@@ -93,7 +93,7 @@ FusedColor FuseColors(const FusionSources& sources,
     const double guess_b = guessed.Empty() ? 0.0 : guessed.Plane(1)[i];
     const GuessShare guess =
         distance.Empty() ? GuessShare{}
-                         : ShareOfGuess(distance.data[i], std::hypot(guess_a, guess_b), options);
+                         : InferredShare(distance.data[i], std::hypot(guess_a, guess_b), options);
     const double strangeness =
         distance.Empty() ? 0.0 : std::min<double>(distance.data[i], kMaxStrange);
     const double pull =

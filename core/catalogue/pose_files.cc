@@ -38,7 +38,7 @@ int RankOf(const fs::path& folder) {
   return folder.string().starts_with("sparse") ? 0 : 1;
 }
 
-ColmapPlace PlaceOf(const std::string& folder, const std::set<std::string>& names) {
+ColmapPlace MakeColmapPlace(const std::string& folder, const std::set<std::string>& names) {
   ColmapPlace place;
   place.folder = folder;
   const std::string prefix = folder.empty() ? "" : folder + "/";
@@ -74,7 +74,7 @@ std::vector<ColmapPlace> ColmapPlaces(const std::vector<std::string>& files) {
     const bool has_cameras = names.contains("cameras.bin") || names.contains("cameras.txt");
     if (!has_cameras && names.size() < 2) continue;
     const int rank = RankOf(folder);
-    ColmapPlace place = PlaceOf(folder, names);
+    ColmapPlace place = MakeColmapPlace(folder, names);
     const int tier = !place.whole ? 2 : rank == kElsewhere ? 1 : 0;
     found[{tier, rank, folder + "/\x7f"}] = std::move(place);
   }

@@ -119,7 +119,7 @@ const Stage& StageOf(std::string_view kind) {
   return *stage;
 }
 
-const Stage* StageThatLeaves(std::string_view artifact) {
+const Stage* FindProducer(std::string_view artifact) {
   const Artifact* found = FindArtifact(artifact);
   return found != nullptr && found->stage != nullptr ? FindStage(found->stage) : nullptr;
 }

@@ -61,6 +61,6 @@ const Stage* FindStage(std::string_view kind);
 const Stage& StageOf(std::string_view kind);
 
 // The stage that writes an artifact or the folder that it lies in; nullptr if there is none.
-const Stage* StageThatLeaves(std::string_view artifact);
+const Stage* FindProducer(std::string_view artifact);
 
 }  // namespace color3d

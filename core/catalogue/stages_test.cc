@@ -40,11 +40,11 @@ TEST(StageCatalogueTest, ResultsAreOutputsOfTheirStage) {
 }
 
 TEST(StageCatalogueTest, FindsWriterByNameAndFolder) {
-  EXPECT_STREQ(StageThatLeaves(artifact::kModel)->kind, kind::kSolveChroma);
-  EXPECT_STREQ(StageThatLeaves(std::string(artifact::kViewsAb) + "0001.png")->kind,
+  EXPECT_STREQ(FindProducer(artifact::kModel)->kind, kind::kSolveChroma);
+  EXPECT_STREQ(FindProducer(std::string(artifact::kViewsAb) + "0001.png")->kind,
                kind::kColorizeViews);
-  EXPECT_STREQ(StageThatLeaves(artifact::kKeyViewColored)->kind, kind::kColorizeKeyView);
-  EXPECT_EQ(StageThatLeaves("nothing.txt"), nullptr);
+  EXPECT_STREQ(FindProducer(artifact::kKeyViewColored)->kind, kind::kColorizeKeyView);
+  EXPECT_EQ(FindProducer("nothing.txt"), nullptr);
 }
 
 TEST(StageCatalogueTest, FindsOrRefusesKinds) {

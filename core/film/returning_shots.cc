@@ -14,7 +14,7 @@ constexpr double kMinFound = 0.15;  // share of the frame
 
 }  // namespace
 
-std::vector<int> MiddlesWithoutKey(const std::vector<int>& shot, const std::vector<int>& keys) {
+std::vector<int> UnkeyedShotMiddles(const std::vector<int>& shot, const std::vector<int>& keys) {
   std::map<int, std::vector<int>> shots;
   for (size_t i = 0; i < shot.size(); ++i) shots[shot[i]].push_back(static_cast<int>(i));
   for (const int key : keys) shots.erase(shot[key]);

@@ -13,7 +13,7 @@ namespace color3d {
 
 // Middle frames of the shots with two frames or more that contain none of the frames `keys`,
 // ascending.
-std::vector<int> MiddlesWithoutKey(const std::vector<int>& shot, const std::vector<int>& keys);
+std::vector<int> UnkeyedShotMiddles(const std::vector<int>& shot, const std::vector<int>& keys);
 
 // Looks for key frames in such shots. Features of a key frame are computed once for all shots.
 class ReturningShots {

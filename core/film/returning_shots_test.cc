@@ -89,9 +89,9 @@ TEST_F(ReturningShotsTest, ComputesFeaturesOncePerKeyFrame) {
 
 TEST(MiddlesWithoutKeyTest, ListsShotsWithoutKeyFrame) {
   const std::vector<int> shot = {0, 0, 0, 1, 1, 5, 2, 5, 5, 7};
-  EXPECT_EQ(MiddlesWithoutKey(shot, {1}), (std::vector<int>{4, 7}));
-  EXPECT_EQ(MiddlesWithoutKey(shot, {1, 8}), (std::vector<int>{4}));
-  EXPECT_TRUE(MiddlesWithoutKey(shot, {1, 3, 5}).empty());
+  EXPECT_EQ(UnkeyedShotMiddles(shot, {1}), (std::vector<int>{4, 7}));
+  EXPECT_EQ(UnkeyedShotMiddles(shot, {1, 8}), (std::vector<int>{4}));
+  EXPECT_TRUE(UnkeyedShotMiddles(shot, {1, 3, 5}).empty());
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ double Difference(const Image& one, const Image& other, int dx, int dy) {
   return sum / (static_cast<double>(x1 - x0) * (y1 - y0));
 }
 
-// Unlikeness of two normalised pictures.
+// ShotDissimilarity of two normalised pictures.
 double UnlikenessOfNormalized(const Image& one, const Image& other) {
   double best = 1e9;
   const int limit_x = std::min(kMaxShiftPx, one.width / 4),
@@ -65,7 +65,7 @@ double Usual(const std::vector<double>& steps, int k) {
 
 }  // namespace
 
-double Unlikeness(const Image& one, const Image& other) {
+double ShotDissimilarity(const Image& one, const Image& other) {
   if (one.channels != 1 || other.channels != 1 || one.width != other.width ||
       one.height != other.height || one.Empty()) {
     throw InvalidArgument("the frames of a film must have one channel and equal sizes");

@@ -31,6 +31,6 @@ FilmShots FindShots(const std::vector<Image>& thumbnails);
 
 // Mean difference of the normalised L of two thumbnails under the best shift by a few px. 0: equal
 // but for exposure; near 1: nothing in common. For FindShots and its tests.
-double Unlikeness(const Image& one, const Image& other);
+double ShotDissimilarity(const Image& one, const Image& other);
 
 }  // namespace color3d

@@ -48,7 +48,7 @@ struct Place {
 
 // Adds to a row of frame `index` the colours along its pixels' tracks into the frames after it
 // (direction 1) or before it (-1). Frame by frame, so that few planes are read at a time.
-void AddFollowed(const std::vector<FrameInMotion>& frames,
+void AddFollowed(const std::vector<MovingFrame>& frames,
                  int index,
                  int direction,
                  int row,
@@ -83,7 +83,7 @@ void SteadyColorsOptions::Validate() const {
   check("persistence", persistence, 0, 1);
 }
 
-Image SteadyColors(const std::vector<FrameInMotion>& frames,
+Image SteadyColors(const std::vector<MovingFrame>& frames,
                    int index,
                    const SteadyColorsOptions& options) {
   options.Validate();

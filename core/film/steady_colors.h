@@ -16,7 +16,7 @@ struct SteadyColorsOptions {
   void Validate() const;     // throws Error{kInvalidArgument}
 };
 
-struct FrameInMotion {
+struct MovingFrame {
   const Image* ab = nullptr;  // 2 channels, Lab units
   // Flow between the frame before it and this one. Null where the earlier frames do not count: at
   // the beginning of a shot, or of the frames of another key frame.
@@ -25,7 +25,7 @@ struct FrameInMotion {
 
 // Returns the colours of frame `index`, averaged over each pixel's track as long as forward and
 // backward flow agree. `frames`: neighbours of one size, in order.
-Image SteadyColors(const std::vector<FrameInMotion>& frames,
+Image SteadyColors(const std::vector<MovingFrame>& frames,
                    int index,
                    const SteadyColorsOptions& options = {});
 

@@ -42,7 +42,7 @@ class SteadyColorsTest : public ::testing::Test {
     flows_.push_back(std::move(flow));
   }
   Image Steady(int index, const SteadyColorsOptions& options = {}) const {
-    std::vector<FrameInMotion> frames;
+    std::vector<MovingFrame> frames;
     for (size_t i = 0; i < pictures_.size(); ++i) frames.push_back({&pictures_[i], flows_[i]});
     return SteadyColors(frames, index, options);
   }

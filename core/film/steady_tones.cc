@@ -239,7 +239,7 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
   return result;
 }
 
-Image Toned(Image luminance, const ToneCurve& curve) {
+Image ApplyToneCurve(Image luminance, const ToneCurve& curve) {
   if (curve.empty()) return luminance;
   for (float& v : luminance.data) v = MappedTone(curve, v);
   return luminance;

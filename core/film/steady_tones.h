@@ -32,6 +32,6 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
                             const CancellationToken& cancel);
 
 // Applies the curve to a picture of L, 1 channel.
-Image Toned(Image luminance, const ToneCurve& curve);
+Image ApplyToneCurve(Image luminance, const ToneCurve& curve);
 
 }  // namespace color3d

@@ -66,7 +66,7 @@ SteadyTones Find(const std::vector<Image>& pictures, std::vector<int> shots = {}
 double FlickerOf(const std::vector<Exposure>& exposures, const std::vector<ToneCurve>& curves) {
   const auto seen = [&](size_t frame, float tone) {
     Image pixel(1, 1, 1, exposures[frame].Of(tone));
-    return static_cast<double>(Toned(pixel, curves[frame]).data[0]);
+    return static_cast<double>(ApplyToneCurve(pixel, curves[frame]).data[0]);
   };
   double sum = 0.0;
   int count = 0;
@@ -108,7 +108,7 @@ TEST(SteadyTonesTest, KeepsSteadyFilms) {
     const SteadyTones tones = Find(pictures);
     double worst = 0.0;
     for (int i = 0; i < 30; ++i) {
-      const Image steady = Toned(pictures[i], tones.curves[i]);
+      const Image steady = ApplyToneCurve(pictures[i], tones.curves[i]);
       for (size_t p = 0; p < steady.data.size(); ++p) {
         worst = std::max<double>(worst, std::abs(steady.data[p] - pictures[i].data[p]));
       }
@@ -125,7 +125,7 @@ TEST(SteadyTonesTest, KeepsSlowFades) {
   }
   const SteadyTones tones = Find(pictures);
   for (const int i : {0, 1, 10, 15, 28, 29}) {
-    EXPECT_NEAR(Toned(Image(1, 1, 1, 50.0f), tones.curves[i]).data[0], 50.0, 1.0) << i;
+    EXPECT_NEAR(ApplyToneCurve(Image(1, 1, 1, 50.0f), tones.curves[i]).data[0], 50.0, 1.0) << i;
   }
 }
 
@@ -140,7 +140,7 @@ TEST(SteadyTonesTest, TreatsShotsSeparately) {
   shots.push_back(2);
   const SteadyTones tones = Find(pictures, shots);
   for (const int i : {8, 9, 10, 11}) {
-    EXPECT_NEAR(Toned(Image(1, 1, 1, 30.0f), tones.curves[i]).data[0], 30.0, 0.5) << i;
+    EXPECT_NEAR(ApplyToneCurve(Image(1, 1, 1, 30.0f), tones.curves[i]).data[0], 30.0, 0.5) << i;
   }
   EXPECT_TRUE(tones.curves[20].empty());
   EXPECT_TRUE(Find({Scenery(0, 0.0), Scenery(1, 0.0)}).curves[0].empty());

@@ -132,9 +132,9 @@ class Vote {
 };
 
 // Penalty of positions on the squared distances of features.
-class Apartness {
+class PositionPenalty {
  public:
-  Apartness(const CellQueries& queries, const CellBank& bank, const VoteOptions& options)
+  PositionPenalty(const CellQueries& queries, const CellBank& bank, const VoteOptions& options)
       : weight_(static_cast<float>(options.position_weight)),
         inverse_reach_(static_cast<float>(1.0 / options.position_reach)) {
     if (!queries.positions.defined() || !bank.positions.defined() || !(weight_ > 0.0f)) return;
@@ -204,7 +204,7 @@ CellMatches MatchCells(const CellQueries& queries,
   const int64_t count = queries.features.size(0), entries = bank.features.size(0);
   const torch::Tensor transposed = bank.features.t();
   const torch::Tensor bank_squares = bank.features.square().sum(1);
-  const Apartness apartness(queries, bank, options);
+  const PositionPenalty apartness(queries, bank, options);
   const ColorBins bins(bank.colors);
   CellMatches matches{torch::empty({count, 2}),
                       torch::empty({count}),

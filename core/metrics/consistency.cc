@@ -179,8 +179,8 @@ std::vector<ViewPair> ConsistencyPairs(const std::vector<int>& groups, int most)
     if (long_gap > kShortGap) AddPairs(begin, views, long_gap, true, &long_pairs);
     begin += views;
   }
-  std::vector<ViewPair> pairs = EvenlyOf(short_pairs, static_cast<size_t>(most));
-  for (const ViewPair& pair : EvenlyOf(long_pairs, static_cast<size_t>(most))) {
+  std::vector<ViewPair> pairs = PickEvenly(short_pairs, static_cast<size_t>(most));
+  for (const ViewPair& pair : PickEvenly(long_pairs, static_cast<size_t>(most))) {
     pairs.push_back(pair);
   }
   std::sort(pairs.begin(), pairs.end(), [](const ViewPair& x, const ViewPair& y) {

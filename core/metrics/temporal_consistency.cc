@@ -21,21 +21,21 @@ constexpr size_t kMostStretches = 16;
 constexpr int kReach = kCdcDistances.back();
 
 // Frames [begin, end) of a shot; each is compared with earlier ones.
-struct Stretch {
+struct FrameRange {
   const std::vector<int>* shot = nullptr;
   int begin = 1;
   int end = 1;
 };
 
-std::vector<Stretch> StretchesOf(const std::vector<std::vector<int>>& shots) {
-  std::vector<Stretch> stretches;
+std::vector<FrameRange> SplitShots(const std::vector<std::vector<int>>& shots) {
+  std::vector<FrameRange> stretches;
   for (const std::vector<int>& shot : shots) {
     const int frames = static_cast<int>(shot.size());
     for (int begin = 1; begin < frames; begin += kStretch) {
       stretches.push_back({&shot, begin, std::min(begin + kStretch, frames)});
     }
   }
-  return EvenlyOf(std::move(stretches), kMostStretches);
+  return PickEvenly(std::move(stretches), kMostStretches);
 }
 
 // Sums for one colouring of a stretch.
@@ -80,7 +80,7 @@ struct Remembered {
   std::deque<ColorHistogram> histograms;  // the newest first
 };
 
-std::vector<Sums> Compare(const Stretch& stretch,
+std::vector<Sums> Compare(const FrameRange& stretch,
                           const TemporalSource& source,
                           const CancellationToken& cancel) {
   const size_t colorings = source.colorings.size();
@@ -221,7 +221,7 @@ std::map<std::string, double> TemporalConsistency::Figures() const {
 std::vector<TemporalConsistency> MeasureTemporalConsistency(const TemporalSource& source,
                                                             ThreadPool& pool,
                                                             const CancellationToken& cancel) {
-  const std::vector<Stretch> stretches = StretchesOf(source.shots);
+  const std::vector<FrameRange> stretches = SplitShots(source.shots);
   std::vector<std::vector<Sums>> sums(stretches.size());
   pool.ForEach(static_cast<int64_t>(stretches.size()),
                [&](int64_t i, int) { sums[i] = Compare(stretches[i], source, cancel); });

@@ -12,7 +12,7 @@ namespace color3d {
 namespace {
 
 // The true L with the given chroma, so that luminance errors do not hide colour errors.
-Image UnderTrueL(const Image& true_lab, const Image& ab) {
+Image WithTrueLuminance(const Image& true_lab, const Image& ab) {
   return JoinLab(LuminanceOfLab(true_lab), Resize(ab, true_lab.width, true_lab.height));
 }
 
@@ -84,12 +84,12 @@ Scores ScoreView(const Image& true_srgb,
   v["psnr_l"] = Psnr(counting(LuminanceOfLab(lab)), counting(LuminanceOfLab(true_lab)), 100.0);
   v["ab_rmse"] = AbRmse(counting(lab), counting(true_lab));
   v["colorfulness"] = Colorfulness(counting(rendered_srgb));
-  v["colorfulness_2d"] = Colorfulness(counting(SrgbFromLab(UnderTrueL(true_lab, view_ab))));
+  v["colorfulness_2d"] = Colorfulness(counting(SrgbFromLab(WithTrueLuminance(true_lab, view_ab))));
   v["colorfulness_truth"] = Colorfulness(counting(truth_srgb));
 
   const Image rendered = FitWithin(lab, kColorSidePx);
   const auto error = [&](const Image& ab) {
-    return MeanDeltaE00(Gather(UnderTrueL(truth, ab), of_color), Gather(truth, of_color));
+    return MeanDeltaE00(Gather(WithTrueLuminance(truth, ab), of_color), Gather(truth, of_color));
   };
   v["delta_e00"] = MeanDeltaE00(Gather(rendered, of_color), Gather(truth, of_color));
   v["delta_e00_chroma"] = error(ChromaOfLab(rendered));
@@ -98,7 +98,7 @@ Scores ScoreView(const Image& true_srgb,
   return v;
 }
 
-double ColorfulnessWhere(const Image& srgb, const Image* mask) {
+double MaskedColorfulness(const Image& srgb, const Image* mask) {
   return Colorfulness(Gather(srgb, Counting(mask, srgb.width, srgb.height)));
 }
 
@@ -106,7 +106,7 @@ double ChromaError(const Image& true_srgb, const Image& rendered_lab, const Imag
   const Image truth = AtColorSide(LabFromSrgb(true_srgb));
   const Image rendered = AtColorSide(rendered_lab);
   const std::vector<size_t> pixels = Counting(mask, truth.width, truth.height);
-  return MeanDeltaE00(Gather(UnderTrueL(truth, ChromaOfLab(rendered)), pixels),
+  return MeanDeltaE00(Gather(WithTrueLuminance(truth, ChromaOfLab(rendered)), pixels),
                       Gather(truth, pixels));
 }
 
@@ -121,7 +121,7 @@ void SourceErrors::Add(const Image& true_srgb,
                        const Image& provenance,
                        const Image* mask) {
   const Image truth = AtColorSide(LabFromSrgb(true_srgb));
-  const Image delivered = UnderTrueL(truth, AtColorSide(view_ab));
+  const Image delivered = WithTrueLuminance(truth, AtColorSide(view_ab));
   const Image shares = Resize(provenance, truth.width, truth.height);
   for (const size_t i : Counting(mask, truth.width, truth.height)) {
     const float guessed = shares.Plane(0)[i], seen = shares.Plane(1)[i],

@@ -29,7 +29,7 @@ Scores ScoreView(const Image& true_srgb,
                  const Image* mask = nullptr);
 
 // Colourfulness of the pixels that count, at the size of the picture. Requires: a pixel counts.
-double ColorfulnessWhere(const Image& srgb, const Image* mask);
+double MaskedColorfulness(const Image& srgb, const Image* mask);
 
 // CIEDE2000 of the chroma of `rendered_lab` under the true L, at kColorSidePx. Requires: a pixel
 // counts.

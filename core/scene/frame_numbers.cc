@@ -14,7 +14,7 @@ namespace color3d {
 namespace {
 
 // Alternating runs of digits and other characters of a name.
-std::vector<std::string_view> PartsOf(std::string_view name) {
+std::vector<std::string_view> SplitDigits(std::string_view name) {
   const auto is_digit = [](char c) { return std::isdigit(static_cast<unsigned char>(c)) != 0; };
   std::vector<std::string_view> parts;
   for (size_t begin = 0; begin < name.size();) {
@@ -35,11 +35,11 @@ std::optional<int64_t> NumberIn(std::string_view part) {
 
 // Returns the only number in which the names differ; empty if there is none. Digits in extensions
 // do not differ.
-std::vector<int64_t> NumbersOf(const std::vector<std::string>& names) {
+std::vector<int64_t> VaryingNumbers(const std::vector<std::string>& names) {
   std::optional<size_t> differs;
-  const std::vector<std::string_view> first = PartsOf(names.front());
+  const std::vector<std::string_view> first = SplitDigits(names.front());
   for (const std::string& name : names) {
-    const std::vector<std::string_view> parts = PartsOf(name);
+    const std::vector<std::string_view> parts = SplitDigits(name);
     if (parts.size() != first.size()) return {};
     for (size_t i = 0; i < parts.size(); ++i) {
       if (parts[i] == first[i]) continue;
@@ -50,7 +50,7 @@ std::vector<int64_t> NumbersOf(const std::vector<std::string>& names) {
   if (!differs) return {};
   std::vector<int64_t> numbers;
   for (const std::string& name : names) {
-    const std::optional<int64_t> number = NumberIn(PartsOf(name)[*differs]);
+    const std::optional<int64_t> number = NumberIn(SplitDigits(name)[*differs]);
     if (!number) return {};
     numbers.push_back(*number);
   }
@@ -59,12 +59,12 @@ std::vector<int64_t> NumbersOf(const std::vector<std::string>& names) {
 
 // Returns the step of the numbers: the most frequent one, if it makes up at least half of all steps
 // and all others are multiples of it; else 0.
-int64_t StepOf(const std::vector<int64_t>& numbers) {
+int64_t UsualStep(const std::vector<int64_t>& numbers) {
   std::map<int64_t, size_t> steps;
   for (size_t i = 1; i < numbers.size(); ++i) ++steps[numbers[i] - numbers[i - 1]];
   if (steps.empty() || steps.begin()->first <= 0) return 0;
-  const auto usual = std::max_element(
-      steps.begin(), steps.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
+  const auto usual =
+      std::ranges::max_element(steps, {}, [](const auto& step) { return step.second; });
   if (2 * usual->second < numbers.size() - 1) return 0;
   for (const auto& [step, count] : steps) {
     if (step % usual->first != 0) return 0;
@@ -79,8 +79,8 @@ FrameNumbers FramePositions(const std::vector<std::string>& names) {
   result.places.resize(names.size());
   std::iota(result.places.begin(), result.places.end(), int64_t{0});
   if (names.size() < 3) return result;
-  const std::vector<int64_t> numbers = NumbersOf(names);
-  const int64_t step = StepOf(numbers);
+  const std::vector<int64_t> numbers = VaryingNumbers(names);
+  const int64_t step = UsualStep(numbers);
   if (step == 0) return result;
   const auto count = static_cast<int64_t>(names.size());
   const int64_t missing = (numbers.back() - numbers.front()) / step + 1 - count;
@@ -109,8 +109,8 @@ FrameNumbers FramePositions(const std::vector<std::string>& names) {
     result.places[i] = (numbers[i] - numbers.front()) / step;
   }
   result.note = fmt::format(
-      "{} {} missing {}: what follows keeps its time, and the frame before a gap is shown longer; "
-      "number the frames anew if there is no gap",
+      "{} {} missing {}: later frames keep their time, and the frame before a gap is shown longer; "
+      "renumber the frames if there is no gap",
       missing,
       missing == 1 ? "frame is" : "frames are",
       where);

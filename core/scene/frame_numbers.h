@@ -15,7 +15,7 @@ struct FrameNumbers {
 // Requires: `names` in order (base/name_order.h). If the names differ in one number only, which
 // nearly always grows by the same step, gaps in it are missing frames and keep their time. Pictures
 // count as consecutive if the names have no such number, or if more frames would be missing than
-// there are; the note says so.
+// there are, which the note reports.
 FrameNumbers FramePositions(const std::vector<std::string>& names);
 
 }  // namespace color3d

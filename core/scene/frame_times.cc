@@ -15,9 +15,9 @@
 namespace color3d {
 namespace {
 
-constexpr double kSameTime = 1e-6;    // fraction of the whole range
-constexpr double kSameTick = 0.25;    // fraction of a step of the cameras' clock
-constexpr double kToldOffset = 0.05;  // likewise: a larger offset is no rounding error
+constexpr double kSameTime = 1e-6;     // fraction of the whole range
+constexpr double kSameTick = 0.25;     // fraction of a step of the cameras' clock
+constexpr double kNotedOffset = 0.05;  // likewise: a larger offset is no rounding error
 
 // Relative to images/.
 std::string Folder(std::string file) {
@@ -47,9 +47,7 @@ bool AllOrNone(const std::vector<FrameTime>& frames, const char* what, const Has
 std::vector<double> ShiftedTimes(const std::vector<FrameTime>& frames) {
   std::vector<size_t> order(frames.size());
   std::iota(order.begin(), order.end(), size_t{0});
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    return *frames[a].time < *frames[b].time;
-  });
+  std::ranges::stable_sort(order, {}, [&](size_t i) { return *frames[i].time; });
   const double begin = *frames[order.front()].time;
   const double span = *frames[order.back()].time - begin;
   if (!std::isfinite(span)) {
@@ -69,9 +67,9 @@ std::vector<double> ShiftedTimes(const std::vector<FrameTime>& frames) {
   return times;
 }
 
-bool SomeShareATime(std::vector<double> times) {
-  std::sort(times.begin(), times.end());
-  return std::adjacent_find(times.begin(), times.end()) != times.end();
+bool HasEqualTimes(std::vector<double> times) {
+  std::ranges::sort(times);
+  return std::ranges::adjacent_find(times) != times.end();
 }
 
 // Frames of each camera, in order of time.
@@ -81,8 +79,7 @@ FramesByCamera ByCamera(const std::vector<std::string>& camera, const std::vecto
   FramesByCamera frames;
   for (size_t i = 0; i < times.size(); ++i) frames[camera[i]].push_back(i);
   for (auto& [name, own] : frames) {
-    std::stable_sort(
-        own.begin(), own.end(), [&](size_t a, size_t b) { return times[a] < times[b]; });
+    std::ranges::stable_sort(own, {}, [&](size_t i) { return times[i]; });
   }
   return frames;
 }
@@ -97,7 +94,7 @@ double MedianStep(const FramesByCamera& cameras, const std::vector<double>& time
 
 // Returns the tick of each frame if all cameras follow one clock to a quarter of a step; else
 // empty. Steps are counted one by one, since rounded times drift against any constant step.
-std::vector<int64_t> TicksOf(const FramesByCamera& cameras, const std::vector<double>& times) {
+std::vector<int64_t> CountTicks(const FramesByCamera& cameras, const std::vector<double>& times) {
   constexpr double kMaxSteps = 1e6;  // missing between two frames
   const double step = MedianStep(cameras, times);
   if (!(step > 0.0)) return {};
@@ -135,7 +132,7 @@ void ShareMoments(const std::vector<std::string>& camera,
                   FrameMoments* result) {
   const FramesByCamera cameras = ByCamera(camera, *times);
   if (cameras.size() < 2) return;
-  const std::vector<int64_t> ticks = TicksOf(cameras, *times);
+  const std::vector<int64_t> ticks = CountTicks(cameras, *times);
   result->one_clock = !ticks.empty();
   if (ticks.empty()) return;
   std::map<int64_t, double> earliest;
@@ -143,17 +140,17 @@ void ShareMoments(const std::vector<std::string>& camera,
     double& time = earliest.try_emplace(ticks[i], (*times)[i]).first->second;
     time = std::min(time, (*times)[i]);
   }
-  const double told = kToldOffset * MedianStep(cameras, *times);
+  const double rounding = kNotedOffset * MedianStep(cameras, *times);
   double moved = 0.0;
   for (size_t i = 0; i < ticks.size(); ++i) {
     const double time = earliest.at(ticks[i]);
     moved = std::max(moved, (*times)[i] - time);
     (*times)[i] = time;
   }
-  if (moved <= told) return;
+  if (moved <= rounding) return;
   result->note = fmt::format(
-      "the cameras' clocks differ by up to {:.3g} s: frames less than that apart are taken for one "
-      "moment",
+      "the cameras' clocks differ by up to {:.3g} s: frames closer than that count as "
+      "simultaneous",
       moved);
 }
 
@@ -168,12 +165,12 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
   const bool named =
       AllOrNone(frames, "camera", [](const FrameTime& f) { return !f.camera.empty(); });
   std::vector<double> times = ShiftedTimes(frames);
-  if (*std::max_element(times.begin(), times.end()) == 0.0) {
+  if (*std::ranges::max_element(times) == 0.0) {
     result.note =
         fmt::format("all {} frames were taken at one time: the scene is static", frames.size());
     return result;
   }
-  const bool by_folder = !named && SomeShareATime(times);
+  const bool by_folder = !named && HasEqualTimes(times);
   std::map<std::string, int> shots;
   std::vector<std::string> camera(frames.size());
   for (size_t i = 0; i < frames.size(); ++i) {
@@ -204,6 +201,15 @@ FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
             : ", or give each camera a folder (in transforms.json also: each frame a \"camera\")");
   }
   return result;
+}
+
+void AddMoments(FrameMoments moments,
+                Scene* scene,
+                std::vector<std::string>* warnings,
+                std::vector<std::string>* cameras) {
+  for (size_t i = 0; i < scene->views.size(); ++i) scene->views[i].moment = moments.moments[i];
+  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
+  if (cameras != nullptr) *cameras = std::move(moments.cameras);
 }
 
 }  // namespace color3d

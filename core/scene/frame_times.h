@@ -27,11 +27,17 @@ struct FrameMoments {
 // Keeps the times, shifted so that the earliest is 0; times closer than a millionth of the whole
 // range are made equal. Without camera names: if frames share a time, each folder is a camera; else
 // all frames are of one camera. If several cameras follow one clock to a quarter of its step (the
-// median step), all frames of a tick get the time of its earliest frame; the note says so if the
-// difference is more than rounding. Without moments, with a note, if all times are equal: nothing
+// median step), all frames of a tick get the time of its earliest frame; a note reports
+// differences beyond rounding. Without moments, with a note, if all times are equal: nothing
 // can move. Throws Error{kInvalidArgument} that names the frames if only some have a time, only
 // some name a camera, two of one camera have the same time, or times are too far apart for a
 // number.
 FrameMoments MomentsOf(const std::vector<FrameTime>& frames);
+// Gives the views of the scene their moments, in order. `warnings` (may be null) receives the note,
+// `cameras` (may be null) the names of the cameras.
+void AddMoments(FrameMoments moments,
+                Scene* scene,
+                std::vector<std::string>* warnings,
+                std::vector<std::string>* cameras);
 
 }  // namespace color3d

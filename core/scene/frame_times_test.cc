@@ -28,7 +28,7 @@ TEST(FrameTimes, OrdersFramesOfOneCamera) {
   EXPECT_EQ(m.moments[1], (Moment{0.0, 0}));
   EXPECT_EQ(m.moments[2], (Moment{0.5, 0}));
   EXPECT_EQ(m.cameras.size(), 1u);
-  // Folders mean nothing where no two frames share a time.
+  // Folders are no cameras if no two frames share a time.
   EXPECT_EQ(MomentsOf({Frame("a/1.png", 0), Frame("b/2.png", 1)}).cameras.size(), 1u);
 }
 
@@ -64,7 +64,7 @@ TEST(FrameTimes, MergesTimesThatDifferByRounding) {
   EXPECT_EQ(m.moments[4]->time_s, 0.4);
 }
 
-// Frames at 29.97 a second as a container with so many ticks a second says when they are.
+// Times of frames at 29.97 fps, rounded to the ticks of a container.
 std::vector<FrameTime> Rounded(const std::string& camera, int ticks, double offset_s, int count) {
   std::vector<FrameTime> frames;
   for (int i = 0; i < count; ++i) {

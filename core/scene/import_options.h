@@ -18,7 +18,7 @@ struct ImportOptions {
   // Dynamic scenes of several cameras: hold out all views of this camera, by name or folder. Empty:
   // none.
   std::string hold_out_camera;
-  // Views with times: hold out this share of the moments as one block in the middle
+  // Views with times: hold out this share of the times as one block in the middle
   // (import/hold_out.h). 0: none.
   double hold_out_block = 0.0;  // 0..0.5
   // Structure-from-motion (only when the input has no poses).

@@ -77,7 +77,7 @@ Camera Zoomed(const Camera& camera, double factor) {
 bool IsUndistorted(const Distortion& distortion) {
   if (distortion.model == Distortion::Model::kFisheye) return false;
   return distortion.model == Distortion::Model::kNone ||
-         std::all_of(distortion.k.begin(), distortion.k.end(), [](double k) { return k == 0.0; });
+         std::ranges::all_of(distortion.k, [](double k) { return k == 0.0; });
 }
 
 Eigen::Vector2d Distort(const Distortion& distortion, const Eigen::Vector2d& p) {

@@ -72,7 +72,7 @@ TEST(Lens, UndistortedPictureHasNoEmptyBorders) {
       }
     }
     EXPECT_GT(closest, -0.51);
-    EXPECT_LT(closest, 0.0);  // and it touches the border: nothing is thrown away without need
+    EXPECT_LT(closest, 0.0);  // it touches the border: no pixel is lost needlessly
   }
 }
 

@@ -1,9 +1,10 @@
 #include "core/scene/named_files.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
+#include <span>
 #include <utility>
 
 #include "core/base/files.h"
@@ -27,8 +28,8 @@ std::string WithoutEnding(const std::string& path) {
 }
 
 // Parts of a name below its drive, root or "..".
-std::vector<std::string> PartsOf(std::string name) {
-  std::replace(name.begin(), name.end(), '\\', '/');
+std::vector<std::string> SplitPath(std::string name) {
+  std::ranges::replace(name, '\\', '/');
   std::vector<std::string> parts;
   size_t begin = 0;
   while (begin <= name.size()) {
@@ -45,7 +46,8 @@ std::vector<std::string> PartsOf(std::string name) {
   return parts;
 }
 
-std::vector<std::string> FilesOf(const fs::path& scene_folder, bool (*is_one)(std::string_view)) {
+std::vector<std::string> ListNamedFiles(const fs::path& scene_folder,
+                                        bool (*is_one)(std::string_view)) {
   std::vector<std::string> files;
   for (std::string& file : ListFiles(scene_folder)) {
     if (is_one(file) && !IsAugmentFile(file) && !IsMaskFile(file)) files.push_back(std::move(file));
@@ -66,12 +68,12 @@ NamedFiles::NamedFiles(std::vector<std::string> files) : files_(std::move(files)
 
 NamedFiles NamedFiles::Photos(const fs::path& scene_folder) {
   return NamedFiles(
-      FilesOf(scene_folder, [](std::string_view path) { return HasImageExtension(path); }));
+      ListNamedFiles(scene_folder, [](std::string_view path) { return HasImageExtension(path); }));
 }
 
 NamedFiles NamedFiles::Films(const fs::path& scene_folder) {
   return NamedFiles(
-      FilesOf(scene_folder, [](std::string_view path) { return HasFilmExtension(path); }));
+      ListNamedFiles(scene_folder, [](std::string_view path) { return HasFilmExtension(path); }));
 }
 
 const std::string* NamedFiles::Only(const Index& index, const std::string& key) {
@@ -104,7 +106,7 @@ NamedFiles::Match NamedFiles::LookUp(const std::string& path) const {
 }
 
 NamedFiles::Match NamedFiles::Look(const std::string& name) const {
-  std::vector<std::string> parts = PartsOf(name);
+  std::vector<std::string> parts = SplitPath(name);
   for (int left_out = 0; !parts.empty(); ++left_out) {
     std::string path;
     for (const std::string& part : parts) path += (path.empty() ? "" : "/") + part;
@@ -145,11 +147,10 @@ std::string ViewNameOf(std::string_view file) {
 }
 
 std::string SummarizeNames(const std::vector<std::string>& names, size_t most) {
-  std::string text;
-  for (size_t i = 0; i < std::min(names.size(), most); ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
-  }
-  return names.size() > most ? fmt::format("{} and {} more", text, names.size() - most) : text;
+  const std::span shown(names.data(), std::min(names.size(), most));
+  std::string text = fmt::format("{}", fmt::join(shown, ", "));
+  if (names.size() > most) text += fmt::format(" and {} more", names.size() - most);
+  return text;
 }
 
 }  // namespace color3d

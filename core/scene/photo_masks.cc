@@ -8,10 +8,12 @@
 #include <set>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/lower_case.h"
 #include "core/image/codec.h"
 #include "core/scene/named_files.h"
+#include "core/scene/photos.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -51,8 +53,7 @@ bool HasTransparency(const fs::path& file, const std::string& name) {
 class MaskFiles {
  public:
   explicit MaskFiles(const fs::path& scene_folder) {
-    std::error_code none;
-    if (!fs::is_directory(scene_folder / kFolder, none)) return;
+    if (!IsFolder(scene_folder / kFolder)) return;
     for (const std::string& file : ListFiles(scene_folder / kFolder)) {
       all_.insert(kFolder + file);
       by_lower_case_.emplace(LowerCase(kFolder + file), kFolder + file);
@@ -70,8 +71,6 @@ class MaskFiles {
   std::set<std::string> all_;
   std::multimap<std::string, std::string> by_lower_case_;
 };
-
-std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
 
 }  // namespace
 
@@ -138,8 +137,8 @@ Image ReadMask(const fs::path& scene_folder,
   if (image.width != width || image.height != height) {
     throw InvalidArgument("{} is {}, the photo {}; save it at the photo's size",
                           what,
-                          Size(image.width, image.height),
-                          Size(width, height));
+                          SizeText(image.width, image.height),
+                          SizeText(width, height));
   }
   // Colour masks: mean of red, green and blue.
   const int first = is_alpha ? image.channels - 1 : 0;

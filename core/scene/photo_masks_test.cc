@@ -108,8 +108,7 @@ TEST_F(PhotoMasksTest, LeavesOutMasksOfDeletedPhotosWithNote) {
   EXPECT_THAT(FindMasks(root(), {"images/a.jpg"}, {}, &warnings), ElementsAre("masks/A.PNG"));
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_THAT(warnings[0],
-              HasSubstr("1 of 2 masks are of no photo and were left out: "
-                        "masks/gone.jpg.png"));
+              HasSubstr("1 of 2 masks are of no photo and were left out: masks/gone.jpg.png"));
 }
 
 TEST_F(PhotoMasksTest, ReducedPixelNeedsFullCoverage) {
@@ -139,9 +138,9 @@ TEST_F(PhotoMasksTest, FollowSceneAndLens) {
   ASSERT_EQ(mask->width, working.width);
   EXPECT_EQ(mask->At(0, 5, working.width / 2 - 2), 0.0f);
   EXPECT_EQ(mask->At(0, 5, working.width / 2 + 1), 1.0f);
-  EXPECT_EQ(images.Mask(1), mask) << "kept";
+  EXPECT_EQ(images.Mask(1), mask) << "cached";
 
-  // Points lose what the masked half has seen of them, and go when too little is left.
+  // Points lose their observations in the masked half and are dropped if too few remain.
   Scene pointed = again;
   pointed.points.clear();
   const Pose& pose = again.views[1].cam_from_world;

@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/catalogue/scene_files.h"
 #include "core/image/probe/focal_length.h"
 #include "core/image/probe/orientation.h"
 #include "core/image/probe/probe.h"
@@ -15,12 +16,6 @@
 namespace color3d {
 namespace fs = std::filesystem;
 namespace {
-
-bool StartsWith(const std::string& text, const std::string& prefix) {
-  return text.compare(0, prefix.size(), prefix) == 0;
-}
-
-std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
 
 // Returns true for the same shape up to the rounding of a downscaled copy: one pixel of the smaller
 // picture.
@@ -69,11 +64,11 @@ std::vector<Photo> ListPhotos(const fs::path& scene_folder) {
   std::vector<Photo> in_images, direct, deeper;
   for (const std::string& file : ListFiles(scene_folder)) {
     if (!HasImageExtension(file)) continue;
-    if (StartsWith(file, "images/")) {
+    if (file.starts_with("images/")) {
       in_images.push_back({file.substr(7), file});
     } else if (file.find('/') == std::string::npos) {
       direct.push_back({file, file});
-    } else if (!StartsWith(file, "augment/") && !StartsWith(file, "masks/")) {
+    } else if (!IsAugmentFile(file) && !IsMaskFile(file)) {
       deeper.push_back({file, file});
     }
   }
@@ -106,8 +101,8 @@ void FitViewToPhoto(const Photo& photo, View* view) {
         "photo {} has {} but its camera was calibrated for {}; use the photos that the poses were "
         "computed from",
         photo.name,
-        Size(photo.width, photo.height),
-        Size(camera.width, camera.height));
+        SizeText(photo.width, photo.height),
+        SizeText(camera.width, camera.height));
   }
   if (as_stored) {
     view->captured_camera = camera.Scaled(w, h);
@@ -128,6 +123,12 @@ void FitViewToPhoto(const Photo& photo, View* view) {
   } catch (const Error& e) {
     throw Error(e.code(), "photo {}: {}", photo.name, e.what());
   }
+}
+
+void FitViewToFile(const fs::path& scene_folder, View* view) {
+  Photo photo{view->name, view->image_file};
+  ProbePhoto(scene_folder, &photo);
+  FitViewToPhoto(photo, view);
 }
 
 }  // namespace color3d

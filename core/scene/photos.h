@@ -2,6 +2,8 @@
 // calibrated for stored pixels to the displayed picture. For this folder only.
 #pragma once
 
+#include <fmt/core.h>
+
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -24,6 +26,11 @@ struct Photo {
   int camera = 0;         // photos of different cameras never share a lens
 };
 
+// "640 x 480 px", for messages.
+inline std::string SizeText(int width, int height) {
+  return fmt::format("{} x {} px", width, height);
+}
+
 // Returns the photos in images/ (any depth) if there are some, else those directly in the folder,
 // else those in subfolders other than augment, masks and hidden ones. Sorted by name; sizes are not
 // read yet.
@@ -38,5 +45,7 @@ void ProbePhoto(const std::filesystem::path& scene_folder, Photo* photo);
 // sets the undistorted camera. Throws Error{kInvalidArgument} naming both sizes if the shapes
 // differ.
 void FitViewToPhoto(const Photo& photo, View* view);
+// Probes the photo of a view with name and image_file, and fits the view to it.
+void FitViewToFile(const std::filesystem::path& scene_folder, View* view);
 
 }  // namespace color3d

@@ -17,9 +17,17 @@ std::string_view Stem(std::string_view name) {
   return name.substr(0, dot);
 }
 
+std::vector<int> SelectViews(const std::vector<View>& views, bool held_out) {
+  std::vector<int> indices;
+  for (size_t i = 0; i < views.size(); ++i) {
+    if (views[i].held_out == held_out) indices.push_back(static_cast<int>(i));
+  }
+  return indices;
+}
+
 // Returns true unless all views have the same position and direction.
 bool HasPoses(const std::vector<View>& views) {
-  return std::any_of(views.begin(), views.end(), [&](const View& view) {
+  return std::ranges::any_of(views, [&](const View& view) {
     const Pose &one = view.cam_from_world, &first = views.front().cam_from_world;
     return one.translation != first.translation || one.rotation.coeffs() != first.rotation.coeffs();
   });
@@ -27,21 +35,9 @@ bool HasPoses(const std::vector<View>& views) {
 
 }  // namespace
 
-std::vector<int> Scene::TrainingViews() const {
-  std::vector<int> indices;
-  for (size_t i = 0; i < views.size(); ++i) {
-    if (!views[i].held_out) indices.push_back(static_cast<int>(i));
-  }
-  return indices;
-}
+std::vector<int> Scene::TrainingViews() const { return SelectViews(views, /*held_out=*/false); }
 
-std::vector<int> Scene::HeldOutViews() const {
-  std::vector<int> indices;
-  for (size_t i = 0; i < views.size(); ++i) {
-    if (views[i].held_out) indices.push_back(static_cast<int>(i));
-  }
-  return indices;
-}
+std::vector<int> Scene::HeldOutViews() const { return SelectViews(views, /*held_out=*/true); }
 
 int Scene::FindView(std::string_view name) const {
   int by_stem = -1;
@@ -65,9 +61,8 @@ int Scene::FindView(std::string_view name) const {
 }
 
 bool Scene::HasTimes() const {
-  return !views.empty() && std::all_of(views.begin(), views.end(), [](const View& view) {
-    return view.moment.has_value();
-  });
+  return !views.empty() &&
+         std::ranges::all_of(views, [](const View& view) { return view.moment.has_value(); });
 }
 
 CaptureKind Scene::kind() const {
@@ -79,9 +74,7 @@ CaptureKind Scene::kind() const {
 std::vector<int> Scene::ViewsInOrderOfTime() const {
   std::vector<int> order(views.size());
   std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-    return views[a].time_s() < views[b].time_s();
-  });
+  std::ranges::stable_sort(order, {}, [&](int i) { return views[i].time_s(); });
   return order;
 }
 
@@ -91,7 +84,7 @@ std::vector<double> Scene::Times() const {
   return {times.begin(), times.end()};
 }
 
-std::vector<int> Scene::FramesOfShotOf(int view) const {
+std::vector<int> Scene::FramesInShot(int view) const {
   std::vector<int> frames = ViewsInOrderOfTime();
   std::erase_if(frames, [&](int i) { return views[i].moment->shot != views[view].moment->shot; });
   return frames;

@@ -75,7 +75,7 @@ struct Scene {
   // The distinct times of the views, seconds, ascending.
   std::vector<double> Times() const;
   // Views of the shot of `view`, in order of time. Requires: the view has a moment.
-  std::vector<int> FramesOfShotOf(int view) const;
+  std::vector<int> FramesInShot(int view) const;
   // 1.1 x the largest distance of a training camera from their mean (3DGS "extent"); 1 when zero.
   double Extent() const;
   // In the world's units and frame.

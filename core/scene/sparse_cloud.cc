@@ -32,7 +32,7 @@ double Baseline(const Scene& scene, const Eigen::Vector3d& mean) {
   return radius > 1e-12 ? radius : 1.0;
 }
 
-bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
+bool IsVisible(const View& view, const Eigen::Vector3d& world, double near) {
   const Eigen::Vector3d p = view.cam_from_world.Apply(world);
   if (p.z() <= 0.0 || p.z() < near) return false;
   return view.camera.Contains(view.camera.Project(p));
@@ -41,12 +41,12 @@ bool Sees(const View& view, const Eigen::Vector3d& world, double near) {
 std::vector<int> AllViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
   std::vector<int> views;
   for (size_t i = 0; i < scene.views.size(); ++i) {
-    if (Sees(scene.views[i], world, near)) views.push_back(static_cast<int>(i));
+    if (IsVisible(scene.views[i], world, near)) views.push_back(static_cast<int>(i));
   }
   return views;
 }
 
-bool MostLookAt(const Scene& scene, const Eigen::Vector3d& world) {
+bool IsInFrontOfMostViews(const Scene& scene, const Eigen::Vector3d& world) {
   size_t in_front = 0;
   for (const View& view : scene.views) in_front += view.cam_from_world.Apply(world).z() > 0.0;
   return 2 * in_front > scene.views.size();
@@ -61,7 +61,7 @@ struct DepthRange {
 // Range around the point where the axes meet. Measured on three scenes without their points
 // (held-out luminance after 800 iterations at 252 px): 0.4 to 1.4 dB better than a box around the
 // focus, which is better than a range of 0.3..4, whose nearest points hide all others.
-DepthRange RangeOf(const View& view, const Eigen::Vector3d& focus, double distance) {
+DepthRange PlausibleDepths(const View& view, const Eigen::Vector3d& focus, double distance) {
   const double depth = std::max(view.cam_from_world.Apply(focus).z(), distance);
   return {0.6 * depth, 2.0 * depth};
 }
@@ -90,11 +90,11 @@ Eigen::Vector3d FocusPoint(const Scene& scene) {
   }
   const Eigen::Vector3d focus = a.ldlt().solve(b);
   // Diverging axes meet behind the cameras; that point is useless.
-  return MostLookAt(scene, focus) ? focus : fallback;
+  return IsInFrontOfMostViews(scene, focus) ? focus : fallback;
 }
 
 std::vector<int> ViewsFacing(const Scene& scene, const Eigen::Vector3d& world, double near) {
-  return EvenlyOf(AllViewsFacing(scene, world, near), kMaxListedViews);
+  return PickEvenly(AllViewsFacing(scene, world, near), kMaxListedViews);
 }
 
 std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t seed) {
@@ -106,7 +106,8 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
   for (const View& view : scene.views) distance += (view.cam_from_world.Center() - focus).norm();
   distance /= static_cast<double>(scene.views.size());
   // Cameras look outward from one place: the scene is around them.
-  if (!MostLookAt(scene, focus)) distance = std::max(distance, 5.0 * Baseline(scene, mean));
+  if (!IsInFrontOfMostViews(scene, focus))
+    distance = std::max(distance, 5.0 * Baseline(scene, mean));
   const double near = 0.15 * distance;
   const size_t wanted_views = std::max<size_t>(2, (scene.views.size() + 3) / 4);
   // Views without any overlap would never give a point: after enough misses one view is enough.
@@ -116,7 +117,7 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     if (static_cast<int>(points.size()) == count) break;
     // Picks pixels of all views in turn, at a depth uniform in 1 / z, as parallax is.
     const View& view = scene.views[attempt % static_cast<int64_t>(scene.views.size())];
-    const DepthRange range = RangeOf(view, focus, 0.3 * distance);
+    const DepthRange range = PlausibleDepths(view, focus, 0.3 * distance);
     const double z = 1.0 / random.NextUniform(1.0 / range.far, 1.0 / range.near);
     const double u = random.NextUniform(0.0, view.camera.width);
     const double v = random.NextUniform(0.0, view.camera.height);
@@ -125,7 +126,7 @@ std::vector<SparsePoint> RandomPoints(const Scene& scene, int count, uint64_t se
     point.views = AllViewsFacing(scene, point.position, near);
     const bool relaxed = attempt >= patience;
     if (point.views.size() < (relaxed ? 1 : std::min(wanted_views, scene.views.size()))) continue;
-    point.views = EvenlyOf(std::move(point.views), kMaxListedViews);
+    point.views = PickEvenly(std::move(point.views), kMaxListedViews);
     point.reprojection_error_px = -1.0;
     points.push_back(std::move(point));
   }

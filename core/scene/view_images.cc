@@ -21,6 +21,7 @@
 #include "core/image/reduced.h"
 #include "core/scene/lens.h"
 #include "core/scene/photo_masks.h"
+#include "core/scene/photos.h"
 
 namespace color3d {
 namespace {
@@ -104,8 +105,6 @@ bool SameLens(const View& x, const View& y) {
          x.distortion.k == y.distortion.k;
 }
 
-std::string Size(int width, int height) { return fmt::format("{} x {} px", width, height); }
-
 }  // namespace
 
 struct ViewImages::Impl {
@@ -146,7 +145,7 @@ struct ViewImages::Impl {
   // and times for photos of 50 megapixels.
   int RemapSide() const { return max_side_px > 0 ? 2 * max_side_px : 0; }
 
-  std::shared_ptr<const RemapTable> TableOf(int view) {
+  std::shared_ptr<const RemapTable> FindTable(int view) {
     constexpr size_t kMaxTables = 4;
     const int lens = lens_of_view[view];
     {
@@ -171,8 +170,8 @@ struct ViewImages::Impl {
     if (width == c.width && height == c.height) return;
     throw InvalidArgument("view {} was captured at {} but this picture of it has {}",
                           v.name,
-                          Size(c.width, c.height),
-                          Size(width, height));
+                          SizeText(c.width, c.height),
+                          SizeText(width, height));
   }
 
   // Size at which a picture of size `own` is undistorted; the working size if there is no
@@ -188,7 +187,7 @@ struct ViewImages::Impl {
     const View& v = At(view);
     if (IsUndistorted(v.distortion)) return picture;
     const Camera working = v.camera.FitWithin(max_side_px);
-    return Resize(Remap(picture, *TableOf(view)), working.width, working.height);
+    return Resize(Remap(picture, *FindTable(view)), working.width, working.height);
   }
 
   Image Undistorted(int view, const Image& captured) {
@@ -278,7 +277,7 @@ Image ViewImages::Srgb(int view) const {
   Image image = impl_->Load(view);
   if (image.channels == 3) return image;
   Image srgb(image.width, image.height, 3);
-  for (int c = 0; c < 3; ++c) std::copy(image.data.begin(), image.data.end(), srgb.Plane(c));
+  for (int c = 0; c < 3; ++c) std::ranges::copy(image.data, srgb.Plane(c));
   return srgb;
 }
 

@@ -115,7 +115,7 @@ TEST(ViewImages, CacheStaysWithinBudget) {
   const std::weak_ptr<const Image> first = images.Luminance(0);
   const std::weak_ptr<const Image> second = images.Luminance(1);
   EXPECT_FALSE(first.expired());
-  EXPECT_EQ(images.Luminance(0), first.lock());  // from the cache, and now the younger of the two
+  EXPECT_EQ(images.Luminance(0), first.lock());  // from the cache, and now the most recently used
   images.Luminance(2);
   EXPECT_FALSE(first.expired());
   EXPECT_TRUE(second.expired());

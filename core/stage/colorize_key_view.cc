@@ -50,7 +50,7 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
   if (result.confidence.Empty()) {
     color.ab = images.Undistort(key, result.ab);
   } else if (additional) {
-    color = UndistortGiven(result.ab, result.confidence, key, images);
+    color = UndistortGivenColors(result.ab, result.confidence, key, images);
   } else {
     color = {images.Undistort(key, result.ab), images.Undistort(key, result.confidence)};
   }

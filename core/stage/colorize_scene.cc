@@ -263,12 +263,12 @@ ReportRow KeyPictures(const std::string& name, const StageContext& context) {
   return row;
 }
 
-void PassOnResults(StageContext& context) {
+void ForwardResults(StageContext& context) {
   for (const Stage& stage : StageCatalogue()) {
     for (const char* result : stage.results) {
-      if (context.HasInput(result)) context.PassOn(result);
+      if (context.HasInput(result)) context.ForwardInput(result);
       if (!std::string_view(result).ends_with('/')) continue;
-      for (const std::string& name : context.InputsBelow(result)) context.PassOn(name);
+      for (const std::string& name : context.InputsBelow(result)) context.ForwardInput(name);
     }
   }
 }
@@ -317,7 +317,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   context.WriteOutput(artifact::kAllCurves, CurvesToCsv(curves));
   context.WriteOutput(artifact::kPlan, PlanToJson(data.plan));
   context.WriteOutput(artifact::kReport, RenderReport(data));
-  PassOnResults(context);
+  ForwardResults(context);
 }
 
 }  // namespace color3d

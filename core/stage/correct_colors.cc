@@ -31,7 +31,7 @@ constexpr size_t kPlacesOfAllViews = 3000;  // candidates of proposals
 constexpr double kHardlyKnown = 0.2;        // least share of a stroke that lies on the geometry
 
 // Marks masked pixels as seen, so that no stroke is proposed for them.
-void SetSeenWhereMasked(const Image& mask, PlacedPicture* picture) {
+void MarkMaskedAsSeen(const Image& mask, PlacedPicture* picture) {
   if (picture->seen.Empty()) picture->seen = Image(mask.width, mask.height, 1);
   for (size_t i = 0; i < mask.data.size(); ++i) {
     if (mask.data[i] == 0.0f) picture->seen.data[i] = 1.0f;
@@ -69,7 +69,7 @@ class ColoredViews {
       picture.seen = Image(provenance.width, provenance.height, 1);
       std::copy_n(provenance.Plane(1), picture.seen.data.size(), picture.seen.data.begin());
     }
-    if (mask) SetSeenWhereMasked(*mask, &picture);
+    if (mask) MarkMaskedAsSeen(*mask, &picture);
     return picture;
   }
   Image Provenance(int view, const Image& size) const {
@@ -105,7 +105,7 @@ double Mean(const Image& picture) {
   return sum / static_cast<double>(std::max<size_t>(picture.data.size(), 1));
 }
 
-void WarnIfOffTheGeometry(const Painted& painted, const std::string& name, StageContext& context) {
+void WarnIfGeometryDiffers(const Painted& painted, const std::string& name, StageContext& context) {
   const Image& position = painted.correction.picture.position;
   double known = 0.0, all = 0.0;
   for (size_t i = 0; i < painted.correction.painted.data.size(); ++i) {
@@ -134,7 +134,7 @@ Painted ReadCorrection(const ColorCorrection& wanted,
                       ReadKeyPhoto(context.scene_folder() / view.image_file, context.MemoryBytes()),
                       correction.picture.ab,
                       context);
-  CarriedColor undistorted = UndistortGiven(given.ab, given.given, index, views.images());
+  CarriedColor undistorted = UndistortGivenColors(given.ab, given.given, index, views.images());
   correction.ab = std::move(undistorted.ab);
   correction.painted = std::move(undistorted.confidence);
   if (const auto mask = views.images().Mask(index)) {
@@ -143,7 +143,7 @@ Painted ReadCorrection(const ColorCorrection& wanted,
       throw InvalidArgument("all that it paints is masked out; paint other pixels");
     }
   }
-  WarnIfOffTheGeometry(painted, view.name, context);
+  WarnIfGeometryDiffers(painted, view.name, context);
   return painted;
 }
 

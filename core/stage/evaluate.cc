@@ -162,7 +162,7 @@ class HeldOutScores {
     if (bound_) {
       const Image lab = Rendered(*bound_, camera, view);
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab, mask.get());
-      scores["colorfulness_bound"] = ColorfulnessWhere(SrgbFromLab(lab), mask.get());
+      scores["colorfulness_bound"] = MaskedColorfulness(SrgbFromLab(lab), mask.get());
     }
     const std::string provenance = ProvenanceArtifact(context_, view);
     if (context_.HasInput(provenance)) {
@@ -185,7 +185,7 @@ class HeldOutScores {
   // Empty if no view was added.
   Scores Mean() const { return MeanOf(all_); }
   // Means for each way in which views are held out; empty for photos.
-  ordered_json MeanByHow() const {
+  ordered_json MeansByHoldOutKind() const {
     ordered_json json = ordered_json::object();
     for (const auto& [how, sum] : by_how_) {
       json[how] = {{"views", sum.views}};
@@ -223,7 +223,7 @@ class HeldOutScores {
   }
 
   const Scene& scene_;
-  const std::vector<HeldOutAs> how_;  // by view
+  const std::vector<HoldOutKind> how_;  // by view
   const std::optional<GaussianModel>& model_;
   const std::optional<GaussianModel>& bound_;
   StageContext& context_;
@@ -287,7 +287,7 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const Scores mean = scores.Mean();
   for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
   ordered_json json{{"mean", mean}, {"views", scores.views()}};
-  if (ordered_json by_how = scores.MeanByHow(); !by_how.empty()) {
+  if (ordered_json by_how = scores.MeansByHoldOutKind(); !by_how.empty()) {
     json["held_out"] = std::move(by_how);
   }
   json["consistency"] = JsonOf(consistency);

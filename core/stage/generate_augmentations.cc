@@ -47,7 +47,7 @@ struct Outcome {
 };
 
 // Number of pictures of each kind. Turns of disabled kinds are dropped.
-std::map<Kind, int> Deal(const AugmentationOptions& options) {
+std::map<Kind, int> AssignKinds(const AugmentationOptions& options) {
   std::map<Kind, int> counts;
   for (int i = 0; i < options.samples; ++i) {
     const Kind kind = kOrder[static_cast<size_t>(i) % std::size(kOrder)];
@@ -152,10 +152,10 @@ void MakeSurrogates(const std::map<Kind, int>& counts,
   }
 }
 
-void LeaveOutNeedless(const AugmentationOptions& options,
-                      const StageContext& context,
-                      std::map<Kind, int>* counts,
-                      Outcome* outcome) {
+void RemoveNeedless(const AugmentationOptions& options,
+                    const StageContext& context,
+                    std::map<Kind, int>* counts,
+                    Outcome* outcome) {
   if (options.samples > 0) {
     const std::pair<Kind, bool> switches[] = {{Kind::kOutpaint, options.outpaint},
                                               {Kind::kAnimate, options.animate},
@@ -246,8 +246,8 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
     }
   }
   const KeyPicture key = ReadKeyPicture(scene, key_index, options.max_side_px, context);
-  std::map<Kind, int> counts = Deal(options);
-  LeaveOutNeedless(options, context, &counts, &outcome);
+  std::map<Kind, int> counts = AssignKinds(options);
+  RemoveNeedless(options, context, &counts, &outcome);
   if (!scene.views[key_index].mask_file.empty()) LeaveOutMasked(&counts, &outcome);
   if (!options.backend.empty() && !counts.empty()) {
     const int side = std::max(options.max_side_px, kRemoteSidePx);

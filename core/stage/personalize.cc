@@ -72,7 +72,7 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
                                              const ViewImages& images,
                                              const StageContext& context) {
   std::vector<std::pair<double, TrainingPicture>> found;
-  for (int view : EvenlyOf(scene.TrainingViews(), kMaxViewsToLookAt)) {
+  for (int view : PickEvenly(scene.TrainingViews(), kMaxViewsToLookAt)) {
     const std::string name = ViewArtifact(artifact::kCarried, scene.views[view], ".png");
     if (view == key || !context.HasInput(name)) continue;
     const auto luminance = images.Luminance(view);

@@ -23,7 +23,7 @@ std::vector<int> ViewsToRender(const RenderOptions& options, const Scene& scene)
   if (views.empty()) {
     for (size_t i = 0; i < scene.views.size(); ++i) views.push_back(static_cast<int>(i));
   }
-  return EvenlyOf(std::move(views), static_cast<size_t>(options.max_views));
+  return PickEvenly(std::move(views), static_cast<size_t>(options.max_views));
 }
 
 // False for a model that came without the colours of the frames.

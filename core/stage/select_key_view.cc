@@ -79,13 +79,13 @@ void ChooseManually(const std::string& name,
 
 // Selects several key views. A view that the user names remains the first. Visibility between views
 // comes from the geometry of an earlier job, if there is one.
-void ChooseTogether(const SelectKeyViewOptions& options,
-                    const Scene& scene,
-                    const std::vector<int>& candidates,
-                    const std::vector<bool>& kept,
-                    bool is_film,
-                    StageContext& context,
-                    KeyViewRanking* ranking) {
+void ChooseKeyViewSet(const SelectKeyViewOptions& options,
+                      const Scene& scene,
+                      const std::vector<int>& candidates,
+                      const std::vector<bool>& kept,
+                      bool is_film,
+                      StageContext& context,
+                      KeyViewRanking* ranking) {
   int first = -1;
   if (options.selection.strategy == KeyViewStrategy::kManual) {
     ChooseManually(options.view, scene, candidates, ranking);
@@ -171,11 +171,11 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
   }
   ranking->strategy = StrategyName(strategy);
   ranking->selection = RankViews(std::move(guarded), scores);
-  if (is_film && TakeFromLongestShot(scene, candidates, &ranking->selection)) {
+  if (is_film && PreferLongestShot(scene, candidates, &ranking->selection)) {
     ranking->among = "the film's longest shot";
   }
   if (options.count > 1) {
-    ChooseTogether(stage_options, scene, candidates, kept, is_film, context, ranking);
+    ChooseKeyViewSet(stage_options, scene, candidates, kept, is_film, context, ranking);
   }
 }
 

@@ -26,11 +26,11 @@ constexpr size_t kMaxPictures =
     48;  // photos with a picture; the others have a name and a camera only
 
 // Adds the exported file and the confidence of its Gaussians in the same order.
-void TakeScene(const GaussianModel& model,
-               const ExportFrame& frame,
-               const ExportedFile& file,
-               StageContext& context,
-               ViewPage* page) {
+void AddScene(const GaussianModel& model,
+              const ExportFrame& frame,
+              const ExportedFile& file,
+              StageContext& context,
+              ViewPage* page) {
   page->file_scale = frame.scale;
   page->file_offset = frame.offset;
   page->file_is_compressed = file.name == artifact::kSog;
@@ -89,7 +89,7 @@ bool WriteViewPage(const Scene& scene,
   const RenderedView rendered = RenderView(model, camera, key.cam_from_world, context.pool());
 
   ViewPage page;
-  TakeScene(model, ExportFrameOf(scene), file, context, &page);
+  AddScene(model, ExportFrameOf(scene), file, context, &page);
   page.key_view = key_view;
   page.focus = FocusOf(key, camera, rendered.median_depth);
   page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);

@@ -114,7 +114,7 @@ TEST_F(FilmContainersTest, RecordingMayBeginInsideGroup) {
   for (int i = 10; i < frames; ++i) EXPECT_EQ(NumberOf(film.Read(i)), 50 - frames + i);
 }
 
-double ShareThatDiffers(const Image& x, const Image& y) {
+double DifferingShare(const Image& x, const Image& y) {
   size_t differ = 0;
   for (size_t i = 0; i < x.PlaneSize(); ++i)
     differ += std::abs(x.Plane(1)[i] - y.Plane(1)[i]) > 0.08f;
@@ -155,7 +155,7 @@ TEST_F(FilmContainersTest, FramesPredictedFromDamagedOneAreDamaged) {
     std::vector<bool> is_whole;
     for (int i = 0; i < kFrames; ++i) {
       try {
-        EXPECT_LT(ShareThatDiffers(film.Read(i), whole.Read(i)), 0.01) << "frame " << i;
+        EXPECT_LT(DifferingShare(film.Read(i), whole.Read(i)), 0.01) << "frame " << i;
         is_whole.push_back(true);
       } catch (const Error& e) {
         EXPECT_EQ(e.code(), ErrorCode::kDataLoss);

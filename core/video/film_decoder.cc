@@ -13,7 +13,7 @@ namespace {
 constexpr size_t kMostWaiting = 32;
 constexpr size_t kFewestWaiting = 4;
 constexpr size_t kWaitingBytes = size_t{512} << 20;
-size_t MostWaiting(const AVCodecContext& codec) {
+size_t MaxQueuedPackets(const AVCodecContext& codec) {
   const auto pixels = static_cast<size_t>(std::max(codec.width, 1)) * std::max(codec.height, 1);
   return std::clamp(kWaitingBytes / (3 * pixels), kFewestWaiting, kMostWaiting);
 }
@@ -23,7 +23,7 @@ constexpr int kResyncPackets = 250;
 
 // In other codecs packets may legitimately produce no picture: a repeat, or a picture that is never
 // shown.
-bool EveryPacketIsAPicture(AVCodecID codec) {
+bool IsIntraOnly(AVCodecID codec) {
   return codec == AV_CODEC_ID_H264 || codec == AV_CODEC_ID_HEVC ||
          codec == AV_CODEC_ID_MPEG2VIDEO || codec == AV_CODEC_ID_MPEG1VIDEO;
 }
@@ -94,15 +94,15 @@ bool FilmDecoder::IsBroken(int packet) const {
   return is_hit(group) || (index_.packets[packet].is_leading && is_hit(group + 1));
 }
 
-bool FilmDecoder::IsLike(int packet) const {
+bool FilmDecoder::HasSizeAndPosition(int packet) const {
   const FilmPacket& that = index_.packets[packet];
   return packet_->size == that.size && packet_->pos == that.pos;
 }
 
 // Positions are preferred to decoding times, which differ after a seek in Matroska.
-bool FilmDecoder::IsThat(int packet) const {
+bool FilmDecoder::IsPacket(int packet) const {
   const FilmPacket& that = index_.packets[packet];
-  return IsLike(packet) && (that.is_placed || packet_->dts == that.dts);
+  return HasSizeAndPosition(packet) && (that.is_placed || packet_->dts == that.dts);
 }
 
 // The nearest packet up to `packet` with a unique position; `packet` without one: it is then
@@ -121,7 +121,7 @@ bool FilmDecoder::ReadUpTo(int packet, bool to_the_end) {
   const int64_t dts = that.dts != AV_NOPTS_VALUE ? that.dts : that.stamp;
   while (true) {
     if (!packets_->Read(packet_.get())) return false;
-    if (IsThat(placed)) break;
+    if (IsPacket(placed)) break;
     const bool is_past =
         that.is_placed && packet_->pos >= 0 ? packet_->pos > that.pos : packet_->dts > dts;
     av_packet_unref(packet_.get());
@@ -131,7 +131,7 @@ bool FilmDecoder::ReadUpTo(int packet, bool to_the_end) {
     av_packet_unref(packet_.get());
     if (!packets_->Read(packet_.get())) return false;
   }
-  has_packet_ = IsLike(packet);
+  has_packet_ = HasSizeAndPosition(packet);
   return has_packet_;
 }
 
@@ -165,10 +165,10 @@ void FilmDecoder::StartAt(int packet) {
 
 // Index of the packet in packet_; -1: unknown.
 int FilmDecoder::Recognize() {
-  if (next_ < static_cast<int>(index_.packets.size()) && IsLike(next_)) return next_;
+  if (next_ < static_cast<int>(index_.packets.size()) && HasSizeAndPosition(next_)) return next_;
   const int end = std::min(next_ + kResyncPackets, static_cast<int>(index_.packets.size()));
   for (int packet = next_; packet < end; ++packet) {
-    if (IsThat(packet)) return packet;
+    if (IsPacket(packet)) return packet;
   }
   return -1;
 }
@@ -192,8 +192,8 @@ bool FilmDecoder::Feed() {
 }
 
 // Marks frames up to `frame` that were not output as missing.
-void FilmDecoder::PassTo(int frame) {
-  if (EveryPacketIsAPicture(codec_->codec_id)) {
+void FilmDecoder::MarkMissingUpTo(int frame) {
+  if (IsIntraOnly(codec_->codec_id)) {
     for (int missing = passed_ + 1; missing < frame; ++missing) {
       NoteDamage(index_.packet_of_frame[missing]);
     }
@@ -210,7 +210,7 @@ void FilmDecoder::Take(std::unique_ptr<AVFrame, FreeFrame> picture) {
   if (is_flagged) NoteDamage(static_cast<int>(packet));
   const FilmPacket& from = index_.packets[packet];
   if (!from.is_shown || from.frame <= passed_) return;
-  PassTo(from.frame);
+  MarkMissingUpTo(from.frame);
   waiting_.push_back({static_cast<int>(packet), is_flagged, std::move(picture)});
 }
 
@@ -226,7 +226,7 @@ bool FilmDecoder::Receive() {
     if (result != AVERROR_EOF && result != AVERROR(EAGAIN)) NoteDamage(next_ - 1);
     if (result == AVERROR_EOF || !Feed()) {
       has_ended_ = true;
-      PassTo(static_cast<int>(index_.stamps.size()));
+      MarkMissingUpTo(static_cast<int>(index_.stamps.size()));
     }
   }
   return false;
@@ -236,7 +236,7 @@ bool FilmDecoder::Receive() {
 // from may be shown after it. Returns false at the end.
 bool FilmDecoder::Await() {
   while (waiting_.empty() || (passed_ < index_.packets[waiting_.front().packet].latest &&
-                              waiting_.size() < MostWaiting(*codec_))) {
+                              waiting_.size() < MaxQueuedPackets(*codec_))) {
     if (!Receive()) break;
   }
   return !waiting_.empty();

@@ -40,14 +40,14 @@ class FilmDecoder {
   void StartAt(int packet);
   bool SeekTo(int packet, int goal);
   bool ReadUpTo(int packet, bool to_the_end);
-  bool IsLike(int packet) const;
-  bool IsThat(int packet) const;
+  bool HasSizeAndPosition(int packet) const;
+  bool IsPacket(int packet) const;
   int PlacedBefore(int packet) const;
   int Recognize();
   bool Feed();
   bool Receive();
   void Take(std::unique_ptr<AVFrame, FreeFrame> picture);
-  void PassTo(int frame);
+  void MarkMissingUpTo(int frame);
   bool Await();
   bool Find(int frame);
 

@@ -101,7 +101,7 @@ void RaiseFalls(double tick, std::vector<Scanned>* scanned) {
   }
 }
 
-bool LacksStamp(const Scanned* picture) { return picture->packet.stamp == AV_NOPTS_VALUE; }
+bool HasNoStamp(const Scanned* picture) { return picture->packet.stamp == AV_NOPTS_VALUE; }
 
 int64_t MeanStep(int64_t first, int64_t last, size_t steps) {
   return steps == 0 ? 0 : (last - first) / static_cast<int64_t>(steps);
@@ -116,7 +116,7 @@ void StampByType(const std::vector<Scanned*>& pictures, bool has_b) {
   }
   for (auto at = pictures.rbegin(); at != pictures.rend(); ++at) {
     Scanned& picture = **at;
-    if (LacksStamp(&picture)) picture.packet.stamp = picture.is_b || !has_b ? picture.dts : next;
+    if (HasNoStamp(&picture)) picture.packet.stamp = picture.is_b || !has_b ? picture.dts : next;
     if (!picture.is_b) next = picture.dts;
   }
 }
@@ -136,9 +136,9 @@ std::vector<Scanned*> ByNumber(std::vector<Scanned*> pictures) {
 // H.264 in AVI has decoding times, but no presentation times: the same times are assigned in the
 // order `shown`, `delay` pictures later or as late as necessary for no picture to be shown before
 // it is decoded.
-void DealStamps(const std::vector<Scanned*>& decoded,
-                const std::vector<Scanned*>& shown,
-                int delay) {
+void AssignStamps(const std::vector<Scanned*>& decoded,
+                  const std::vector<Scanned*>& shown,
+                  int delay) {
   std::vector<int64_t> stamps;
   for (const Scanned* picture : decoded) stamps.push_back(picture->dts);
   std::sort(stamps.begin(), stamps.end());
@@ -160,7 +160,7 @@ void SpreadStamps(const std::vector<Scanned*>& shown) {
   }
   if (known.size() < 2) return;
   for (size_t i = 0; i < shown.size(); ++i) {
-    if (!LacksStamp(shown[i])) continue;
+    if (!HasNoStamp(shown[i])) continue;
     const auto after = std::lower_bound(known.begin() + 1, known.end() - 1, i);
     const auto from = static_cast<int64_t>(*(after - 1)), to = static_cast<int64_t>(*after);
     const int64_t begin = shown[from]->packet.stamp, end = shown[to]->packet.stamp;
@@ -174,13 +174,13 @@ void StampPictures(std::vector<Scanned>* scanned, const AVCodecParameters& codec
     if (!picture.is_second) pictures.push_back(&picture);
   }
   const auto has_dts = [](const Scanned* picture) { return picture->dts != AV_NOPTS_VALUE; };
-  if (std::any_of(pictures.begin(), pictures.end(), LacksStamp)) {
+  if (std::any_of(pictures.begin(), pictures.end(), HasNoStamp)) {
     if (!HasNumbers(codec.codec_id)) {
       StampByType(pictures, codec.video_delay > 0);
-    } else if (!std::all_of(pictures.begin(), pictures.end(), LacksStamp)) {
+    } else if (!std::all_of(pictures.begin(), pictures.end(), HasNoStamp)) {
       SpreadStamps(ByNumber(pictures));
     } else if (std::all_of(pictures.begin(), pictures.end(), has_dts)) {
-      DealStamps(pictures, ByNumber(pictures), codec.video_delay);
+      AssignStamps(pictures, ByNumber(pictures), codec.video_delay);
     }
   }
   int64_t last = 0;

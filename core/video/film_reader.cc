@@ -70,10 +70,10 @@ FilmTransfer TransferOf(const AVFrame& frame) {
 
 // Side data of the frame, else of its stream; null if there is none or it is smaller than `Facts`.
 template <typename Facts>
-const Facts* DataBeside(const AVFrame& frame,
-                        AVFrameSideDataType of_frame,
-                        const AVStream& stream,
-                        AVPacketSideDataType of_stream) {
+const Facts* FindSideData(const AVFrame& frame,
+                          AVFrameSideDataType of_frame,
+                          const AVStream& stream,
+                          AVPacketSideDataType of_stream) {
   if (const AVFrameSideData* data = av_frame_get_side_data(&frame, of_frame);
       data != nullptr && data->size >= sizeof(Facts)) {
     return reinterpret_cast<const Facts*>(data->data);
@@ -86,15 +86,15 @@ const Facts* DataBeside(const AVFrame& frame,
 // Peak luminance of a PQ film, cd/m2: as stated, else that of its mastering display.
 double PeakNits(const AVFrame& frame, const AVStream& stream) {
   double peak = 0.0;
-  if (const auto* light = DataBeside<AVContentLightMetadata>(
+  if (const auto* light = FindSideData<AVContentLightMetadata>(
           frame, AV_FRAME_DATA_CONTENT_LIGHT_LEVEL, stream, AV_PKT_DATA_CONTENT_LIGHT_LEVEL)) {
     peak = light->MaxCLL;
   }
   const auto* display =
-      DataBeside<AVMasteringDisplayMetadata>(frame,
-                                             AV_FRAME_DATA_MASTERING_DISPLAY_METADATA,
-                                             stream,
-                                             AV_PKT_DATA_MASTERING_DISPLAY_METADATA);
+      FindSideData<AVMasteringDisplayMetadata>(frame,
+                                               AV_FRAME_DATA_MASTERING_DISPLAY_METADATA,
+                                               stream,
+                                               AV_PKT_DATA_MASTERING_DISPLAY_METADATA);
   if (peak <= 0.0 && display != nullptr && display->has_luminance != 0 &&
       display->max_luminance.den != 0) {
     peak = av_q2d(display->max_luminance);
@@ -107,9 +107,9 @@ double PeakNits(const AVFrame& frame, const AVStream& stream) {
 class FilmReader::Impl {
  public:
   Impl(const fs::path& file, const CancellationToken* cancel) : file_(file), film_(file, cancel) {
-    TakeTimes();
-    TakeFacts();
-    TakeFirstFrame();
+    ReadTimes();
+    ReadFacts();
+    ReadFirstFrame();
   }
 
   const FilmFacts& facts() const { return facts_; }
@@ -132,7 +132,7 @@ class FilmReader::Impl {
  private:
   std::string Name() const { return file_.filename().string(); }
 
-  void TakeTimes() {
+  void ReadTimes() {
     const std::vector<int64_t>& stamps = film_.index().stamps;
     const double tick = av_q2d(film_.packets().stream()->time_base);
     for (const int64_t stamp : stamps) {
@@ -148,7 +148,7 @@ class FilmReader::Impl {
     }
   }
 
-  void TakeFacts() {
+  void ReadFacts() {
     AVFormatContext* container = film_.packets().container();
     for (unsigned i = 0; i < container->nb_streams; ++i) {
       facts_.has_sound |= container->streams[i]->codecpar->codec_type == AVMEDIA_TYPE_AUDIO;
@@ -182,7 +182,7 @@ class FilmReader::Impl {
   }
 
   // Facts known only from decoded frames. Damaged frames are skipped; recordings begin with some.
-  void TakeFirstFrame() {
+  void ReadFirstFrame() {
     const int tries = std::min(kFirstTries, static_cast<int>(times_.size()));
     int frame = 0;
     while (frame < tries && !film_.Decode(frame)) ++frame;
@@ -197,10 +197,10 @@ class FilmReader::Impl {
                              Name()));
     }
     facts_.interlaced = picture.interlaced_frame != 0;
-    TakeTones(picture);
+    ReadTones(picture);
   }
 
-  void TakeTones(const AVFrame& picture) {
+  void ReadTones(const AVFrame& picture) {
     const FilmTransfer transfer = TransferOf(picture);
     const bool is_wide = picture.color_primaries == AVCOL_PRI_BT2020;
     if (transfer == FilmTransfer::kUsual && !is_wide) return;

@@ -29,14 +29,14 @@ constexpr const char* kAbout =
 ordered_json Numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 ordered_json Numbers(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
-ordered_json PhotoJson(const Stand& stand, const View& view, const std::string& jpeg) {
-  const StandingCamera standing = CameraOn(stand, view);
+ordered_json PhotoJson(const ScenePlacement& placement, const View& view, const std::string& jpeg) {
+  const PageCamera pose = PlaceCamera(placement, view);
   const Camera& camera = view.camera;
   return {{"name", view.name},
           {"held_out", view.held_out},
-          {"position", Numbers(standing.position)},
-          {"rotation", Numbers(standing.rotation)},
-          {"target", Numbers(standing.target)},
+          {"position", Numbers(pose.position)},
+          {"rotation", Numbers(pose.rotation)},
+          {"target", Numbers(pose.target)},
           {"aspect", static_cast<double>(camera.width) / camera.height},
           {"tan", 0.5 * camera.height / camera.fy},  // half the vertical field of view
           {"center", {camera.cx / camera.width, camera.cy / camera.height}},
@@ -73,27 +73,27 @@ std::string InHtml(const ordered_json& json) {
 }
 
 std::string Facts(const Scene& scene, const ViewPage& page) {
-  const Stand stand = StandOf(scene, page.key_view, page.focus);
+  const ScenePlacement placement = PlaceScene(scene, page.key_view, page.focus);
   ordered_json photos = ordered_json::array();
   int key = -1;
   for (const ViewPagePhoto& photo : page.photos) {
     if (photo.view == page.key_view) key = static_cast<int>(photos.size());
-    photos.push_back(PhotoJson(stand, scene.views.at(photo.view), photo.jpeg));
+    photos.push_back(PhotoJson(placement, scene.views.at(photo.view), photo.jpeg));
   }
   if (key < 0) throw InvalidArgument("the key view is not among the photos of the page");
   // page = placement of ((file - offset) / scale).
-  const double scale = stand.scale / page.file_scale;
-  const Eigen::Vector3d center = page.file_scale * stand.center + page.file_offset;
+  const double scale = placement.scale / page.file_scale;
+  const Eigen::Vector3d center = page.file_scale * placement.center + page.file_offset;
   return InHtml({{"scene", page.file_name},
                  {"packed", !page.file_is_compressed},
                  {"frame",
-                  {{"rotation", Numbers(stand.rotation)},
+                  {{"rotation", Numbers(placement.rotation)},
                    {"scale", scale},
-                   {"position", Numbers(Eigen::Vector3d(-scale * (stand.rotation * center)))}}},
+                   {"position", Numbers(Eigen::Vector3d(-scale * (placement.rotation * center)))}}},
                  {"confidence",
                   page.confidence.empty() ? "" : Base64(Gzip(ConfidenceBytes(page.confidence)))},
                  {"key", key},
-                 {"turn", TurnJson(TurnOf(scene, page.key_view, stand))},
+                 {"turn", TurnJson(TurnOf(scene, page.key_view, placement))},
                  {"poster", Base64(page.poster)},
                  {"about", fmt::format(kAbout, ViewerName(), ViewerLicense())},
                  {"photos", std::move(photos)}});

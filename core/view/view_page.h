@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/scene/scene.h"
-#include "core/view/stand.h"
+#include "core/view/scene_placement.h"
 
 namespace color3d {
 
@@ -38,7 +38,7 @@ struct ViewPage {
 };
 
 // Returns the whole file. Throws Error{kFailedPrecondition} without HasViewer(),
-// Error{kInvalidArgument} if the key view is not among the photos or has no focus (StandOf).
+// Error{kInvalidArgument} if the key view is not among the photos or has no focus (PlaceScene).
 std::string RenderViewPage(const Scene& scene, const ViewPage& page);
 
 // RFC 1952.

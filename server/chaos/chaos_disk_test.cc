@@ -34,7 +34,7 @@ bool Says(const char* file, const std::string& text) {
 }
 
 // What this thread and its children mount from now on, they alone see. Says why not, or nothing.
-std::string LeaveTheMountsOfOthers() {
+std::string UnshareMounts() {
   const uid_t user = ::geteuid();
   const gid_t group = ::getegid();
   if (::unshare(user == 0 ? CLONE_NEWNS : CLONE_NEWNS | CLONE_NEWUSER) != 0) {
@@ -55,7 +55,7 @@ class ChaosDiskTest : public ::testing::Test {
  protected:
   explicit ChaosDiskTest(const char* size = kDiskSize) : size_(size) {}
   void SetUp() override {
-    std::string why = LeaveTheMountsOfOthers();
+    std::string why = UnshareMounts();
     fs::create_directory(disk_);
     if (why.empty() && ::mount("none", disk_.c_str(), "tmpfs", 0, size_) != 0) {
       why = std::string("mount: ") + std::strerror(errno);

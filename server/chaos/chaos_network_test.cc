@@ -114,7 +114,7 @@ std::unique_ptr<User> Come(const std::string& address, const fs::path& folder) {
   }
 }
 
-std::string FatesOf(const std::vector<std::unique_ptr<CuttingProxy>>& proxies) {
+std::string DescribeFates(const std::vector<std::unique_ptr<CuttingProxy>>& proxies) {
   std::map<std::string, int> sum;
   for (const auto& proxy : proxies) {
     for (const auto& [name, count] : proxy->Fates()) sum[name] += count;
@@ -175,8 +175,8 @@ TEST(ChaosNetworkTest, ClientsEndWithEveryResultThroughABadNetwork) {
   const double seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   std::cout << jobs << " submissions of " << kClients
-            << " clients; connections: " << FatesOf(proxies) << "; " << service.Faults() << "; "
-            << failures.size() << " losses, " << seconds << " s\n";
+            << " clients; connections: " << DescribeFates(proxies) << "; " << service.Faults()
+            << "; " << failures.size() << " losses, " << seconds << " s\n";
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ Copy CopyBlob(const fs::path& from, const std::string& sha256, const fs::path& p
 enum class Kept { kGood, kDamaged, kNone };
 
 // What an earlier backup has of the blob. What it does not give is not good.
-Kept LookInCopy(const BlobStore& copy, const std::string& sha256) {
+Kept CheckCopy(const BlobStore& copy, const std::string& sha256) {
   const std::optional<StoredBlob> blob = copy.Look(sha256);
   if (!blob) return Kept::kNone;
   return IsIntact(copy, blob->digest) ? Kept::kGood : Kept::kDamaged;
@@ -71,7 +71,7 @@ CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const D
   const std::set<std::string> awaited = store.AwaitedBlobs();
   CopiedBlobs result;
   for (const std::string& sha256 : store.ReferencedBlobs()) {
-    const Kept kept = LookInCopy(target, sha256);
+    const Kept kept = CheckCopy(target, sha256);
     if (kept == Kept::kGood) {
       ++result.kept;
       continue;

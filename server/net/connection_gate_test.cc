@@ -48,7 +48,7 @@ class GateTest : public ::testing::Test {
     clients_.push_back(fd);
     return fd;
   }
-  bool AreHandedOn(size_t count) {
+  bool WaitForHandOver(size_t count) {
     std::unique_lock lock(mutex_);
     return wake_.wait_for(lock, kSoon, [&] { return handed_on_.size() >= count; });
   }
@@ -78,7 +78,7 @@ TEST_F(GateTest, ClosesSilentConnectionsToMakeRoom) {
   const int first = Connect("");
   for (int i = 0; i < 200; ++i) Connect("");
   Connect("x");
-  EXPECT_TRUE(AreHandedOn(1));
+  EXPECT_TRUE(WaitForHandOver(1));
   EXPECT_TRUE(IsEnded(first, kSoon));
   EXPECT_EQ(gate_->counts().refused, 0);
   EXPECT_LE(gate_->counts().silent + gate_->counts().open, 16);
@@ -89,10 +89,10 @@ TEST_F(GateTest, HandsOnBeforeFirstBytesWhileFewAreOpen) {
   limits.handed_on_at_once = 2;
   Open(limits);
   Connect(""), Connect("");
-  EXPECT_TRUE(AreHandedOn(2));
+  EXPECT_TRUE(WaitForHandOver(2));
   Connect("");
   EXPECT_FALSE(IsEnded(Connect("x"), milliseconds(0)));
-  EXPECT_TRUE(AreHandedOn(3)) << "the connection that sent bytes, not the silent one";
+  EXPECT_TRUE(WaitForHandOver(3)) << "the connection that sent bytes, not the silent one";
 }
 
 TEST_F(GateTest, ClosesSilentConnections) {
@@ -108,12 +108,12 @@ TEST_F(GateTest, ClosesOnlyConnectionsWithoutCall) {
   limits.max_connections = 8;
   Open(limits);
   const int busy = Connect("x");
-  ASSERT_TRUE(AreHandedOn(1));
+  ASSERT_TRUE(WaitForHandOver(1));
   gate_->BeginCall(NameOf(busy));
   const int idle = Connect("x");
   for (size_t i = 0; i < 40; ++i) {
     Connect("x");
-    ASSERT_TRUE(AreHandedOn(3 + i)) << "no room for connection " << i;
+    ASSERT_TRUE(WaitForHandOver(3 + i)) << "no room for connection " << i;
   }
   EXPECT_TRUE(IsEnded(idle, kSoon));
   EXPECT_FALSE(IsEnded(busy, milliseconds(0)));
@@ -122,7 +122,7 @@ TEST_F(GateTest, ClosesOnlyConnectionsWithoutCall) {
   gate_->EndCall(NameOf(busy));
   for (size_t i = 0; i < 40 && !IsEnded(busy, milliseconds(1)); ++i) {
     Connect("x");
-    ASSERT_TRUE(AreHandedOn(43 + i));
+    ASSERT_TRUE(WaitForHandOver(43 + i));
     gate_->BeginCall(NameOf(clients_.back()));
     if (i % 6 != 5) gate_->EndCall(NameOf(clients_.back()));
   }
@@ -135,7 +135,7 @@ TEST_F(GateTest, RefusesWhenAllConnectionsHaveCalls) {
   Open(limits);
   for (size_t i = 0; i < 4; ++i) {
     gate_->BeginCall(NameOf(Connect("x")));
-    ASSERT_TRUE(AreHandedOn(i + 1));
+    ASSERT_TRUE(WaitForHandOver(i + 1));
   }
   EXPECT_TRUE(IsEnded(Connect(""), kSoon));
   EXPECT_GT(gate_->counts().refused, 0);
@@ -144,7 +144,7 @@ TEST_F(GateTest, RefusesWhenAllConnectionsHaveCalls) {
   handed_on_.erase(handed_on_.begin());
   gate_->EndCall(NameOf(clients_.front()));
   Connect("x");
-  EXPECT_TRUE(AreHandedOn(4)) << "closed connections are not counted";
+  EXPECT_TRUE(WaitForHandOver(4)) << "closed connections are not counted";
 }
 
 TEST(PeerNameTest, EqualsNameOfGrpc) {

@@ -34,7 +34,7 @@ Error CannotListen(const std::string& address, const std::string& why) {
                why);
 }
 
-std::string WhyOf(int error) {
+std::string BindErrorText(int error) {
   return error == EADDRINUSE ? "the address is in use (is another server running?)"
                              : std::strerror(error);
 }
@@ -143,7 +143,7 @@ void ListenSockets::ListenOnUnix() {
   descriptors_.push_back(fd);
   if (::bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 ||
       ::listen(fd, kBacklog) != 0) {
-    throw CannotListen(address_, WhyOf(errno));
+    throw CannotListen(address_, BindErrorText(errno));
   }
   if (::stat(path_.c_str(), &status) == 0) inode_ = status.st_ino;
 }
@@ -158,7 +158,7 @@ void ListenSockets::ListenOnTcp() {
     if (port == 0 && everywhere) port = BindAll("0.0.0.0", parts.port, false, &error);
     if (error != EADDRINUSE || parts.port != "0") break;
   }
-  if (port == 0) throw CannotListen(address_, WhyOf(error));
+  if (port == 0) throw CannotListen(address_, BindErrorText(error));
   address_ = address_.substr(0, address_.rfind(':') + 1) + std::to_string(port);
 }
 

@@ -140,7 +140,7 @@ class NotifierTest : public JobStoreTest {
     return std::make_unique<Notifier>(
         *store_, [this] { return wall_.load(); }, options);
   }
-  bool NothingIsOwed() {
+  bool NoNotificationIsDue() {
     wall_ += int64_t{3600} * 1000;  // longer than any pause
     for (int i = 0; i < 1000 && store_->CountJobs().notifications > 0; ++i) {
       std::this_thread::sleep_for(milliseconds(5));
@@ -156,7 +156,7 @@ TEST_F(NotifierTest, RetriesUntilAcceptedAndSigns) {
   const JobRecord job = EndedJob(receiver.url());
   const auto notifier = Start({receiver.url()});
   ASSERT_TRUE(receiver.WaitFor(3));
-  EXPECT_TRUE(NothingIsOwed());
+  EXPECT_TRUE(NoNotificationIsDue());
   const auto requests = receiver.requests();
   EXPECT_EQ(requests.size(), 3u) << "not sent again once accepted";
   for (const Receiver::Request& request : requests) {
@@ -194,7 +194,7 @@ TEST_F(NotifierTest, StopsAfterHttpGone) {
   EndedJob(receiver.url());
   const auto notifier = Start({receiver.url()});
   ASSERT_TRUE(receiver.WaitFor(1));
-  EXPECT_TRUE(NothingIsOwed());
+  EXPECT_TRUE(NoNotificationIsDue());
 }
 
 TEST_F(NotifierTest, GivesUpAfterMaxTries) {
@@ -203,7 +203,7 @@ TEST_F(NotifierTest, GivesUpAfterMaxTries) {
   wall_ += int64_t{100} * 24 * 3600 * 1000;
   const auto notifier = Start({receiver.url()}, /*max_tries=*/3);
   EXPECT_TRUE(receiver.WaitFor(3)) << "a jump of the clock must not end the retries";
-  EXPECT_TRUE(NothingIsOwed());
+  EXPECT_TRUE(NoNotificationIsDue());
   EXPECT_EQ(receiver.requests().size(), 3u);
 }
 
@@ -261,7 +261,7 @@ TEST_F(NotifierTest, FullDiskCausesNoDuplicates) {
     FailWith(ClaimOne(), ErrorCode::kInvalidArgument);
     ASSERT_TRUE(receiver.WaitFor(3));
     full.is_full = false;
-    EXPECT_TRUE(NothingIsOwed()) << "the disk has room again";
+    EXPECT_TRUE(NoNotificationIsDue()) << "the disk has room again";
   }
   EXPECT_EQ(receiver.requests().size(), 3u);
 }

@@ -118,7 +118,7 @@ void CopySceneOptions(const ColorizeSceneSpec& options, JobSpec* spec) {
 }
 
 // Reason for carrying no colour; empty if colour is carried. `scene`: `given` over its preset.
-std::string WhyNothingIsCarried(const ColorizeSceneSpec& given, const ColorizeSceneSpec& scene) {
+std::string NoCarryReason(const ColorizeSceneSpec& given, const ColorizeSceneSpec& scene) {
   if (!scene.carry_color().skip()) return "";
   return given.carry_color().has_skip() ? "carry_color.skip is set"
                                         : "the preset carries no colour";
@@ -126,7 +126,7 @@ std::string WhyNothingIsCarried(const ColorizeSceneSpec& given, const ColorizeSc
 
 // Reason for generating no pictures; empty if they are generated. Files in augment/ are used on
 // request only.
-std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
+std::string NoAugmentationsReason(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
   const auto& spec = scene.generate_augmentations();
   if (spec.files() && facts.augment_files == 0) {
     throw InvalidArgument(
@@ -146,9 +146,9 @@ std::string WhyNoAugmentations(const ColorizeSceneSpec& scene, const SceneFacts&
 }
 
 // Reason why a stage has nothing to do for the scene; empty if it has, or if only import finds out.
-std::string WhyIdle(const std::string& kind,
-                    const SceneFacts& facts,
-                    const ColorizeSceneSpec& scene) {
+std::string IdleReason(const std::string& kind,
+                       const SceneFacts& facts,
+                       const ColorizeSceneSpec& scene) {
   return std::string(WhyNothingToDo(KindBeforeImport(facts, scene.import_scene()), kind));
 }
 
@@ -200,13 +200,13 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
       TrainAtFrameSize(scene.max_side_px(), spec.mutable_personalize());
     }
     std::string skip_reason;
-    if (kind == kind::kCarryColor) skip_reason = WhyNothingIsCarried(given, scene);
+    if (kind == kind::kCarryColor) skip_reason = NoCarryReason(given, scene);
     if (kind == kind::kCorrectColors && !given.has_correct_colors() &&
         scene.correct_colors().corrections().empty()) {
       skip_reason = "no corrections were given";
     }
-    if (kind == kind::kGenerateAugmentations) skip_reason = WhyNoAugmentations(scene, facts);
-    if (skip_reason.empty()) skip_reason = WhyIdle(kind, facts, scene);
+    if (kind == kind::kGenerateAugmentations) skip_reason = NoAugmentationsReason(scene, facts);
+    if (skip_reason.empty()) skip_reason = IdleReason(kind, facts, scene);
     builder->Add(std::move(spec), skip_reason);
   }
   builder->AddParent();

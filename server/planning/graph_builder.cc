@@ -14,13 +14,13 @@ namespace color3d {
 namespace {
 
 std::string ProviderOf(const std::string& artifact) {
-  const Stage* stage = StageThatLeaves(artifact);
+  const Stage* stage = FindProducer(artifact);
   if (stage == nullptr) throw Error(ErrorCode::kInternal, "no stage leaves '{}'", artifact);
   return stage->kind;
 }
 
 // Later stages do not depend on a job that only proposes corrections: they stay cached.
-bool OnlyProposes(const NewJob& job) {
+bool IsKeyViewProposal(const NewJob& job) {
   return job.kind == kind::kCorrectColors &&
          ParseSpec(job.spec, job.kind).correct_colors().corrections().empty();
 }
@@ -105,7 +105,7 @@ void GraphBuilder::LinkIfThere(const std::string& provider, NewJob* job) const {
   if (planned != planned_.end()) {
     const int index = planned->second;
     const NewJob& other = graph_.jobs[static_cast<size_t>(index)];
-    if (other.skip_reason.empty() && !OnlyProposes(other)) job->inputs.push_back(index);
+    if (other.skip_reason.empty() && !IsKeyViewProposal(other)) job->inputs.push_back(index);
   } else if (given != given_.end() &&
              (!IsFinished(given->second.state) || given->second.state == JobState::kSucceeded)) {
     job->input_jobs.push_back(given->second.name);

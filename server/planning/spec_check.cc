@@ -170,7 +170,7 @@ void CheckKeyColor(const v1::KeyColorSource& source, const std::string& path) {
       fmt::format(" is required: where the key view's colour comes from (image, strokes, points, "
                   "automatic, ...). To learn which photo is the key view, first run {} and read "
                   "its artifact {}; `automatic` needs nothing of the user",
-                  StageThatLeaves(artifact::kKeyView)->kind,
+                  FindProducer(artifact::kKeyView)->kind,
                   artifact::kKeyView));
 }
 

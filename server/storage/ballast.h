@@ -35,7 +35,7 @@ int64_t BallastBytes(const std::filesystem::path& folder);
 // Calls `body`, which frees space. If the disk is too full for that, calls it again after
 // `make_room` (may be empty) has freed some.
 template <typename Body>
-auto WithRoomMade(const std::function<bool()>& make_room, const Body& body) {
+auto RetryAfterMakingRoom(const std::function<bool()>& make_room, const Body& body) {
   try {
     return body();
   } catch (const Error& e) {

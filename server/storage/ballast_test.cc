@@ -29,12 +29,13 @@ TEST_F(StorageTest, RetriesDeletionOnceThereIsRoom) {
     return tries;
   };
   const std::function<bool()> make_room = [&] { return ++rooms == 1; };
-  EXPECT_EQ(WithRoomMade(make_room, full_at_first), 2);
+  EXPECT_EQ(RetryAfterMakingRoom(make_room, full_at_first), 2);
   tries = 0;
-  EXPECT_EQ(ReasonThrown([&] { WithRoomMade(make_room, full_at_first); }), "STORAGE_FULL")
+  EXPECT_EQ(ReasonThrown([&] { RetryAfterMakingRoom(make_room, full_at_first); }), "STORAGE_FULL")
       << "there is none left";
-  EXPECT_EQ(ReasonThrown(
-                [&] { WithRoomMade(make_room, [] { throw Error(ErrorCode::kNotFound, "no"); }); }),
+  EXPECT_EQ(ReasonThrown([&] {
+              RetryAfterMakingRoom(make_room, [] { throw Error(ErrorCode::kNotFound, "no"); });
+            }),
             "NOT_FOUND");
   EXPECT_EQ(rooms, 2) << "nothing is given up for another reason";
 }

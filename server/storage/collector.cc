@@ -17,8 +17,8 @@ std::map<std::string, StoredBlob> Unnamed(ChoreStore& store, const std::vector<S
 }
 
 // Candidates that are still what they were.
-std::vector<StoredBlob> StillUnnamed(const std::map<std::string, StoredBlob>& unnamed,
-                                     const std::vector<BlobCandidate>& candidates) {
+std::vector<StoredBlob> FilterUnnamed(const std::map<std::string, StoredBlob>& unnamed,
+                                      const std::vector<BlobCandidate>& candidates) {
   std::vector<StoredBlob> due;
   for (const BlobCandidate& candidate : candidates) {
     const auto blob = unnamed.find(candidate.sha256);
@@ -37,13 +37,13 @@ std::vector<StoredBlob> DueBlobs(ChoreStore& store,
   const std::map<std::string, StoredBlob> unnamed = Unnamed(store, blobs);
   std::vector<BlobCandidate> told;
   for (const auto& [sha256, blob] : unnamed) told.push_back({sha256, blob.touched_ns});
-  return StillUnnamed(unnamed, store.AgeCandidates(told, grace.count()));
+  return FilterUnnamed(unnamed, store.AgeCandidates(told, grace.count()));
 }
 
 std::vector<StoredBlob> DueBlobsSoFar(ChoreStore& store,
                                       const std::vector<StoredBlob>& blobs,
                                       std::chrono::milliseconds grace) {
-  return StillUnnamed(Unnamed(store, blobs), store.AgedCandidates(grace.count()));
+  return FilterUnnamed(Unnamed(store, blobs), store.AgedCandidates(grace.count()));
 }
 
 // Every caller that stores or looks for a blob touches it before it names it.

@@ -7,21 +7,21 @@
 namespace color3d {
 namespace {
 
-SceneRecord AsNamed(SceneRecord scene) {
+SceneRecord WithPublicName(SceneRecord scene) {
   scene.name = PublicScene(scene.name);
   return scene;
 }
-JobRecord AsNamed(JobRecord job) {
+JobRecord WithPublicName(JobRecord job) {
   job.scene = PublicScene(job.scene);
   return job;
 }
-ColorizerRecord AsNamed(ColorizerRecord colorizer) {
+ColorizerRecord WithPublicName(ColorizerRecord colorizer) {
   colorizer.scene = PublicScene(colorizer.scene);
   return colorizer;
 }
 template <typename Record>
-std::vector<Record> AsNamed(std::vector<Record> records) {
-  for (Record& record : records) record = AsNamed(std::move(record));
+std::vector<Record> WithPublicName(std::vector<Record> records) {
+  for (Record& record : records) record = WithPublicName(std::move(record));
   return records;
 }
 
@@ -49,29 +49,29 @@ SceneRecord ProjectStore::CreateScene(SceneRecord record,
                                       const SceneLimits& limits) const {
   record.name = Stored(record.name);
   record.project = project_;
-  return AsNamed(store_->CreateScene(record, Own(request), limits));
+  return WithPublicName(store_->CreateScene(record, Own(request), limits));
 }
 
 SceneRecord ProjectStore::GetScene(const std::string& name) const {
-  return AsNamed(store_->GetScene(Stored(name)));
+  return WithPublicName(store_->GetScene(Stored(name)));
 }
 
 std::vector<SceneRecord> ProjectStore::ListScenes(int64_t before_id, int limit) const {
-  return AsNamed(store_->ListScenes(project_, before_id, limit));
+  return WithPublicName(store_->ListScenes(project_, before_id, limit));
 }
 
 SceneRecord ProjectStore::ActivateScene(const std::string& name,
                                         CaptureLayout layout,
                                         int photo_count,
                                         const RequestKey& request) const {
-  return AsNamed(store_->ActivateScene(Stored(name), layout, photo_count, Own(request)));
+  return WithPublicName(store_->ActivateScene(Stored(name), layout, photo_count, Own(request)));
 }
 
 SceneRecord ProjectStore::AcceptKeyColor(const std::string& name,
                                          const std::string& job,
                                          const RequestKey& request) const {
   if (!job.empty()) RequireOwn(job);
-  return AsNamed(store_->AcceptKeyColor(Stored(name), job, Own(request)));
+  return WithPublicName(store_->AcceptKeyColor(Stored(name), job, Own(request)));
 }
 
 void ProjectStore::DeleteScene(const std::string& name, const RequestKey& request) const {
@@ -87,7 +87,7 @@ JobRecord ProjectStore::CreateGraph(NewGraph graph,
     job.scene = Stored(job.scene);
     for (const std::string& input : job.input_jobs) RequireOwn(input);
   }
-  return AsNamed(store_->CreateGraph(graph, Own(request), limits));
+  return WithPublicName(store_->CreateGraph(graph, Own(request), limits));
 }
 
 std::optional<std::string> ProjectStore::FindRequest(const RequestKey& request) const {
@@ -97,7 +97,7 @@ std::optional<std::string> ProjectStore::FindRequest(const RequestKey& request) 
 JobRecord ProjectStore::GetJob(const std::string& name) const {
   JobRecord job = store_->GetJob(name);
   if (job.project != project_) RequireOwn(name);
-  return AsNamed(std::move(job));
+  return WithPublicName(std::move(job));
 }
 
 std::vector<JobRecord> ProjectStore::ListJobs(JobFilter filter,
@@ -106,22 +106,22 @@ std::vector<JobRecord> ProjectStore::ListJobs(JobFilter filter,
                                               const ListBudget& budget) const {
   filter.project = project_;
   filter.scene = Stored(filter.scene);
-  return AsNamed(store_->ListJobs(filter, before_id, limit, budget));
+  return WithPublicName(store_->ListJobs(filter, before_id, limit, budget));
 }
 
 std::vector<JobRecord> ProjectStore::ListChildren(const std::string& name) const {
   RequireOwn(name);
-  return AsNamed(store_->ListChildren(name));
+  return WithPublicName(store_->ListChildren(name));
 }
 
 std::vector<JobRecord> ProjectStore::GetInputs(const JobRecord& job) const {
   RequireOwn(job.name);
-  return AsNamed(store_->GetInputs(job.id));
+  return WithPublicName(store_->GetInputs(job.id));
 }
 
 JobRecord ProjectStore::Cancel(const std::string& name, const RequestKey& request) const {
   RequireOwn(name);
-  return AsNamed(store_->Cancel(name, Own(request)));
+  return WithPublicName(store_->Cancel(name, Own(request)));
 }
 
 JobRecord ProjectStore::Retry(const std::string& name,
@@ -129,7 +129,7 @@ JobRecord ProjectStore::Retry(const std::string& name,
                               const RequestKey& request,
                               const QueueLimits& limits) const {
   RequireOwn(name);
-  return AsNamed(store_->Retry(name, from_scratch, Own(request), limits));
+  return WithPublicName(store_->Retry(name, from_scratch, Own(request), limits));
 }
 
 void ProjectStore::Delete(const std::string& name, const RequestKey& request) const {
@@ -140,19 +140,19 @@ void ProjectStore::Delete(const std::string& name, const RequestKey& request) co
 
 JobRecord ProjectStore::Pin(const std::string& name, bool pinned) const {
   RequireOwn(name);
-  return AsNamed(store_->Pin(name, pinned));
+  return WithPublicName(store_->Pin(name, pinned));
 }
 
 JobsSnapshot ProjectStore::Snapshot(const std::vector<int64_t>& job_ids) const {
   JobsSnapshot snapshot = store_->Snapshot(job_ids);
-  snapshot.jobs = AsNamed(std::move(snapshot.jobs));
+  snapshot.jobs = WithPublicName(std::move(snapshot.jobs));
   return snapshot;
 }
 
 LoadedJobs ProjectStore::LoadJobs(const std::vector<int64_t>& job_ids,
                                   const ListBudget& budget) const {
   LoadedJobs loaded = store_->LoadJobs(job_ids, budget);
-  loaded.jobs = AsNamed(std::move(loaded.jobs));
+  loaded.jobs = WithPublicName(std::move(loaded.jobs));
   return loaded;
 }
 
@@ -164,11 +164,11 @@ std::vector<int64_t> ProjectStore::ResolveWatch(const std::vector<std::string>& 
 std::vector<ColorizerRecord> ProjectStore::ListColorizers(const std::string& scene,
                                                           int64_t before_id,
                                                           int limit) const {
-  return AsNamed(store_->ListColorizers(project_, Stored(scene), before_id, limit));
+  return WithPublicName(store_->ListColorizers(project_, Stored(scene), before_id, limit));
 }
 
 ColorizerRecord ProjectStore::GetColorizer(const std::string& sha256) const {
-  return AsNamed(store_->GetColorizer(project_, sha256));
+  return WithPublicName(store_->GetColorizer(project_, sha256));
 }
 
 bool ProjectStore::HoldsBlob(const FileDigest& blob) const {

@@ -146,7 +146,7 @@ void SqliteDatabase::Exec(const char* sql) {
   if (code != SQLITE_OK) ThrowSqlite(db_, code, fmt::format("cannot run '{}'", sql));
 }
 
-void SqliteDatabase::BuildAnew(const std::filesystem::path& temporary) {
+void SqliteDatabase::Rebuild(const std::filesystem::path& temporary) {
   char* const before = sqlite3_temp_directory;
   sqlite3_temp_directory = sqlite3_mprintf("%s", temporary.c_str());
   Exec(kShrinkable);

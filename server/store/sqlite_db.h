@@ -65,7 +65,7 @@ class SqliteDatabase {
   void Exec(const char* sql);
   // Writes the whole file again, without what is free in it; nothing changes when it throws. What
   // it needs meanwhile lies in `temporary`. Not while other threads use any database.
-  void BuildAnew(const std::filesystem::path& temporary);
+  void Rebuild(const std::filesystem::path& temporary);
   // Prepares, binds and runs to the end; returns the number of rows changed.
   template <typename... Values>
   int64_t Run(std::string_view sql, const Values&... values) {

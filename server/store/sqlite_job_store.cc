@@ -33,7 +33,7 @@ SqliteJobStore::~SqliteJobStore() = default;
 
 namespace {
 
-ServiceError NoSuchJob(const std::string& name) {
+ServiceError JobNotFound(const std::string& name) {
   return ServiceError(ErrorReason::kJobNotFound, "there is no job '{}'", name);
 }
 
@@ -50,7 +50,7 @@ std::optional<JobRecord> SqliteJobStore::FindJob(SqliteDatabase& db, const std::
 
 JobRecord SqliteJobStore::RequireJob(SqliteDatabase& db, const std::string& name) {
   std::optional<JobRecord> job = FindJob(db, name);
-  if (!job) throw NoSuchJob(name);
+  if (!job) throw JobNotFound(name);
   return *std::move(job);
 }
 
@@ -277,7 +277,7 @@ std::vector<int64_t> SqliteJobStore::ResolveWatch(const std::vector<std::string>
   for (const std::string& name : names) {
     SqliteStatement select(db.handle(), "select job_id from job where name=?1 or parent=?1");
     select.Bind(name);
-    if (!select.Step()) throw NoSuchJob(name);
+    if (!select.Step()) throw JobNotFound(name);
     do {
       ids.insert(select.Int(0));
     } while (select.Step());

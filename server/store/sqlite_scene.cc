@@ -197,7 +197,7 @@ std::string IsColorizer(const char* artifact, const char* job) {
       artifact,
       job,
       artifact::kColorizer,
-      StageThatLeaves(artifact::kColorizer)->kind);
+      FindProducer(artifact::kColorizer)->kind);
 }
 
 constexpr char kColorizerColumns[] =

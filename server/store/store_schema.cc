@@ -76,7 +76,7 @@ void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
     return;
   }
   try {
-    db.BuildAnew(file.parent_path());
+    db.Rebuild(file.parent_path());
     spdlog::info("the job store was built anew: it gives back space from now on");
   } catch (const Error& e) {
     spdlog::warn("the job store cannot give back space yet: {}", e.what());
@@ -99,7 +99,7 @@ bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
 }
 
 // Writes nothing where nothing has changed: on a full disk the server still answers those who read.
-void SayWhoServes(SqliteDatabase& db, const ServerIdentity& identity) {
+void RecordServerIdentity(SqliteDatabase& db, const ServerIdentity& identity) {
   if (IsKnown(db, identity)) return;
   SqliteTransaction transaction(db);
   SqliteStatement before(db.handle(), "select 1 from server where boot_id=?");
@@ -148,7 +148,7 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
     Migrate(db);
   }
   MakeShrinkable(file, db);
-  SayWhoServes(db, identity);
+  RecordServerIdentity(db, identity);
 }
 
 }  // namespace color3d

@@ -47,7 +47,7 @@ Entry Split(const std::string& text, const std::string& flag, const std::string&
   return entry;
 }
 
-[[noreturn]] void GivenTwice(const std::string& flag, const std::string& name) {
+[[noreturn]] void RejectDuplicate(const std::string& flag, const std::string& name) {
   throw InvalidArgument("{} {} is given twice; give each name once", flag, name);
 }
 
@@ -70,13 +70,13 @@ UserModels ParseUserModels(const std::vector<std::string>& models,
   for (const std::string& text : models) {
     const Entry entry = Split(text, "--model", "FILE");
     if (!result.files.emplace(entry.name, fs::absolute(entry.value)).second) {
-      GivenTwice("--model", entry.name);
+      RejectDuplicate("--model", entry.name);
     }
   }
   for (const std::string& text : backends) {
     const Entry entry = Split(text, "--backend", "ADDRESS");
     if (!result.backends.emplace(entry.name, entry.value).second) {
-      GivenTwice("--backend", entry.name);
+      RejectDuplicate("--backend", entry.name);
     }
   }
   return result;

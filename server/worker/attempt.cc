@@ -406,7 +406,7 @@ void Attempt::GiveUp(StopReason reason) {
 
 }  // namespace
 
-void GiveBack(WorkerStore& store, const JobRecord& job) {
+void ReturnJob(WorkerStore& store, const JobRecord& job) {
   try {
     store.Release({job.id, job.lease_epoch}, job.usage);
   } catch (const std::exception& e) {
@@ -422,7 +422,7 @@ void RunAttempt(const AttemptContext& context, const JobRecord& job, bool shares
     // It was not begun, or its end could not be told: not the job's fault, and no attempt.
     spdlog::error("{} could not be run here: {}", AttemptTag(job), e.what());
     std::this_thread::sleep_for(context.timing.report_pause);
-    GiveBack(context.store, job);
+    ReturnJob(context.store, job);
   }
   ReleaseFreedMemory();
 }

@@ -149,7 +149,7 @@ class World {
       store_.ReapExpired();
       Try([&] { failing_store_.UpdateWorker({"worker", 1, "", 0, 0}); });
       if (const auto job = Claim()) {
-        const auto other = ClaimBeside(*job);
+        const auto other = ClaimConcurrently(*job);
         Attempt(*job);
         if (other) Attempt(*other);
       }
@@ -212,7 +212,7 @@ class World {
     Try([&] { job = failing_store_.Claim("worker", timing_.lease.count()); });
     return job;
   }
-  std::optional<JobRecord> ClaimBeside(const JobRecord& job) {
+  std::optional<JobRecord> ClaimConcurrently(const JobRecord& job) {
     const auto accept = [](const JobRecord& other) {
       return ParseSpec(other.spec, other.name).seed() == kBatched;
     };

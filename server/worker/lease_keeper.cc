@@ -113,7 +113,7 @@ void LeaseKeeper::StopStage(StopReason reason) {
 }
 
 // Stores progress and extends the lease, or at least looks whether the user wants it cancelled.
-void LeaseKeeper::Beat() {
+void LeaseKeeper::SendHeartbeat() {
   ProgressRecord progress;
   JobUsage usage;
   bool dirty = false;
@@ -163,7 +163,7 @@ void LeaseKeeper::Loop() {
       if (ending_) return;
       last_progress = last_progress_;
     }
-    Beat();
+    SendHeartbeat();
     const auto now = SteadyClock::now();
     // A worker that cannot reach the store stops before somebody else may take its job over.
     if (SteadyClock::now() - last_success_ > timing_.lease * 2 / 3) {

@@ -65,7 +65,7 @@ class LeaseKeeper : public ProgressObserver {
  private:
   using SteadyClock = std::chrono::steady_clock;
   void Loop();
-  void Beat();
+  void SendHeartbeat();
   void StopStage(StopReason reason);
   double SecondsSoFar() const;
   void UpdateEta() COLOR3D_REQUIRES(mutex_);

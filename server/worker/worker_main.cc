@@ -139,7 +139,7 @@ void LimitMemory(int64_t memory_mib) {
   constexpr int64_t kLeastBytes = int64_t{256} << 20;
   // Sanitizers reserve terabytes, which the kernel would count.
   constexpr int64_t kMostReserved = int64_t{1} << 40;
-  if (!BeEndedFirstWhenMemoryRunsOut()) {
+  if (!PreferAsOomVictim()) {
     spdlog::warn("the kernel may end the server before this worker when memory runs out");
   }
   if (memory_mib == 0) return;
@@ -168,7 +168,7 @@ void LimitMemory(int64_t memory_mib) {
 }
 
 // This process decodes untrusted files. Threads that were there before are OpenBLAS's own.
-void LockIn(const WorkerArguments& arguments) {
+void EnterSandbox(const WorkerArguments& arguments) {
   SetSandboxing(arguments.settings.sandbox);
   if (!arguments.settings.sandbox) return;
   ProcessLimits limits;  // cores would hold what strangers uploaded
@@ -232,7 +232,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
              arguments.settings.log_format,
              paths.Logs() / (arguments.options.name + ".log"));
     LimitMemory(arguments.settings.memory_mib);
-    LockIn(arguments);
+    EnterSandbox(arguments);
     if (arguments.inference.empty()) {
       Complete(&arguments);
       LogJobsTo(paths.JobLogs());

@@ -148,7 +148,7 @@ class FilmBench {
     constexpr size_t kFrames = 8;
     const Scene scene = ReadScene(context);
     const ViewImages images(scene, context.scene_folder(), kConsistencySidePx, 0);
-    const std::vector<int> views = EvenlyOf(scene.TrainingViews(), kFrames);
+    const std::vector<int> views = PickEvenly(scene.TrainingViews(), kFrames);
     double error = 0.0;
     for (const int view : views) {
       const auto luminance = images.Luminance(view);

@@ -60,7 +60,7 @@ bool TakeEarlier(const PipelineArguments& args, const char* kind, LocalPipeline*
   }
   if (place(kind) >= place(args.from_stage)) return false;
   for (const std::string& name : ListFiles(args.earlier_folder)) {
-    const Stage* stage = StageThatLeaves(name);
+    const Stage* stage = FindProducer(name);
     if (stage != nullptr && std::string_view(kind) == stage->kind) {
       pipeline->Take(name, std::filesystem::path(args.earlier_folder) / name);
     }

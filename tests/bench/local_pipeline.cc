@@ -12,9 +12,9 @@ namespace color3d {
 namespace {
 
 // Says errors and warnings as they come, and keeps the warnings.
-class SayingObserver : public ProgressObserver {
+class PrintingObserver : public ProgressObserver {
  public:
-  SayingObserver(std::string kind, const std::function<void(const std::string&)>& say)
+  PrintingObserver(std::string kind, const std::function<void(const std::string&)>& say)
       : kind_(std::move(kind)), say_(say) {}
 
   void OnProgress(int64_t, int64_t, const std::string&) override {}
@@ -67,7 +67,7 @@ void LocalPipeline::Run(const std::string& kind,
                         const std::function<void(StageContext&)>& stage,
                         const std::string& folder) {
   NoCheckpoints none;
-  SayingObserver observer(kind, say_);
+  PrintingObserver observer(kind, say_);
   CurveRecorder recorder(kind, observer, none);
   CancellationToken cancel;
   const ScratchFolder scratch;

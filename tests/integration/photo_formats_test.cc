@@ -77,9 +77,9 @@ TEST_F(PhotoFormatsTest, SandboxedWorkerReadsEveryFormat) {
           TiffFile({{.image = Resize(photos[2], 40, 30), .subfile_type = 1, .photometric = 2},
                     {.image = photos[2], .photometric = 2}}));
   // The same tones and other numbers.
-  WriteFileAtomic(
-      Path("room") / "images" / "view003.png",
-      WithPngProfile(EncodePng16(InSpaceOf(photos[3], ProPhotoProfile())), ProPhotoProfile()));
+  WriteFileAtomic(Path("room") / "images" / "view003.png",
+                  WithPngProfile(EncodePng16(ConvertToProfile(photos[3], ProPhotoProfile())),
+                                 ProPhotoProfile()));
   const std::string heic = HeicFile(photos[4]);
   if (!heic.empty()) Replace("view004", ".heic", heic);
 

@@ -7,7 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
+#include "client/lib/text.h"
 #include "core/base/text/lower_case.h"
 #include "core/base/text/name_order.h"
 #include "core/catalogue/scene_files.h"
@@ -78,21 +79,9 @@ constexpr Ending kEndings[] = {{".gif", Kind::kAnimation, "GIF"},
 
 const Ending* EndingOf(const fs::path& file) {
   const std::string ending = LowerCase(file.extension().string());
-  const auto* found = std::find_if(std::begin(kEndings), std::end(kEndings), [&](const Ending& e) {
-    return ending == e.ending;
-  });
+  const auto* found =
+      std::ranges::find_if(kEndings, [&](const Ending& e) { return ending == e.ending; });
   return found == std::end(kEndings) ? nullptr : found;
-}
-
-std::string Quoted(const std::string& name) {
-  const bool is_plain = std::all_of(name.begin(), name.end(), [](unsigned char c) {
-    return std::isalnum(c) != 0 ||
-           std::string_view("._-/%").find(static_cast<char>(c)) != std::string_view::npos;
-  });
-  if (is_plain) return name;
-  std::string quoted = "'";
-  for (const char c : name) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return quoted + "'";
 }
 
 // Returns FFmpeg's input pattern for all frames of which `file` is the first.
@@ -102,14 +91,14 @@ std::string FramesInput(const fs::path& file) {
   const auto end = std::find_if(stem.rbegin(), stem.rend(), is_digit).base();
   const auto begin =
       std::find_if_not(std::make_reverse_iterator(end), stem.rend(), is_digit).base();
-  if (begin == end) return "-i " + Quoted(file.string());
+  if (begin == end) return "-i " + ShellLine({file.string()});
   const std::string number(begin, end);
   const fs::path pattern =
       file.parent_path() /
       (std::string(stem.begin(), begin) +
        (number[0] == '0' && number.size() > 1 ? fmt::format("%0{}d", number.size()) : "%d") +
        std::string(end, stem.end()) + file.extension().string());
-  return fmt::format("-start_number {} -i {}", number, Quoted(pattern.string()));
+  return fmt::format("-start_number {} -i {}", number, ShellLine({pattern.string()}));
 }
 
 // Returns how to convert it to a film.
@@ -117,7 +106,7 @@ std::string Remedy(const fs::path& file, Kind kind) {
   switch (kind) {
     case Kind::kAnimation:
       return fmt::format("make a film of it: `ffmpeg -i {} -c:v ffv1 film.mkv`",
-                         Quoted(file.string()));
+                         ShellLine({file.string()}));
     case Kind::kFrame:
       return fmt::format("make a film of all frames: `ffmpeg -framerate 24 {} -c:v ffv1 film.mkv`",
                          FramesInput(file));
@@ -125,31 +114,31 @@ std::string Remedy(const fs::path& file, Kind kind) {
       return "export it with the camera maker's program, e.g. as ProRes in .mov";
     case Kind::kList:
       return fmt::format("save the film as one file: `ffmpeg -i {} -c copy film.mkv`",
-                         Quoted(file.string()));
+                         ShellLine({file.string()}));
     case Kind::kContainer:
       return fmt::format("save it in another container: `ffmpeg -i {} -c copy film.mkv`",
-                         Quoted(file.string()));
+                         ShellLine({file.string()}));
     case Kind::kNone:
       break;
   }
   return "";
 }
 
-std::string What(const Ending& ending) {
+std::string DescribeEnding(const Ending& ending) {
   switch (ending.kind) {
     case Kind::kAnimation:
       return fmt::format("an animated picture ({})", ending.name);
     case Kind::kFrame:
-      return fmt::format("a picture ({}) of a kind that is not read", ending.name);
+      return fmt::format("a picture in an unsupported format ({})", ending.name);
     case Kind::kCameraRaw:
-      return fmt::format("a camera's raw film ({}), which is not read", ending.name);
+      return fmt::format("a camera's raw film ({}), which is not supported", ending.name);
     case Kind::kList:
       return fmt::format("a list of other files ({}), which are not opened", ending.name);
     case Kind::kContainer:
     case Kind::kNone:
       break;
   }
-  return fmt::format("a film ({}) of a kind that is not read", ending.name);
+  return fmt::format("a film in an unsupported format ({})", ending.name);
 }
 
 bool IsHidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
@@ -169,8 +158,8 @@ std::vector<fs::path> FilesBelow(const fs::path& folder, int depth) {
   const auto by_name = [](const fs::path& x, const fs::path& y) {
     return ComesBefore(x.string(), y.string());
   };
-  std::sort(files.begin(), files.end(), by_name);
-  std::sort(folders.begin(), folders.end(), by_name);
+  std::ranges::sort(files, by_name);
+  std::ranges::sort(folders, by_name);
   for (const fs::path& below : folders) {
     if (depth >= kDeepest || files.size() >= kMostFiles) break;
     const std::vector<fs::path> more = FilesBelow(below, depth + 1);
@@ -184,27 +173,28 @@ std::vector<fs::path> FilesBelow(const fs::path& folder, int depth) {
 std::string FilmAdvice(const fs::path& file) {
   const Ending* ending = EndingOf(file);
   if (ending == nullptr) return "";
-  return fmt::format("{} is {}; {}", file.string(), What(*ending), Remedy(file, ending->kind));
+  return fmt::format(
+      "{} is {}; {}", file.string(), DescribeEnding(*ending), Remedy(file, ending->kind));
 }
 
 std::string FolderAdvice(const fs::path& folder) {
   const std::vector<fs::path> files = FilesBelow(folder, 0);
-  const auto first = std::find_if(
-      files.begin(), files.end(), [](const fs::path& file) { return EndingOf(file) != nullptr; });
+  const auto first =
+      std::ranges::find_if(files, [](const fs::path& file) { return EndingOf(file) != nullptr; });
   if (first != files.end()) {
     const Ending* ending = EndingOf(*first);
-    const auto count = std::count_if(files.begin(), files.end(), [&](const fs::path& file) {
+    const auto count = std::ranges::count_if(files, [&](const fs::path& file) {
       const Ending* other = EndingOf(file);
       return other != nullptr && std::string_view(other->name) == ending->name;
     });
     return fmt::format("; {} is {}{}: {}",
                        first->string(),
-                       What(*ending),
+                       DescribeEnding(*ending),
                        count > 1 ? fmt::format(", as {} more are", count - 1) : "",
                        Remedy(*first, ending->kind));
   }
   // Files in the folder itself were checked before; advice to use the same folder would not help.
-  const auto below = std::find_if(files.begin(), files.end(), [&](const fs::path& file) {
+  const auto below = std::ranges::find_if(files, [&](const fs::path& file) {
     if (file.parent_path() == folder) return false;
     return HasImageExtension(file.string()) || HasFilmExtension(file.string());
   });

@@ -56,7 +56,7 @@ TEST_F(FilmAdviceTest, FolderNamesFirstFileOfKind) {
   for (const int i : {9, 10, 11}) Write("reel/scan" + std::to_string(i) + ".dpx");
   for (const bool as_frames : {false, true}) {
     EXPECT_THAT(Complaint("reel", as_frames),
-                AllOf(HasSubstr("reel/scan9.dpx is a picture (DPX) of a kind that is not read, as "
+                AllOf(HasSubstr("reel/scan9.dpx is a picture in an unsupported format (DPX), as "
                                 "2 more are"),
                       HasSubstr("-start_number 9 -i "),
                       HasSubstr("scan%d.dpx")));

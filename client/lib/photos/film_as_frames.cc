@@ -15,11 +15,11 @@ namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kFramesToLookAt = 5;
+constexpr int kInspectedFrames = 5;
 constexpr size_t kFewestFrames = 3;
 
 // Returns a decodable frame; nullopt if it is damaged.
-std::optional<Image> ReadWhole(FilmReader* film, int frame) {
+std::optional<Image> ReadUndamaged(FilmReader* film, int frame) {
   try {
     return film->Read(frame);
   } catch (const Error& e) {
@@ -31,16 +31,16 @@ std::optional<Image> ReadWhole(FilmReader* film, int frame) {
 // Checked before all frames are decoded.
 void RequireColor(FilmReader* film, int frames, const std::string& name) {
   int looked_at = 0, in_color = 0;
-  for (int i = 0; i < kFramesToLookAt; ++i) {
+  for (int i = 0; i < kInspectedFrames; ++i) {
     const std::optional<Image> frame =
-        ReadWhole(film, (2 * i + 1) * frames / (2 * kFramesToLookAt));
+        ReadUndamaged(film, (2 * i + 1) * frames / (2 * kInspectedFrames));
     if (!frame) continue;
     ++looked_at;
     in_color += HasColor(*frame) ? 1 : 0;
   }
   if (2 * in_color > looked_at) return;
   throw InvalidArgument(
-      "{} is monochrome ({} of {} frames looked at); --benchmark drops the colour of a film in "
+      "{} is monochrome ({} of {} frames inspected); --benchmark drops the colour of a film in "
       "colour and scores against it: leave it out",
       name,
       looked_at - in_color,
@@ -57,7 +57,7 @@ FilmAsFrames DecodeFilmFrames(const PhotoFolder& folder,
   const std::string name = folder.film->file.string();
   FilmReader film(folder.film->file, &cancel);
   const std::vector<double>& times = film.times();
-  const auto end = end_s ? std::lower_bound(times.begin(), times.end(), *end_s) : times.end();
+  const auto end = end_s ? std::ranges::lower_bound(times, *end_s) : times.end();
   const auto count = static_cast<size_t>(end - times.begin());
   if (count > kMostBenchmarkFrames) {
     throw InvalidArgument(
@@ -88,7 +88,7 @@ FilmAsFrames DecodeFilmFrames(const PhotoFolder& folder,
   int damaged = 0;
   for (int i = 0; i < frames; ++i) {
     on_frame(i, frames);
-    const std::optional<Image> frame = ReadWhole(&film, i);
+    const std::optional<Image> frame = ReadUndamaged(&film, i);
     if (!frame) {
       ++damaged;
       continue;

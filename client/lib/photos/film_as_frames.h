@@ -12,7 +12,7 @@
 
 namespace color3d::client {
 
-inline constexpr size_t kMostBenchmarkFrames = 3000;  // as many as a job takes
+inline constexpr size_t kMostBenchmarkFrames = 3000;  // the limit of a job
 
 struct FilmAsFrames {
   PhotoFolder folder;  // frames/f000000.png and so on; no film

@@ -75,7 +75,7 @@ TEST_F(FilmAsFramesTest, WritesFramesInColor) {
 
 TEST_F(FilmAsFramesTest, RefusesFilmsThatCannotBeScored) {
   Write(10, false);
-  EXPECT_THAT(Complaint(), HasSubstr("film.mp4 is monochrome (5 of 5 frames looked at)"));
+  EXPECT_THAT(Complaint(), HasSubstr("film.mp4 is monochrome (5 of 5 frames inspected)"));
   Write(10, true);
   EXPECT_THAT(Complaint(0.1), HasSubstr("has 2 frames before 0.1 s (film_end_s)"));
   EXPECT_TRUE(fs::is_empty(scratch_.path()));

@@ -11,14 +11,13 @@ namespace color3d::client {
 
 void RemoveCopies(std::vector<LocalFile>* films, std::vector<std::string>* notes) {
   std::vector<LocalFile> by_length = *films;
-  std::stable_sort(by_length.begin(), by_length.end(), [](const LocalFile& x, const LocalFile& y) {
+  std::ranges::stable_sort(by_length, [](const LocalFile& x, const LocalFile& y) {
     return std::tuple(x.path.size(), x.path) < std::tuple(y.path.size(), y.path);
   });
   std::vector<LocalFile> kept;
   for (const LocalFile& film : by_length) {
-    const auto same = std::find_if(kept.begin(), kept.end(), [&](const LocalFile& other) {
-      return HaveEqualBytes(other.file, film.file);
-    });
+    const auto same = std::ranges::find_if(
+        kept, [&](const LocalFile& other) { return HaveEqualBytes(other.file, film.file); });
     if (same == kept.end()) {
       kept.push_back(film);
       continue;

@@ -64,7 +64,7 @@ std::optional<LocalFile> SaveAlpha(const std::string& bytes,
   if (image.channels != 2 && image.channels != 4) return std::nullopt;
   Image mask(image.width, image.height, 1);
   std::copy_n(image.Plane(image.channels - 1), mask.data.size(), mask.data.begin());
-  if (std::all_of(mask.data.begin(), mask.data.end(), [](float a) { return a > 0.5f; })) {
+  if (std::ranges::all_of(mask.data, [](float a) { return a > 0.5f; })) {
     return std::nullopt;
   }
   const std::string name = photo.path.starts_with("images/") ? photo.path.substr(7) : photo.path;

@@ -6,8 +6,9 @@
 #include <cctype>
 #include <map>
 
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/lower_case.h"
 #include "core/image/probe/orientation.h"
@@ -28,7 +29,7 @@ std::string Size(int width, int height) { return fmt::format("{} x {} px", width
 void RequireSizeOf(const fs::path& mask, const fs::path& photo) {
   const ImageInfo of_mask = ProbeImage(ReadFile(mask), mask.string());
   if (of_mask.format != ImageFormat::kPng) {
-    throw InvalidArgument("{} is no PNG, as masks must be; save it as one", mask.string());
+    throw InvalidArgument("the mask {} is not a PNG; save it as one", mask.string());
   }
   const std::string bytes = ReadFile(photo);
   const PictureSize size = OrientedSize(ProbeImage(bytes, photo.string()), ReadOrientation(bytes));
@@ -42,8 +43,7 @@ void RequireSizeOf(const fs::path& mask, const fs::path& photo) {
 }  // namespace
 
 void AddMasks(const fs::path& masks, PhotoFolder* folder) {
-  std::error_code none;
-  if (!fs::is_directory(masks, none)) {
+  if (!IsFolder(masks)) {
     throw InvalidArgument("--masks {}: there is no such folder", masks.string());
   }
   std::map<std::string, const LocalFile*> photo_of;

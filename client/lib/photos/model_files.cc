@@ -8,9 +8,9 @@
 #include <optional>
 #include <utility>
 
-#include "client/lib/photos/file_kind.h"
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/json_text.h"
 #include "core/base/text/lower_case.h"
@@ -42,8 +42,8 @@ constexpr UnreadPoses kUnreadPoses[] = {{"cameras.xml", "Agisoft Metashape"},
                                         {"sfm.json", "Meshroom"}};
 
 // Normalises the separators of a path from a user's file.
-std::string OurPath(std::string path) {
-  std::replace(path.begin(), path.end(), '\\', '/');
+std::string NormalizedPath(std::string path) {
+  std::ranges::replace(path, '\\', '/');
   while (path.starts_with("./")) path.erase(0, 2);
   return path;
 }
@@ -57,7 +57,7 @@ std::vector<std::string> FoldersIn(const fs::path& root) {
     if (name.starts_with('.') || IsSystemFolder(name)) continue;
     if (IsFolder(entry.path())) folders.push_back(name);
   }
-  std::sort(folders.begin(), folders.end());
+  std::ranges::sort(folders);
   return folders;
 }
 
@@ -80,7 +80,7 @@ json ReadTransforms(const fs::path& file) {
 }
 
 // Returns files below `root` with the names of a COLMAP model's files.
-std::vector<std::string> FilesOfModels(const fs::path& root) {
+std::vector<std::string> FindModelFiles(const fs::path& root) {
   std::vector<std::string> files;
   std::error_code error;
   const auto options = fs::directory_options::skip_permission_denied |
@@ -98,23 +98,23 @@ std::vector<std::string> FilesOfModels(const fs::path& root) {
     if (stem != "cameras" && stem != "images" && stem != "points3D") continue;
     files.push_back(it->path().lexically_relative(root).generic_string());
   }
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   return files;
 }
 
-std::vector<std::string> FilesOfColmap(const fs::path& root) {
+std::vector<std::string> FindColmapFiles(const fs::path& root) {
   std::vector<std::string> files;
-  for (const ColmapPlace& place : ColmapPlaces(FilesOfModels(root))) {
+  for (const ColmapPlace& place : ColmapPlaces(FindModelFiles(root))) {
     files.insert(files.end(), place.files.begin(), place.files.end());
   }
   return files;
 }
 
 // Returns the file of points of transforms; empty if there is none.
-std::string FileOfPoints(const fs::path& root, const std::string& transforms) {
+std::string FindPointFile(const fs::path& root, const std::string& transforms) {
   const json named = ReadTransforms(root / transforms).value("ply_file_path", json());
   if (named.is_string()) {
-    const std::string path = OurPath(named.get<std::string>());
+    const std::string path = NormalizedPath(named.get<std::string>());
     for (const std::string& file : {path, path.substr(path.rfind('/') + 1)}) {
       if (IsSafeRelativePath(file) && IsFile(root / file)) return file;
     }
@@ -125,7 +125,7 @@ std::string FileOfPoints(const fs::path& root, const std::string& transforms) {
   return "";
 }
 
-void NotePosesNotRead(const fs::path& root, PhotoFolder* result) {
+void NoteUnreadPoses(const fs::path& root, PhotoFolder* result) {
   std::error_code none;
   std::vector<std::string> found;
   for (const auto& entry : fs::directory_iterator(root, none)) {
@@ -137,15 +137,15 @@ void NotePosesNotRead(const fs::path& root, PhotoFolder* result) {
     }
   }
   if (found.empty()) return;
-  std::sort(found.begin(), found.end());
-  result->notes.push_back(
-      fmt::format("the poses in {} are not read, and are found anew; to use them, export them as a "
-                  "COLMAP model into {}",
-                  found[0],
-                  (root / "sparse").string()));
+  std::ranges::sort(found);
+  result->notes.push_back(fmt::format(
+      "the poses in {} cannot be read and will be estimated; to use them, export them as a "
+      "COLMAP model into {}",
+      found[0],
+      (root / "sparse").string()));
 }
 
-void NoteTimesNotRead(PhotoFolder* result) {
+void NoteUnreadTimes(PhotoFolder* result) {
   result->notes.push_back(
       std::string(kTimesFile) + " is not read: it goes with a COLMAP model" +
       (result->model_files.empty()
@@ -175,7 +175,7 @@ std::set<std::string> FoldersInTransforms(const fs::path& root) {
     for (const json& frame : transforms["frames"]) {
       if (!frame.is_object() || !frame.contains("file_path")) continue;
       if (!frame["file_path"].is_string()) continue;
-      const std::string path = OurPath(frame["file_path"].get<std::string>());
+      const std::string path = NormalizedPath(frame["file_path"].get<std::string>());
       const size_t slash = path.rfind('/');
       if (slash == std::string::npos) continue;
       const std::string folder = path.substr(0, slash);
@@ -195,10 +195,10 @@ std::string ImagesFolder(const fs::path& root) {
 
 bool HasPoses(const fs::path& root) {
   return !TransformsIn(root).empty() || IsFile(root / kPosesBoundsFile) ||
-         !FilesOfColmap(root).empty();
+         !FindColmapFiles(root).empty();
 }
 
-std::string PosesBeside(const fs::path& root) {
+std::string FindSiblingPoses(const fs::path& root) {
   for (const char* folder : {"sparse", "colmap"}) {
     if (IsFolder(root / folder)) return (root / folder).string();
   }
@@ -208,7 +208,7 @@ std::string PosesBeside(const fs::path& root) {
   return IsFile(poses_bounds) ? poses_bounds.string() : "";
 }
 
-std::string OnlyFolderOfPhotos(const fs::path& root) {
+std::string FindSinglePhotoFolder(const fs::path& root) {
   std::string found;
   for (const std::string& folder : FoldersIn(root)) {
     if (IsAugmentFile(folder + "/") || IsMaskFile(folder + "/")) continue;
@@ -222,21 +222,21 @@ std::string OnlyFolderOfPhotos(const fs::path& root) {
 void CollectModelFiles(const fs::path& root, PhotoFolder* folder) {
   std::vector<LocalFile>& files = folder->model_files;
   const auto add = [&](const std::string& file) { files.push_back({file, root / file}); };
-  const std::vector<std::string> colmap = FilesOfColmap(root);
+  const std::vector<std::string> colmap = FindColmapFiles(root);
   for (const std::string& file : colmap) add(file);
   const std::vector<std::string> transforms = TransformsIn(root);
   for (const std::string& file : transforms) add(file);
   const bool of_photos = folder->camera_films.empty();
   if (of_photos && !transforms.empty()) {
-    const std::string points = FileOfPoints(root, transforms[0]);
+    const std::string points = FindPointFile(root, transforms[0]);
     if (!points.empty()) add(points);
   }
   if (transforms.empty() && colmap.empty() && IsFile(root / kPosesBoundsFile)) {
     add(std::string(kPosesBoundsFile));
   }
-  if (of_photos && files.empty()) NotePosesNotRead(root, folder);
+  if (of_photos && files.empty()) NoteUnreadPoses(root, folder);
   if (!IsFile(root / kTimesFile)) return;
-  if (colmap.empty()) return NoteTimesNotRead(folder);
+  if (colmap.empty()) return NoteUnreadTimes(folder);
   add(std::string(kTimesFile));
 }
 

@@ -29,10 +29,10 @@ std::string ImagesFolder(const std::filesystem::path& root);
 bool HasPoses(const std::filesystem::path& root);
 // Returns the file or folder with poses in `root`, the parent of the user's folder of photos; empty
 // if there is none.
-std::string PosesBeside(const std::filesystem::path& root);
+std::string FindSiblingPoses(const std::filesystem::path& root);
 // Returns the only folder in `root` that directly contains photos; empty if there is none, or more
 // than one.
-std::string OnlyFolderOfPhotos(const std::filesystem::path& root);
+std::string FindSinglePhotoFolder(const std::filesystem::path& root);
 
 // Adds the files that belong to the photos or films in `folder`: COLMAP models (those of
 // catalogue/pose_files.h) and times.txt, transforms.json or the like with its file of points,

@@ -54,7 +54,7 @@ TEST_F(ModelFilesTest, SendsAllCompleteModels) {
   WritePhotos("images/");
   WriteModel("sparse/0");
   WriteModel("sparse/1");
-  Write("sparse/2/cameras.bin");  // no whole model
+  Write("sparse/2/cameras.bin");  // an incomplete model
   EXPECT_THAT(Paths(CollectPhotos(root()).model_files),
               ElementsAre("sparse/0/cameras.bin",
                           "sparse/0/images.bin",
@@ -88,7 +88,7 @@ TEST_F(ModelFilesTest, NamesUnsupportedPoses) {
   Write("Cameras.xml");
   EXPECT_THAT(CollectPhotos(root()).notes,
               ElementsAre(AllOf(HasSubstr("the poses in Cameras.xml (Agisoft Metashape)"),
-                                HasSubstr("are found anew"))));
+                                HasSubstr("will be estimated"))));
   WriteModel("sparse");
   EXPECT_THAT(CollectPhotos(root()).notes, IsEmpty());
 }
@@ -116,7 +116,7 @@ TEST_F(ModelFilesTest, SendsPointsWithTransforms) {
     EXPECT_THAT(Paths(CollectPhotos(root()).model_files),
                 ElementsAre("cloud.ply", "transforms.json"));
   }
-  // Never what lies outside.
+  // Files outside of the folder are never sent.
   WriteFileAtomic(root().parent_path() / "outside.ply", "x");
   Write("transforms.json", R"({"ply_file_path": "../outside.ply", "frames": []})");
   EXPECT_THAT(Paths(CollectPhotos(root()).model_files),
@@ -152,7 +152,7 @@ TEST_F(ModelFilesTest, AdviceKeepsPoses) {
   folder = CollectPhotos(root());
   EXPECT_THAT(Paths(folder.photos), ElementsAre("images/a.jpg", "images/b.jpg"));
   EXPECT_EQ(folder.model_files.size(), 3u);
-  // Thumbnails make no second folder of photos.
+  // A folder of thumbnails is no second folder of photos.
   WritePhotos("@eaDir/");
   EXPECT_EQ(CollectPhotos(root()).photos.size(), 2u);
   WritePhotos("other/");

@@ -49,9 +49,7 @@ class Tone {
   explicit Tone(const Image& lab) {
     std::vector<size_t> order(lab.PlaneSize());
     std::iota(order.begin(), order.end(), size_t{0});
-    std::sort(order.begin(), order.end(), [&](size_t x, size_t y) {
-      return lab.Plane(0)[x] < lab.Plane(0)[y];
-    });
+    std::ranges::sort(order, {}, [&](size_t i) { return lab.Plane(0)[i]; });
     for (size_t k = 0; k < kTones; ++k) {
       const size_t begin = order.size() * k / kTones, end = order.size() * (k + 1) / kTones;
       if (begin == end) continue;

@@ -4,12 +4,12 @@
 #include <set>
 
 #include "client/lib/names.h"
-#include "client/lib/photos/file_kind.h"
 #include "client/lib/photos/film_advice.h"
 #include "client/lib/photos/film_copies.h"
 #include "client/lib/photos/model_files.h"
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/name_order.h"
 #include "core/base/text/utf8.h"
@@ -45,8 +45,8 @@ void AddPhotos(const fs::path& root,
                const std::string& folder,
                bool with_subfolders,
                PhotoFolder* result,
-               PassedOver* passed_over) {
-  for (const std::string& file : ListPictures(root / folder, with_subfolders, passed_over)) {
+               SkippedFiles* skipped) {
+  for (const std::string& file : ListPictures(root / folder, with_subfolders, skipped)) {
     result->photos.push_back({folder.empty() ? file : folder + "/" + file, root / folder / file});
   }
 }
@@ -55,19 +55,19 @@ void AddPhotos(const fs::path& root,
 void AddPhotosAsImages(const fs::path& root,
                        const std::string& folder,
                        PhotoFolder* result,
-                       PassedOver* passed_over) {
+                       SkippedFiles* skipped) {
   if (folder.empty()) return;
   const size_t before = result->photos.size();
-  AddPhotos(root, folder, /*with_subfolders=*/true, result, passed_over);
+  AddPhotos(root, folder, /*with_subfolders=*/true, result, skipped);
   for (size_t i = before; i < result->photos.size(); ++i) {
     result->photos[i].path = "images/" + result->photos[i].path.substr(folder.size() + 1);
   }
 }
 
-void CollectNerfies(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
+void CollectNerfies(const fs::path& root, PhotoFolder* result, SkippedFiles* skipped) {
   for (const char* folder : kNerfiesPictures) {
     if (!result->photos.empty() || !IsFolder(root / folder)) continue;
-    AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);
+    AddPhotos(root, folder, /*with_subfolders=*/false, result, skipped);
   }
   AddNerfiesFiles(root, &result->model_files);
 }
@@ -97,7 +97,7 @@ void CollectCameraFilms(const fs::path& root, PhotoFolder* result) {
 }
 
 // Returns two or more folders of pictures in `root`: the frames of one camera each.
-void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
+void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result, SkippedFiles* skipped) {
   std::error_code none;
   PhotoFolder folders;
   int count = 0;
@@ -106,26 +106,26 @@ void CollectFoldersOfFrames(const fs::path& root, PhotoFolder* result, PassedOve
     if (name.starts_with('.') || name == kAugment || !IsFolder(entry.path())) continue;
     if (IsSystemFolder(name)) continue;
     const size_t before = folders.photos.size();
-    AddPhotos(root, name, /*with_subfolders=*/false, &folders, passed_over);
+    AddPhotos(root, name, /*with_subfolders=*/false, &folders, skipped);
     count += folders.photos.size() > before ? 1 : 0;
   }
   if (count > 1) result->photos = std::move(folders.photos);
 }
 
-void CollectImages(const fs::path& root, PhotoFolder* result, PassedOver* passed_over) {
-  if (IsNerfiesFolder(root)) return CollectNerfies(root, result, passed_over);
-  AddPhotosAsImages(root, ImagesFolder(root), result, passed_over);
+void CollectImages(const fs::path& root, PhotoFolder* result, SkippedFiles* skipped) {
+  if (IsNerfiesFolder(root)) return CollectNerfies(root, result, skipped);
+  AddPhotosAsImages(root, ImagesFolder(root), result, skipped);
   if (!result->photos.empty()) return;
-  AddPhotos(root, "", /*with_subfolders=*/false, result, passed_over);
+  AddPhotos(root, "", /*with_subfolders=*/false, result, skipped);
   std::vector<std::string> used;
   for (const std::string& folder : FoldersInTransforms(root)) {
     used.push_back(folder.substr(0, folder.find('/')));
     if (IsFolder(root / folder)) {
-      AddPhotos(root, folder, /*with_subfolders=*/false, result, passed_over);
+      AddPhotos(root, folder, /*with_subfolders=*/false, result, skipped);
     }
   }
-  if (!result->photos.empty()) return AddUnusedNeighbors(root, used, passed_over);
-  if (HasPoses(root)) AddPhotosAsImages(root, OnlyFolderOfPhotos(root), result, passed_over);
+  if (!result->photos.empty()) return AddUnusedNeighbors(root, used, skipped);
+  if (HasPoses(root)) AddPhotosAsImages(root, FindSinglePhotoFolder(root), result, skipped);
 }
 
 // Includes all files, so that one of the wrong kind is refused by name instead of being skipped.
@@ -162,12 +162,12 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
                           root.string(),
                           found.size(),
                           what,
-                          (root / *std::min_element(found.begin(), found.end())).string());
+                          (root / *std::ranges::min_element(found)).string());
   }
   return LocalFile{found[0], root / found[0]};
 }
 
-void CheckCounts(const PhotoFolder& folder, bool as_frames, const PassedOver& passed_over) {
+void CheckCounts(const PhotoFolder& folder, bool as_frames, const SkippedFiles& skipped) {
   const std::string root = folder.root.string();
   if (folder.splat || folder.film || !folder.camera_films.empty()) return;
   if (folder.photos.empty()) {
@@ -181,7 +181,7 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames, const PassedOver& pa
                           root,
                           ReadableImageFormats(),
                           remedy,
-                          passed_over.Clause());
+                          skipped.Clause());
   }
   if (folder.photos.size() == 1 && as_frames) {
     throw InvalidArgument(
@@ -189,13 +189,13 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames, const PassedOver& pa
         "frames{}",
         root,
         folder.photos[0].path,
-        passed_over.Clause());
+        skipped.Clause());
   }
   if (folder.photos.size() == 1) {
     throw InvalidArgument("{} contains one photograph ({}); at least 3 that overlap are needed{}",
                           root,
                           folder.photos[0].path,
-                          passed_over.Clause());
+                          skipped.Clause());
   }
   const size_t files = folder.AllFiles().size();
   if (files > kMaxFiles) {
@@ -204,8 +204,8 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames, const PassedOver& pa
   }
 }
 
-void AddNotes(const PassedOver& passed_over, PhotoFolder* folder) {
-  for (std::string& note : passed_over.Notes()) folder->notes.push_back(std::move(note));
+void AddNotes(const SkippedFiles& skipped, PhotoFolder* folder) {
+  for (std::string& note : skipped.Notes()) folder->notes.push_back(std::move(note));
 }
 
 void CheckName(const LocalFile& file) {
@@ -261,16 +261,16 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   if (!result.root.has_filename() && result.root.has_relative_path()) {
     result.root = result.root.parent_path();
   }
-  PassedOver passed_over;
-  CollectImages(result.root, &result, &passed_over);
+  SkippedFiles skipped;
+  CollectImages(result.root, &result, &skipped);
   if (result.photos.empty() && as_frames) {
-    CollectFoldersOfFrames(result.root, &result, &passed_over);
+    CollectFoldersOfFrames(result.root, &result, &skipped);
   }
   if (result.photos.empty()) CollectCameraFilms(result.root, &result);
   if (!result.camera_films.empty()) {
     CollectModelFiles(result.root, &result);
     CheckNames(result);
-    AddNotes(passed_over, &result);
+    AddNotes(skipped, &result);
     return result;
   }
   if (result.photos.empty() && !result.film) {
@@ -279,25 +279,24 @@ PhotoFolder CollectPhotos(const fs::path& root, bool as_frames) {
   }
   if (!result.splat && !result.film) CollectModelFiles(result.root, &result);
   CollectAugmentFiles(result.root, &result);
-  const auto by_path = [](const LocalFile& x, const LocalFile& y) { return x.path < y.path; };
-  std::sort(result.photos.begin(), result.photos.end(), by_path);
-  std::sort(result.model_files.begin(), result.model_files.end(), by_path);
-  std::sort(result.augment_files.begin(), result.augment_files.end(), by_path);
-  CheckCounts(result, as_frames, passed_over);
+  std::ranges::sort(result.photos, {}, &LocalFile::path);
+  std::ranges::sort(result.model_files, {}, &LocalFile::path);
+  std::ranges::sort(result.augment_files, {}, &LocalFile::path);
+  CheckCounts(result, as_frames, skipped);
   CheckNames(result);
   const fs::path parent = fs::absolute(result.root).parent_path();
   if (result.model_files.empty() && !result.splat && !result.film) {
-    const std::string poses = PosesBeside(parent);
+    const std::string poses = FindSiblingPoses(parent);
     if (!poses.empty()) {
       result.notes.push_back("the poses in " + poses + " are not used; to use them, give " +
                              parent.string());
     }
   }
-  AddNotes(passed_over, &result);
+  AddNotes(skipped, &result);
   return result;
 }
 
-void TakeAsFrames(PhotoFolder* folder) {
+void UsePhotosAsFrames(PhotoFolder* folder) {
   if (folder->film) return;
   if (!folder->camera_films.empty()) {
     throw InvalidArgument(
@@ -334,10 +333,7 @@ void TakeAsFrames(PhotoFolder* folder) {
           photo.file.filename().string());
     }
   }
-  const auto as_counted = [](const LocalFile& x, const LocalFile& y) {
-    return ComesBefore(x.path, y.path);
-  };
-  std::sort(folder->photos.begin(), folder->photos.end(), as_counted);
+  std::ranges::sort(folder->photos, &ComesBefore, &LocalFile::path);
 }
 
 namespace {
@@ -349,7 +345,7 @@ bool IsNumbered(const std::string& stem, std::string_view prefix) {
 
 }  // namespace
 
-std::string PhotoOfSameStem(const PhotoFolder& folder, const fs::path& file) {
+std::string FindPhotoByStem(const PhotoFolder& folder, const fs::path& file) {
   const std::string wanted = file.stem().string();
   if (folder.splat) return IsNumbered(wanted, "view_") ? wanted + ".png" : "";
   if (folder.film) return IsNumbered(wanted, "f") ? wanted + ".png" : "";

@@ -48,8 +48,8 @@ TEST_F(PhotoFolderTest, TakesPhotosOnly) {
   EXPECT_THAT(Paths(folder.photos), ElementsAre("a.jpg", "b.JPG", "c.tiff"));
   EXPECT_THAT(folder.model_files, IsEmpty());
   EXPECT_THAT(folder.notes,
-              ElementsAre(HasSubstr("hidden pictures passed over: 1 (.hidden.jpg)"),
-                          HasSubstr("pictures in subfolders passed over: 1 (sub/)")));
+              ElementsAre(HasSubstr("hidden pictures skipped: 1 (.hidden.jpg)"),
+                          HasSubstr("pictures in subfolders skipped: 1 (sub/)")));
 }
 
 TEST_F(PhotoFolderTest, PrefersImagesFolderAtAnyDepth) {
@@ -77,8 +77,8 @@ TEST_F(PhotoFolderTest, TakesSplatInsteadOfPhotos) {
     EXPECT_EQ(folder.Name(), "bust.ply");
     EXPECT_EQ(folder.Layout(), CaptureLayout::kSplat);
     EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("bust.ply"));
-    EXPECT_EQ(PhotoOfSameStem(folder, "x/view_07.png"), "view_07.png");
-    EXPECT_EQ(PhotoOfSameStem(folder, "x/coloured.png"), "");
+    EXPECT_EQ(FindPhotoByStem(folder, "x/view_07.png"), "view_07.png");
+    EXPECT_EQ(FindPhotoByStem(folder, "x/coloured.png"), "");
     RequirePhoto(folder, "view_07");
   }
   EXPECT_THAT(ErrorOf(root() / "notes.txt"), HasSubstr("a splat (.ply, .sog or .spz) or a film"));
@@ -97,10 +97,10 @@ TEST_F(PhotoFolderTest, TakesFilmOrPhotosAsFrames) {
     EXPECT_EQ(folder.Name(), "walk.MOV");
     EXPECT_EQ(folder.Layout(), CaptureLayout::kFilm);
     EXPECT_THAT(Paths(folder.AllFiles()), ElementsAre("walk.MOV"));
-    EXPECT_EQ(PhotoOfSameStem(folder, "x/f000012.png"), "f000012.png");
-    EXPECT_EQ(PhotoOfSameStem(folder, "x/fox.png"), "");
+    EXPECT_EQ(FindPhotoByStem(folder, "x/f000012.png"), "f000012.png");
+    EXPECT_EQ(FindPhotoByStem(folder, "x/fox.png"), "");
     RequirePhoto(folder, "f000003");
-    TakeAsFrames(&folder);
+    UsePhotosAsFrames(&folder);
     EXPECT_TRUE(folder.film.has_value());
   }
   Write("second.mp4", "y");
@@ -108,23 +108,23 @@ TEST_F(PhotoFolderTest, TakesFilmOrPhotosAsFrames) {
   EXPECT_THAT(Paths(cameras.AllFiles()), ElementsAre("second.mp4", "walk.MOV"));
   EXPECT_EQ(cameras.Layout(), CaptureLayout::kFilms);
   EXPECT_FALSE(cameras.film.has_value());
-  EXPECT_THROW(TakeAsFrames(&cameras), Error);
+  EXPECT_THROW(UsePhotosAsFrames(&cameras), Error);
   for (const char* name : {"images/b.jpg", "images/a.jpg"}) Write(name);
   PhotoFolder folder = CollectPhotos(root());
   EXPECT_FALSE(folder.film.has_value());
   EXPECT_EQ(folder.Layout(), CaptureLayout::kPhotos);
-  TakeAsFrames(&folder);
+  UsePhotosAsFrames(&folder);
   EXPECT_EQ(folder.Layout(), CaptureLayout::kFilm);
   EXPECT_THAT(Paths(folder.photos), ElementsAre("frames/a.jpg", "frames/b.jpg"));
-  EXPECT_EQ(PhotoOfSameStem(folder, "b.png"), "b.jpg");
+  EXPECT_EQ(FindPhotoByStem(folder, "b.png"), "b.jpg");
   for (const char* name : {"images/c10.jpg", "images/c2.jpg"}) Write(name);
   folder = CollectPhotos(root());
-  TakeAsFrames(&folder);
+  UsePhotosAsFrames(&folder);
   EXPECT_THAT(Paths(folder.photos),
               ElementsAre("frames/a.jpg", "frames/b.jpg", "frames/c2.jpg", "frames/c10.jpg"));
   Write("images/more/a.jpg");
   PhotoFolder two = CollectPhotos(root());
-  EXPECT_THROW(TakeAsFrames(&two), Error);
+  EXPECT_THROW(UsePhotosAsFrames(&two), Error);
 }
 
 TEST_F(PhotoFolderTest, TakesOneCompleteColmapModel) {
@@ -190,7 +190,7 @@ TEST_F(PhotoFolderTest, FoldersOfFramesAreCameras) {
   for (const char* name : {"right/10.png", "right/9.png", "left/9.png", "notes/a.txt"}) Write(name);
   EXPECT_THAT(ErrorOf(root()), HasSubstr("no photographs"));
   PhotoFolder folder = CollectPhotos(root(), /*as_frames=*/true);
-  TakeAsFrames(&folder);
+  UsePhotosAsFrames(&folder);
   EXPECT_THAT(Paths(folder.AllFiles()),
               ElementsAre("frames/left/9.png", "frames/right/9.png", "frames/right/10.png"));
   EXPECT_EQ(folder.Layout(), CaptureLayout::kFilms);
@@ -275,9 +275,9 @@ TEST_F(PhotoFolderTest, RefusesNamesThatAreNotUtf8) {
 TEST_F(PhotoFolderTest, FindsPhotoOfColoredCopy) {
   for (const char* name : {"images/a.jpg", "images/b.jpg", "images/x/b.jpg"}) Write(name);
   const PhotoFolder folder = CollectPhotos(root());
-  EXPECT_EQ(PhotoOfSameStem(folder, "/elsewhere/a.png"), "a.jpg");
-  EXPECT_EQ(PhotoOfSameStem(folder, "b.png"), "");  // two have this stem
-  EXPECT_EQ(PhotoOfSameStem(folder, "key_view.png"), "");
+  EXPECT_EQ(FindPhotoByStem(folder, "/elsewhere/a.png"), "a.jpg");
+  EXPECT_EQ(FindPhotoByStem(folder, "b.png"), "");  // two have this stem
+  EXPECT_EQ(FindPhotoByStem(folder, "key_view.png"), "");
   EXPECT_NO_THROW(RequirePhoto(folder, "a"));
   EXPECT_NO_THROW(RequirePhoto(folder, "x/b.jpg"));
   EXPECT_THROW(RequirePhoto(folder, "c"), Error);

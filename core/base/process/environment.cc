@@ -4,7 +4,7 @@ extern char** environ;
 
 namespace color3d {
 
-bool IsHandedOn(std::string_view variable) {
+bool IsInherited(std::string_view variable) {
   // With "=": the whole name; without: a prefix of names.
   for (const std::string_view name : {"PATH=",
                                       "LANG=",
@@ -35,10 +35,10 @@ bool IsHandedOn(std::string_view variable) {
   return false;
 }
 
-std::vector<std::string> EnvironmentToHandOn() {
+std::vector<std::string> InheritedEnvironment() {
   std::vector<std::string> variables;
   for (char** e = environ; *e != nullptr; ++e) {
-    if (IsHandedOn(*e)) variables.emplace_back(*e);
+    if (IsInherited(*e)) variables.emplace_back(*e);
   }
   return variables;
 }

@@ -11,9 +11,9 @@ namespace color3d {
 // Returns true if "NAME=value" may be passed to a child program: variables of paths, language and
 // numeric libraries. Names that are not listed are not passed, so that no token, key or password
 // leaks.
-bool IsHandedOn(std::string_view variable);
+bool IsInherited(std::string_view variable);
 
 // Variables of this process that may be passed on, as "NAME=value".
-std::vector<std::string> EnvironmentToHandOn();
+std::vector<std::string> InheritedEnvironment();
 
 }  // namespace color3d

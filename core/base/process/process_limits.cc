@@ -35,7 +35,7 @@ bool LimitProcess(const ProcessLimits& limits) noexcept {
          LowerIfGiven(RLIMIT_NPROC, limits.processes);
 }
 
-bool BeEndedFirstWhenMemoryRunsOut() noexcept {
+bool PreferAsOomVictim() noexcept {
   // Range -1000 to 1000; the kernel adds up to 1000 for the process's share of memory.
   constexpr std::string_view kScore = "500";
   const int fd = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);

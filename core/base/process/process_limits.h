@@ -21,7 +21,7 @@ bool LimitProcess(const ProcessLimits& limits) noexcept;
 
 // Makes the kernel end this process and its children before others of the same user when the
 // machine runs out of memory. Returns false if the kernel refuses.
-bool BeEndedFirstWhenMemoryRunsOut() noexcept;
+bool PreferAsOomVictim() noexcept;
 
 // Most likely limit exceeded by a process that was ended by `signal`, as a part of a sentence: "it
 // wrote a file of more than 64 MiB".

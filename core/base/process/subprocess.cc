@@ -46,7 +46,7 @@ std::vector<char*> Pointers(std::vector<std::string>& texts) {
 // Given variables override inherited ones.
 std::vector<std::string> VariablesOf(const SubprocessOptions& options) {
   std::vector<std::string> variables = options.environment;
-  for (const std::string& variable : EnvironmentToHandOn()) {
+  for (const std::string& variable : InheritedEnvironment()) {
     const std::string_view name = std::string_view(variable).substr(0, variable.find('=') + 1);
     const bool given = std::ranges::any_of(
         options.environment, [&](const std::string& own) { return own.starts_with(name); });

@@ -14,12 +14,12 @@ namespace {
 constexpr std::string_view kMark = "\xef\xbb\xbf";
 constexpr std::string_view kJsonBlanks = " \t\r\n";
 
-bool IsOfToken(char c) {
+bool IsTokenCharacter(char c) {
   return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '+' || c == '.';
 }
 
 // A word for a number that JSON lacks.
-bool IsNoJsonNumber(std::string_view token) {
+bool IsNonJsonNumber(std::string_view token) {
   if (token.front() == '-' || token.front() == '+') token.remove_prefix(1);
   const std::string word = LowerCase(token.substr(0, 16));
   if (word == "nan" || word == "inf" || word == "infinity") return true;
@@ -84,10 +84,10 @@ void PlainJson::Arrive() {
     if (next == text_.npos || (text_[next] != ']' && text_[next] != '}')) return;
     ++at_;
   }
-  if (at_ >= text_.size() || !IsOfToken(text_[at_])) return;
+  if (at_ >= text_.size() || !IsTokenCharacter(text_[at_])) return;
   token_end_ = at_;
-  while (token_end_ < text_.size() && IsOfToken(text_[token_end_])) ++token_end_;
-  if (IsNoJsonNumber(text_.substr(at_, token_end_ - at_))) quoted_ = Quoted::kOpening;
+  while (token_end_ < text_.size() && IsTokenCharacter(text_[token_end_])) ++token_end_;
+  if (IsNonJsonNumber(text_.substr(at_, token_end_ - at_))) quoted_ = Quoted::kOpening;
 }
 
 bool PlainJson::operator==(const PlainJson& other) const {

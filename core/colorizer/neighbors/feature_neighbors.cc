@@ -17,13 +17,13 @@ constexpr char kPrefix[] = "neighbors.";
 
 // Cells of certain colour of all pictures but the first, the key view, whose cells are `key`. Adds
 // the variation of features of one place between pictures to `view_noise`.
-std::vector<KnownCells> FurtherCells(const TapEncoder& encoder,
-                                     std::span<const TrainingPicture> pictures,
-                                     const KnownCells& key,
-                                     const FeatureNeighborsOptions& options,
-                                     Random& random,
-                                     const CancellationToken& cancel,
-                                     ViewNoise* view_noise) {
+std::vector<KnownCells> AdditionalCells(const TapEncoder& encoder,
+                                        std::span<const TrainingPicture> pictures,
+                                        const KnownCells& key,
+                                        const FeatureNeighborsOptions& options,
+                                        Random& random,
+                                        const CancellationToken& cancel,
+                                        ViewNoise* view_noise) {
   std::vector<KnownCells> found;
   const auto further = static_cast<int64_t>(pictures.size()) - 1;
   const auto placed = [](const KnownCells& cells) {
@@ -77,7 +77,7 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
       Select(key, colored.index_select(0, SampleRows(colored.size(0), options.bank_size, random)));
   ViewNoise view_noise;
   std::vector<KnownCells> parts =
-      FurtherCells(encoder, pictures, key, options, random, cancel, &view_noise);
+      AdditionalCells(encoder, pictures, key, options, random, cancel, &view_noise);
   parts.insert(parts.begin(), of_key);
   whitening_ = Whitening(
       key.blocks, encoder.config().stem_stride, options.whitening, view_noise.Covariances());

@@ -74,7 +74,7 @@ TEST(SrgbConversion, OtherColorSpacesMatchSrgbCopies) {
     for (const auto& [name, profile, stretch] : {std::tuple{"Adobe RGB", AdobeRgbProfile(), 3.0},
                                                  {"ProPhoto", ProPhotoProfile(), 6.0},
                                                  {"Display P3", DisplayP3Profile(), 3.0}}) {
-      const Image other = InSpaceOf(srgb, profile);
+      const Image other = ConvertToProfile(srgb, profile);
       ASSERT_GT(WorstDifference(other, srgb), 0.03);
       const Image read = DecodeImage(container.write(other, profile), "a");
       EXPECT_LT(WorstDifference(read, srgb), stretch * container.step + 1e-4)
@@ -90,7 +90,7 @@ TEST(SrgbConversion, GrayPicturesKeepOneChannelWithSrgbTones) {
     if (name == "WebP" || name == "BMP") continue;  // have no grey
     for (const std::string& profile :
          {GrayGammaProfile(1.8), GrayGammaProfile(2.2), DotGainProfile(20.0)}) {
-      const Image other = InSpaceOf(srgb, profile);
+      const Image other = ConvertToProfile(srgb, profile);
       ASSERT_GT(WorstDifference(other, srgb), 0.005);
       const Image read = DecodeImage(container.write(other, profile), "a");
       EXPECT_EQ(read.channels, 1);
@@ -103,7 +103,7 @@ TEST(SrgbConversion, GrayPictureFollowsColorProfile) {
   const Image srgb = Colors(1);
   Image three(srgb.width, srgb.height, 3);
   for (int c = 0; c < 3; ++c) std::copy(srgb.data.begin(), srgb.data.end(), three.Plane(c));
-  const Image adobe = InSpaceOf(three, AdobeRgbProfile());
+  const Image adobe = ConvertToProfile(three, AdobeRgbProfile());
   Image gray(srgb.width, srgb.height, 1);
   std::copy_n(adobe.Plane(1), gray.data.size(), gray.data.begin());
   const Image read = DecodeImage(WithPngProfile(EncodePng16(gray), AdobeRgbProfile()), "a");
@@ -123,7 +123,7 @@ TEST(SrgbConversion, JoinsProfileChunksOfJpeg) {
   Image srgb(16, 16, 3, 0.5f);
   std::fill_n(srgb.Plane(0), srgb.PlaneSize(), 0.8f);
   const std::string profile = AdobeRgbProfile();
-  const std::string plain = UntaggedJpeg(InSpaceOf(srgb, profile));
+  const std::string plain = UntaggedJpeg(ConvertToProfile(srgb, profile));
   const auto at = [&](const std::string& jpeg, int channel) {
     return DecodeImage(jpeg, "a.jpg").At(channel, 8, 8);
   };
@@ -138,7 +138,7 @@ TEST(SrgbConversion, JoinsProfileChunksOfJpeg) {
 TEST(SrgbConversion, AppliesHeicProfile) {
   Image srgb(64, 64, 3, 0.3f);
   std::fill_n(srgb.Plane(0), srgb.PlaneSize(), 0.7f);
-  const std::string heic = HeicFile(InSpaceOf(srgb, AdobeRgbProfile()), AdobeRgbProfile());
+  const std::string heic = HeicFile(ConvertToProfile(srgb, AdobeRgbProfile()), AdobeRgbProfile());
   if (heic.empty()) GTEST_SKIP() << "libheif or its encoder is missing";
   const Image read = DecodeImage(heic, "a.heic");
   EXPECT_NEAR(read.At(0, 30, 30), 0.7f, 0.02f);
@@ -199,7 +199,7 @@ TEST(SrgbConversion, PngChunksHavePrecedence) {
 TEST(SrgbConversion, RecognizesAdobeRgbInExif) {
   Image srgb(16, 16, 3, 0.5f);
   std::fill_n(srgb.Plane(0), srgb.PlaneSize(), 0.8f);
-  const std::string silent = UntaggedJpeg(InSpaceOf(srgb, AdobeRgbProfile()));
+  const std::string silent = UntaggedJpeg(ConvertToProfile(srgb, AdobeRgbProfile()));
   std::string block = ExifBlock({{40965, 4, 0}});
   const auto place = static_cast<uint32_t>(block.size());
   block.replace(26 + 2 + 8, 4, [&] {

@@ -91,7 +91,7 @@ std::optional<LabColor> FromHex(const std::string& word) {
 }
 
 // "reddish", "bluish": half of the chroma.
-std::optional<LabColor> FromIsh(const std::string& word) {
+std::optional<LabColor> PaleColor(const std::string& word) {
   if (!word.ends_with("ish")) return std::nullopt;
   std::string stem = word.substr(0, word.size() - 3);
   if (stem == "redd") stem = "red";
@@ -126,7 +126,7 @@ std::optional<NamedColor> ColorAt(const std::vector<std::string>& words, size_t 
     } else {
       lab = FromTable(words[i]);
       if (!lab) lab = FromHex(words[i]);
-      if (!lab) lab = FromIsh(words[i]);
+      if (!lab) lab = PaleColor(words[i]);
     }
     if (lab) {
       name += words[i] + (count == 2 ? " " + words[i + 1] : "");

@@ -218,7 +218,7 @@ class HintPlacer {
   std::vector<bool> allowed_;  // phrases that were found, and background
 };
 
-Error NothingFound(const std::vector<PromptRegion>& regions) {
+Error NoRegionFound(const std::vector<PromptRegion>& regions) {
   std::string text = "none of the prompt's things was found in the key view:";
   for (const PromptRegion& region : regions) {
     text += fmt::format(" \"{}\" (best score {:.3g})", region.phrase.thing, region.score);
@@ -261,11 +261,11 @@ PromptSolution KeyColorFromPrompt(const Image& luminance,
     solution.notes.push_back(fmt::format(
         "\"{}\" was not found in the key view; its colour is not used", region.phrase.thing));
   }
-  if (!any) throw NothingFound(solution.regions);
+  if (!any) throw NoRegionFound(solution.regions);
   const HintPlacer placer(
       luminance, rest, probabilities, solution.regions, options.seed_confidence);
   const std::vector<ColorHint> hints = placer.Place();
-  if (hints.empty()) throw NothingFound(solution.regions);
+  if (hints.empty()) throw NoRegionFound(solution.regions);
   solution.confidence = placer.Confidence();
   solution.spread = KeyColorFromHints(luminance, hints, options.hints, control);
   solution.ab = std::move(solution.spread.ab);

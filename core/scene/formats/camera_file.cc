@@ -17,7 +17,7 @@ Camera WithSize(const Camera& camera, int width, int height) {
   return {width, height, scale * camera.fx, scale * camera.fy, 0.5 * width, 0.5 * height};
 }
 
-Camera CameraOf(const FrameFields& fields, const Camera& absent) {
+Camera ReadCamera(const FrameFields& fields, const Camera& absent) {
   for (const char* key : {"fl_x", "fl_y", "camera_angle_x", "camera_angle_y"}) {
     if (fields.Find(key) != nullptr) return ReadIntrinsics(fields, absent.width, absent.height);
   }
@@ -49,7 +49,7 @@ std::vector<FileCamera> ReadCameraFile(std::string_view text,
     if (!frames[i].is_object()) throw InvalidArgument("{} must be an object", place);
     const FrameFields fields(root, frames[i], place);
     FileCamera camera;
-    camera.camera = CameraOf(fields, absent);
+    camera.camera = ReadCamera(fields, absent);
     camera.cam_from_world = ReadTransform(fields);
     camera.time_s = FrameFields(frames[i], frames[i], place).Number("time");
     // world = scale * scene + offset, for points as for the camera's centre.

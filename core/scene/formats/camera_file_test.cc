@@ -55,7 +55,7 @@ TEST(CameraFileTest, ReadsIntrinsicsOfFileOrFrame) {
   EXPECT_EQ(cameras[1].camera.fx, 70.0);
   EXPECT_EQ(cameras[1].camera.cx, 99.0);
   EXPECT_EQ(cameras[1].camera.height, 100);
-  // A size alone: as much is seen between top and bottom.
+  // With a size alone the vertical field of view is kept.
   const auto sized = Read("{\"w\":100,\"h\":200,\"frames\":[" + Frame() + "]}");
   EXPECT_EQ(sized[0].camera.width, 100);
   EXPECT_DOUBLE_EQ(sized[0].camera.fy, 260.0);
@@ -65,7 +65,7 @@ TEST(CameraFileTest, ReadsIntrinsicsOfFileOrFrame) {
 TEST(CameraFileTest, ReadsTimesOfFrames) {
   const auto cameras =
       Read("{\"time\":9,\"frames\":[" + Frame() + "," + Frame("[1,0,0,6]", "\"time\":0.5,") + "]}");
-  EXPECT_FALSE(cameras[0].time_s) << "no file says that of all its frames";
+  EXPECT_FALSE(cameras[0].time_s) << "times belong to single frames";
   EXPECT_EQ(cameras[1].time_s, 0.5);
   EXPECT_THAT(Complaint("{\"frames\":[" + Frame("[1,0,0,5]", "\"time\":\"now\",") + "]}"),
               HasSubstr("frame 0: time must be a finite number"));

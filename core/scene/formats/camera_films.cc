@@ -10,6 +10,7 @@
 
 #include "core/base/equal_files.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
@@ -26,7 +27,7 @@ using nlohmann::json;
 
 constexpr char kTransforms[] = "transforms.json";
 
-std::string FileOf(const FrameFields& frame) {
+std::string FilmPath(const FrameFields& frame) {
   std::string file = frame.TextOr("file_path", "");
   while (file.starts_with("./")) file.erase(0, 2);
   return file;
@@ -42,9 +43,9 @@ CameraFilm ReadFilm(const FrameFields& own,
                     const NamedFiles& given,
                     const FilmSize& size) {
   CameraFilm film;
-  film.file = given.Find(FileOf(fields));
+  film.file = given.Find(FilmPath(fields));
   if (film.file.empty()) {
-    throw InvalidArgument("{}: there is no film {} in the scene", fields.place(), FileOf(fields));
+    throw InvalidArgument("{}: there is no film {} in the scene", fields.place(), FilmPath(fields));
   }
   film.camera = own.TextOr("camera", fs::path(film.file).stem().string());
   film.time_offset_s = own.NumberOr("time_offset", 0.0);
@@ -66,7 +67,7 @@ std::vector<CameraFilm> FilmsOfTransforms(const fs::path& scene_folder, const Fi
     const std::string place = fmt::format("{}: frame {}", kTransforms, i);
     if (!frame.is_object()) throw InvalidArgument("{} must be an object", place);
     const FrameFields own(frame, frame, place);
-    if (!HasFilmExtension(FileOf(own))) {
+    if (!HasFilmExtension(FilmPath(own))) {
       photo = place;
       continue;
     }
@@ -74,7 +75,7 @@ std::vector<CameraFilm> FilmsOfTransforms(const fs::path& scene_folder, const Fi
       throw InvalidArgument(
           "{}: {} is a film, whose frames have times of their own; leave `time` out",
           place,
-          FileOf(own));
+          FilmPath(own));
     }
     films.push_back(ReadFilm(own, FrameFields(root, frame, place), given, size));
   }
@@ -119,15 +120,15 @@ void CheckFilms(const std::vector<CameraFilm>& films, const std::string& from) {
   }
   if (films.size() < 2) {
     throw InvalidArgument(
-        "{} has the pose of one film; a static camera gives no depth. "
-        "Colour it as a film, without {}",
+        "{} has the pose of one film; a static camera gives no depth. Colour it as a film, without "
+        "{}",
         from,
         from);
   }
 }
 
 // Returns the files of the film's pictures, in order.
-std::vector<fs::path> FilesOf(const CameraFilm& film, const fs::path& scene_folder) {
+std::vector<fs::path> PictureFiles(const CameraFilm& film, const fs::path& scene_folder) {
   if (!film.is_pictures) return {scene_folder / film.file};
   std::vector<fs::path> files;
   for (const std::string& file : ListFiles(scene_folder / film.file)) {
@@ -137,19 +138,19 @@ std::vector<fs::path> FilesOf(const CameraFilm& film, const fs::path& scene_fold
 }
 
 // Throws for copies: they show nothing from a second position.
-void RefuseCopies(const std::vector<CameraFilm>& films, const fs::path& scene_folder) {
+void RejectDuplicateFilms(const std::vector<CameraFilm>& films, const fs::path& scene_folder) {
   std::map<std::vector<uintmax_t>, std::vector<const CameraFilm*>> by_sizes;
   for (const CameraFilm& film : films) {
     std::vector<uintmax_t> sizes;
     std::error_code error;
-    for (const fs::path& file : FilesOf(film, scene_folder)) {
+    for (const fs::path& file : PictureFiles(film, scene_folder)) {
       sizes.push_back(fs::file_size(file, error));
     }
     std::vector<const CameraFilm*>& alike = by_sizes[sizes];
-    const std::vector<fs::path> files = FilesOf(film, scene_folder);
+    const std::vector<fs::path> files = PictureFiles(film, scene_folder);
     for (const CameraFilm* other : alike) {
-      const std::vector<fs::path> of_other = FilesOf(*other, scene_folder);
-      if (std::equal(files.begin(), files.end(), of_other.begin(), &HaveEqualBytes)) {
+      const std::vector<fs::path> of_other = PictureFiles(*other, scene_folder);
+      if (std::ranges::equal(files, of_other, &HaveEqualBytes)) {
         throw InvalidArgument(
             "{} and {} are the same film, byte for byte; films of several cameras are each taken "
             "from another place: leave one of them out",
@@ -193,7 +194,7 @@ std::vector<CameraFilm> FoldersOfPictures(const std::vector<std::string>& files)
 }
 
 // Returns the films of a folder that has no other pictures.
-std::vector<CameraFilm> FilmsAlone(const std::vector<std::string>& files) {
+std::vector<CameraFilm> FilmsWithoutPoses(const std::vector<std::string>& files) {
   std::vector<CameraFilm> films;
   for (const std::string& file : files) {
     if (IsAugmentFile(file) || IsMaskFile(file)) continue;
@@ -208,30 +209,27 @@ std::vector<CameraFilm> FilmsAlone(const std::vector<std::string>& files) {
 }  // namespace
 
 std::vector<CameraFilm> ReadCameraFilms(const fs::path& scene_folder, const FilmSize& size_of) {
-  std::error_code error;
-  if (!fs::is_directory(scene_folder, error)) return {};
+  if (!IsFolder(scene_folder)) return {};
   const std::vector<std::string> files = ListFiles(scene_folder);
   std::vector<CameraFilm> films = FoldersOfPictures(files);
   std::string from = "frames/";
-  if (films.empty() && std::any_of(files.begin(), files.end(), HasFilmExtension)) {
-    if (fs::is_regular_file(scene_folder / kTransforms, error)) {
+  if (films.empty() && std::ranges::any_of(files, HasFilmExtension)) {
+    if (IsFile(scene_folder / kTransforms)) {
       from = kTransforms;
       films = FilmsOfTransforms(scene_folder, size_of);
-    } else if (fs::is_regular_file(scene_folder / kPosesBounds, error)) {
+    } else if (IsFile(scene_folder / kPosesBounds)) {
       from = kPosesBounds;
       films = ReadPosesBounds(scene_folder);
       for (CameraFilm& film : films) FitToFilm(size_of(film.file), &film);
     } else {
       from = "the scene";
-      films = FilmsAlone(files);
+      films = FilmsWithoutPoses(files);
     }
   }
   if (films.empty()) return films;
   CheckFilms(films, from);
-  RefuseCopies(films, scene_folder);
-  std::sort(films.begin(), films.end(), [](const CameraFilm& x, const CameraFilm& y) {
-    return x.camera < y.camera;
-  });
+  RejectDuplicateFilms(films, scene_folder);
+  std::ranges::sort(films, {}, &CameraFilm::camera);
   return films;
 }
 

@@ -13,12 +13,12 @@
 namespace color3d {
 
 struct CameraFilm {
-  std::string camera;  // unique: as told, else the film's name
+  std::string camera;  // unique: from the file, else the film's name
   std::string file;    // relative to the scene's folder: a video file, or a folder of pictures
-  View view;           // where has_pose: camera, lens and pose; without name, picture and moment
+  View view;           // if has_pose: camera, lens and pose; other fields are unset
   double time_offset_s = 0.0;  // to be added to the film's own times, finite
-  bool has_pose = true;        // the same of all films
-  bool is_pictures = false;    // likewise
+  bool has_pose = true;        // equal for all films
+  bool is_pictures = false;    // equal for all films
 };
 
 // Returns width and height of a film as displayed, px.

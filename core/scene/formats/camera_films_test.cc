@@ -15,12 +15,13 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-// Three cameras whose axes are the world's but for a turn of the last about z, as LLFF has them.
+// Three cameras as LLFF stores them, aligned with the world except for a rotation of the last about
+// z.
 std::vector<double> PosesOfThree() {
   std::vector<double> rows;
   for (int i = 0; i < 3; ++i) {
     const double place = 0.5 * i;
-    // Columns: down, right, backwards, place, (height, width, focal length).
+    // Columns: down, right, backwards, position, (height, width, focal length).
     const double matrix[3][5] = {{0, 1, 0, place, 64}, {-1, 0, 0, 0.25, 96}, {0, 0, 1, 4, 120}};
     for (const auto& row : matrix) rows.insert(rows.end(), row, row + 5);
     rows.insert(rows.end(), {1.0, 10.0});

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/scene/formats/within_reach.h"
 
 namespace color3d {
@@ -119,8 +121,7 @@ Pose MakeColmapPose(const double (&q)[4], const double (&t)[3], const std::strin
 }
 
 void CheckColmapName(const std::string& name, const std::string& place) {
-  const bool bad =
-      std::any_of(name.begin(), name.end(), [](unsigned char c) { return c < 32 || c == 127; });
+  const bool bad = std::ranges::any_of(name, [](unsigned char c) { return c < 32 || c == 127; });
   if (bad) throw InvalidArgument("{}: the name of an image holds control characters", place);
 }
 
@@ -132,25 +133,31 @@ void CheckColmapPoint(const ColmapPoint& point, const std::string& place) {
   }
 }
 
+SparsePoint MakeSparsePoint(const ColmapPoint& from, const std::map<uint32_t, int>& view_of_image) {
+  std::set<int> views;
+  for (const uint32_t image_id : from.image_ids) {
+    const auto view = view_of_image.find(image_id);
+    if (view != view_of_image.end()) views.insert(view->second);
+  }
+  return {from.position, from.error_px, {views.begin(), views.end()}};
+}
+
 double KnownError(double error_px) { return std::isfinite(error_px) ? error_px : -1.0; }
 
 bool IsColmapFolder(const fs::path& folder) {
-  std::error_code error;
-  return fs::is_regular_file(folder / "cameras.bin", error) ||
-         fs::is_regular_file(folder / "cameras.txt", error);
+  return IsFile(folder / "cameras.bin") || IsFile(folder / "cameras.txt");
 }
 
 ColmapModel LoadColmapModel(const fs::path& folder) {
-  std::error_code error;
   const auto missing = [&](const std::string& ending) -> std::string {
     for (const char* part : {"cameras", "images", "points3D"}) {
-      if (!fs::is_regular_file(folder / (part + ending), error)) return part + ending;
+      if (!IsFile(folder / (part + ending))) return part + ending;
     }
     return "";
   };
   const std::string of_binary = missing(".bin"), of_text = missing(".txt");
-  const bool binary = of_binary.empty() || fs::is_regular_file(folder / "cameras.bin", error);
-  if (!binary && !fs::is_regular_file(folder / "cameras.txt", error)) {
+  const bool binary = of_binary.empty() || IsFile(folder / "cameras.bin");
+  if (!binary && !IsFile(folder / "cameras.txt")) {
     throw Error(ErrorCode::kNotFound, "there is no COLMAP model (cameras.bin or cameras.txt)");
   }
   if (!of_binary.empty() && !of_text.empty()) {

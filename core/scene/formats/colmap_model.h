@@ -66,6 +66,9 @@ Pose MakeColmapPose(const double (&qvec_wxyz)[4],
 // Throws if the name has control characters, which would break lines of messages and logs.
 void CheckColmapName(const std::string& name, const std::string& place);
 void CheckColmapPoint(const ColmapPoint& point, const std::string& place);
+// Converts a point. Its views are those whose images are on its track; images without a view are
+// ignored.
+SparsePoint MakeSparsePoint(const ColmapPoint& from, const std::map<uint32_t, int>& view_of_image);
 // Returns -1 (unknown) for a reprojection error that is not finite.
 double KnownError(double error_px);
 

@@ -29,7 +29,7 @@ struct BinaryModel {
   std::string cameras, images, points;
   void Write(const fs::path& folder) const {
     fs::create_directories(folder);
-    // Not durably: some tests write hundreds of them.
+    // Without fsync, since some tests write hundreds of them.
     std::ofstream(folder / "cameras.bin", std::ios::binary) << cameras;
     std::ofstream(folder / "images.bin", std::ios::binary) << images;
     std::ofstream(folder / "points3D.bin", std::ios::binary) << points;
@@ -53,7 +53,7 @@ BinaryModel MakeBinary(const Scene& scene) {
   for (size_t v = 0; v < scene.views.size(); ++v) {
     const View& view = scene.views[v];
     const Pose& pose = view.cam_from_world;
-    Put<uint32_t>(&out.images, static_cast<uint32_t>(100 - v));  // numbers against the names' order
+    Put<uint32_t>(&out.images, static_cast<uint32_t>(100 - v));  // in the reverse order of names
     for (double x : {pose.rotation.w(), pose.rotation.x(), pose.rotation.y(), pose.rotation.z()}) {
       Put(&out.images, x);
     }
@@ -163,7 +163,7 @@ TEST(Colmap, ReadsTextWithCommentsBlanksAndCrLf) {
   EXPECT_TRUE(read.points.empty());
 }
 
-// Photos 0001.png, 0002.png and "l/a b.png" with times as a file tells them.
+// Photos 0001.png, 0002.png and "l/a b.png" with times from a file.
 class ColmapTimes : public testing::Test {
  protected:
   ColmapTimes() {

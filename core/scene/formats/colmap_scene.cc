@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
@@ -35,8 +36,7 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
                          const std::vector<View>& views) {
   FrameMoments none;
   none.moments.resize(views.size());
-  std::error_code error;
-  if (!fs::is_regular_file(scene_folder / kTimesFile, error)) return none;
+  if (!IsFile(scene_folder / kTimesFile)) return none;
   std::map<std::string, FrameTime> time_of_file;
   {
     const std::map<std::string, FrameTime> times = LoadColmapTimes(scene_folder / kTimesFile);
@@ -87,14 +87,14 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
 
 // Orders views by the names of their photos, so that the result does not depend on COLMAP's
 // numbers.
-NamedViews NamesOf(const ColmapModel& model, const NamedFiles& photos) {
+NamedViews MatchPhotos(const ColmapModel& model, const NamedFiles& photos) {
   std::vector<std::pair<std::string, uint32_t>> order;
   for (const auto& [id, image] : model.images) order.emplace_back(image.name, id);
-  std::sort(order.begin(), order.end());
+  std::ranges::sort(order);
   std::vector<std::string> names;
   for (size_t i = 0; i < order.size(); ++i) {
     std::string name = order[i].first;
-    std::replace(name.begin(), name.end(), '\\', '/');
+    std::ranges::replace(name, '\\', '/');
     while (name.starts_with("./")) name.erase(0, 2);
     if (!IsSafeRelativePath(name)) {
       throw InvalidArgument(
@@ -148,25 +148,19 @@ void NoteMissing(const NamedViews& named, size_t total, std::vector<std::string>
 }
 
 // Points without tracks get the views whose picture they fall into.
-std::vector<SparsePoint> PointsOf(const ColmapModel& model,
-                                  const std::map<uint32_t, int>& view_of_image,
-                                  const Scene& scene) {
+std::vector<SparsePoint> MakePoints(const ColmapModel& model,
+                                    const std::map<uint32_t, int>& view_of_image,
+                                    const Scene& scene) {
   std::vector<SparsePoint> points;
   points.reserve(model.points.size());
   for (const ColmapPoint& from : model.points) {
-    SparsePoint point;
-    point.position = from.position;
-    point.reprojection_error_px = from.error_px;
-    std::set<int> views;
     for (const uint32_t image_id : from.image_ids) {
       if (!model.images.contains(image_id)) {
         throw InvalidArgument("points3D refers to image {}, which the model does not have",
                               image_id);
       }
-      const auto view = view_of_image.find(image_id);
-      if (view != view_of_image.end()) views.insert(view->second);
     }
-    point.views.assign(views.begin(), views.end());
+    SparsePoint point = MakeSparsePoint(from, view_of_image);
     if (from.image_ids.empty()) {
       point.reprojection_error_px = -1.0;
       point.views = ViewsFacing(scene, point.position, 0.0);
@@ -176,12 +170,12 @@ std::vector<SparsePoint> PointsOf(const ColmapModel& model,
   return points;
 }
 
-Scene SceneOf(const ColmapModel& model,
-              const NamedViews& named,
-              const NamedFiles& photos,
-              const fs::path& scene_folder,
-              std::vector<std::string>* warnings,
-              std::vector<std::string>* cameras) {
+Scene MakeScene(const ColmapModel& model,
+                const NamedViews& named,
+                const NamedFiles& photos,
+                const fs::path& scene_folder,
+                std::vector<std::string>* warnings,
+                std::vector<std::string>* cameras) {
   if (model.images.empty()) throw InvalidArgument("the COLMAP model has no images");
   NoteMissing(named, model.images.size(), warnings);
   if (warnings != nullptr) {
@@ -198,29 +192,22 @@ Scene SceneOf(const ColmapModel& model,
     view.captured_camera = camera.camera;
     view.distortion = camera.distortion;
     view.cam_from_world = image.cam_from_world;
-    Photo photo{view.name, view.image_file};
-    ProbePhoto(scene_folder, &photo);
-    FitViewToPhoto(photo, &view);
+    FitViewToFile(scene_folder, &view);
     views.emplace_back(std::move(view), named.images[i]);
   }
-  std::sort(views.begin(), views.end(), [](const auto& x, const auto& y) {
-    return x.first.name < y.first.name;
-  });
+  std::ranges::sort(views, {}, [](const auto& view) { return view.first.name; });
   Scene scene;
   std::map<uint32_t, int> view_of_image;
   for (auto& [view, image] : views) {
     view_of_image[image] = static_cast<int>(scene.views.size());
     scene.views.push_back(std::move(view));
   }
-  FrameMoments moments = ReadMoments(scene_folder, photos, scene.views);
-  for (size_t i = 0; i < scene.views.size(); ++i) scene.views[i].moment = moments.moments[i];
-  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
-  if (cameras != nullptr) *cameras = std::move(moments.cameras);
-  scene.points = PointsOf(model, view_of_image, scene);
+  AddMoments(ReadMoments(scene_folder, photos, scene.views), &scene, warnings, cameras);
+  scene.points = MakePoints(model, view_of_image, scene);
   return scene;
 }
 
-std::string Shown(const std::string& folder) {
+std::string FolderText(const std::string& folder) {
   return folder.empty() ? "the scene's own folder" : folder;
 }
 
@@ -232,7 +219,7 @@ Scene ReadColmapModel(const fs::path& model_folder,
                       std::vector<std::string>* cameras) {
   const ColmapModel model = LoadColmapModel(model_folder);
   const NamedFiles photos = NamedFiles::Photos(scene_folder);
-  return SceneOf(model, NamesOf(model, photos), photos, scene_folder, warnings, cameras);
+  return MakeScene(model, MatchPhotos(model, photos), photos, scene_folder, warnings, cameras);
 }
 
 std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
@@ -246,13 +233,14 @@ std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
   for (const ColmapPlace& place : places) {
     try {
       const ColmapModel model = LoadColmapModel(scene_folder / place.folder);
-      const size_t found = NamesOf(model, photos).images.size();
-      counts.push_back(fmt::format("{} has {} of {}", Shown(place.folder), found, photos.size()));
+      const size_t found = MatchPhotos(model, photos).images.size();
+      counts.push_back(
+          fmt::format("{} has {} of {}", FolderText(place.folder), found, photos.size()));
       if (!choice || found > choice->photos) choice = ColmapChoice{place.folder, found, {}};
     } catch (const Error& e) {
       if (!refusal) refusal = e;
-      notes.push_back(
-          fmt::format("the COLMAP model in {} is not used: {}", Shown(place.folder), e.what()));
+      notes.push_back(fmt::format(
+          "the COLMAP model in {} is not used: {}", FolderText(place.folder), e.what()));
     }
   }
   if (!choice) throw *refusal;
@@ -261,7 +249,7 @@ std::optional<ColmapChoice> ChooseColmapModel(const fs::path& scene_folder) {
     choice->notes.push_back(fmt::format(
         "there are {} COLMAP models; the one in {} is used, since it has most photos ({})",
         counts.size(),
-        Shown(choice->folder),
+        FolderText(choice->folder),
         SummarizeNames(counts, 8)));
   }
   return choice;

@@ -71,7 +71,7 @@ class Lines {
   }
   // As Number, for integers. Accepts 154.0, as in tables saved as floating point numbers.
   template <typename T>
-  T Whole() {
+  T WholeNumber() {
     const std::string_view word = Peek();
     const size_t dot = word.find('.');
     if (dot == word.npos || dot == 0) return Number<T>();
@@ -126,7 +126,7 @@ bool IsNumber(std::string_view word) {
 
 // Returns true for the line of a photo (number, pose, camera, name), false for one of observations
 // (three numbers each): some programs write no second line for photos without observations.
-bool IsLineOfPhoto(std::string_view line) {
+bool IsImageLine(std::string_view line) {
   constexpr size_t kWordsBeforeName = 9;
   size_t count = 0;
   while (!line.empty() && count < kWordsBeforeName + 2) {
@@ -146,8 +146,8 @@ bool IsLineOfPhoto(std::string_view line) {
 constexpr uint64_t kNoPoint = std::numeric_limits<uint64_t>::max();
 
 int64_t PointId(Lines& lines) {
-  if (lines.Peek().starts_with('-')) return lines.Whole<int64_t>();
-  const uint64_t id = lines.Whole<uint64_t>();
+  if (lines.Peek().starts_with('-')) return lines.WholeNumber<int64_t>();
+  const uint64_t id = lines.WholeNumber<uint64_t>();
   return id == kNoPoint ? -1 : static_cast<int64_t>(id);
 }
 
@@ -155,11 +155,11 @@ std::map<uint32_t, ColmapCamera> ReadCameras(const fs::path& path) {
   Lines lines(path);
   std::map<uint32_t, ColmapCamera> cameras;
   while (lines.NextRecord()) {
-    const uint32_t id = lines.Whole<uint32_t>();
+    const uint32_t id = lines.WholeNumber<uint32_t>();
     const std::string place = fmt::format("{}: camera {}", lines.Place(), id);
     const std::string model(lines.Word());
-    const uint64_t width = lines.Whole<uint64_t>();
-    const uint64_t height = lines.Whole<uint64_t>();
+    const uint64_t width = lines.WholeNumber<uint64_t>();
+    const uint64_t height = lines.WholeNumber<uint64_t>();
     std::vector<double> parameters;
     while (!lines.AtEndOfLine()) parameters.push_back(lines.Number<double>());
     if (!cameras.emplace(id, MakeColmapCamera(model, width, height, parameters, place)).second) {
@@ -173,13 +173,13 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
   Lines lines(path);
   std::map<uint32_t, ColmapImage> images;
   while (lines.NextRecord()) {
-    const uint32_t id = lines.Whole<uint32_t>();
+    const uint32_t id = lines.WholeNumber<uint32_t>();
     double qvec[4];
     double tvec[3];
     for (double& v : qvec) v = lines.Number<double>();
     for (double& v : tvec) v = lines.Number<double>();
     ColmapImage image;
-    image.camera_id = lines.Whole<uint32_t>();
+    image.camera_id = lines.WholeNumber<uint32_t>();
     image.name = lines.Rest();
     CheckColmapName(image.name, lines.Place());
     const std::string place = lines.Place() + ": image " + image.name;
@@ -188,7 +188,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
     bool more = lines.NextLine();
     while (more && lines.Line().starts_with('#')) more = lines.NextLine();
     if (more) {
-      if (IsLineOfPhoto(lines.Line())) lines.PutBack();
+      if (IsImageLine(lines.Line())) lines.PutBack();
       while (!lines.AtEndOfLine()) {
         ColmapObservation observation;
         observation.pixel.x() = lines.Number<double>();
@@ -208,7 +208,7 @@ std::vector<ColmapPoint> ReadPoints(const fs::path& path) {
   Lines lines(path);
   std::vector<ColmapPoint> points;
   while (lines.NextRecord()) {
-    const uint64_t id = lines.Whole<uint64_t>();
+    const uint64_t id = lines.WholeNumber<uint64_t>();
     ColmapPoint point;
     point.id = id;
     for (int i = 0; i < 3; ++i) point.position[i] = lines.Number<double>();
@@ -217,7 +217,7 @@ std::vector<ColmapPoint> ReadPoints(const fs::path& path) {
     if (!lines.AtEndOfLine()) point.error_px = KnownError(lines.Number<double>());
     CheckColmapPoint(point, fmt::format("{}: point {}", lines.Place(), id));
     while (!lines.AtEndOfLine()) {
-      point.image_ids.push_back(lines.Whole<uint32_t>());
+      point.image_ids.push_back(lines.WholeNumber<uint32_t>());
       lines.Word();  // index of the observation
     }
     points.push_back(std::move(point));

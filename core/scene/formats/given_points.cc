@@ -12,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/base/evenly.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
@@ -47,10 +48,10 @@ NamedFiles PlyFiles(const fs::path& scene_folder) {
 }
 
 // Returns the file of points, relative to the scene's folder; empty if there is none.
-std::string FileOfPoints(const json& transforms,
-                         const std::string& file_name,
-                         const fs::path& scene_folder,
-                         std::vector<std::string>* warnings) {
+std::string FindPointFile(const json& transforms,
+                          const std::string& file_name,
+                          const fs::path& scene_folder,
+                          std::vector<std::string>* warnings) {
   const auto named = transforms.find("ply_file_path");
   if (named != transforms.end() && named->is_string() && !named->get<std::string>().empty()) {
     const std::string name = named->get<std::string>();
@@ -62,9 +63,8 @@ std::string FileOfPoints(const json& transforms,
     }
     return file;
   }
-  std::error_code error;
   for (const std::string_view file : kPointFiles) {
-    if (fs::is_regular_file(scene_folder / file, error)) return std::string(file);
+    if (IsFile(scene_folder / file)) return std::string(file);
   }
   return "";
 }
@@ -97,11 +97,13 @@ double ShareSeen(const Scene& scene, const Positions& points, const Eigen::Affin
 }
 
 // Returns the transform from the file's frame to that of the poses.
-Eigen::Affine3d FrameOf(const json& transforms, const Scene& scene, const Positions& points) {
+Eigen::Affine3d PointTransform(const json& transforms,
+                               const Scene& scene,
+                               const Positions& points) {
   const Eigen::Affine3d as_it_is = Eigen::Affine3d::Identity();
   const std::optional<Eigen::Affine3d> applied = AppliedTransform(transforms);
   if (!applied) return as_it_is;
-  const Positions tried = EvenlyOf(points, kTriedPoints);
+  const Positions tried = PickEvenly(points, kTriedPoints);
   Eigen::Affine3d best = as_it_is;
   // Keeps the points in the frame of the poses unless far fewer are visible there.
   double most = 2.0 * ShareSeen(scene, tried, as_it_is);
@@ -120,7 +122,7 @@ std::vector<SparsePoint> ReadGivenPoints(const json& transforms,
                                          const Scene& scene,
                                          std::vector<std::string>* warnings) {
   std::vector<SparsePoint> points;
-  const std::string file = FileOfPoints(transforms, file_name, scene_folder, warnings);
+  const std::string file = FindPointFile(transforms, file_name, scene_folder, warnings);
   if (file.empty()) return points;
   std::error_code error;
   if (const auto bytes = fs::file_size(scene_folder / file, error); error || bytes > kMaxBytes) {
@@ -137,7 +139,7 @@ std::vector<SparsePoint> ReadGivenPoints(const json& transforms,
     Warn(warnings, fmt::format("the given points are not used: {}", e.what()));
     return points;
   }
-  const Eigen::Affine3d transform = FrameOf(transforms, scene, positions);
+  const Eigen::Affine3d transform = PointTransform(transforms, scene, positions);
   for (const Eigen::Vector3d& position : positions) {
     SparsePoint point;
     point.position = transform * position;

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/json_text.h"
 #include "core/catalogue/film_rate.h"
@@ -30,15 +31,14 @@ constexpr char kPoints[] = "points.npy";
 constexpr size_t kMaxPoints = 500'000;
 
 json ParseObject(const fs::path& folder, const std::string& file) {
-  std::error_code error;
-  if (!fs::is_regular_file(folder / file, error)) throw InvalidArgument("{} is missing", file);
+  if (!IsFile(folder / file)) throw InvalidArgument("{} is missing", file);
   json root = ParseJson(ReadFile(folder / file), file);
   if (!root.is_object()) throw InvalidArgument("{} is not a JSON object", file);
   return root;
 }
 
 // Flattens nested lists of numbers.
-std::vector<double> NumbersOf(const FrameFields& fields, const char* key, size_t count) {
+std::vector<double> ReadNumbers(const FrameFields& fields, const char* key, size_t count) {
   const json* list = fields.Find(key);
   std::vector<double> numbers;
   bool good = list != nullptr && list->is_array() && list->size() <= count;
@@ -72,7 +72,7 @@ double Positive(const FrameFields& fields, const char* key, double absent) {
 // OpenCV's axes; orientation: from world to camera.
 void ReadCamera(const json& root, const std::string& file, View* view) {
   const FrameFields fields(root, root, file);
-  const std::vector<double> r = NumbersOf(fields, "orientation", 9);
+  const std::vector<double> r = ReadNumbers(fields, "orientation", 9);
   const Eigen::Matrix3d axes =
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(r.data());
   if (!(std::abs(axes.determinant() - 1.0) < 1e-2) ||
@@ -80,15 +80,13 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
     throw InvalidArgument(
         "{}: orientation is not a rotation (determinant {:g})", file, axes.determinant());
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
-  view->cam_from_world.rotation = Eigen::Quaterniond(rotation).normalized();
-  const std::vector<double> position = NumbersOf(fields, "position", 3);
+  view->cam_from_world.rotation = Eigen::Quaterniond(NearestRotation(axes)).normalized();
+  const std::vector<double> position = ReadNumbers(fields, "position", 3);
   const Eigen::Vector3d place(position[0], position[1], position[2]);
   RequireWithinReach(place, file);
   view->cam_from_world.translation = -(view->cam_from_world.rotation * place);
-  const std::vector<double> size = NumbersOf(fields, "image_size", 2);
-  const std::vector<double> center = NumbersOf(fields, "principal_point", 2);
+  const std::vector<double> size = ReadNumbers(fields, "image_size", 2);
+  const std::vector<double> center = ReadNumbers(fields, "principal_point", 2);
   if (!(size[0] >= 1.0 && size[1] >= 1.0 && size[0] <= 1e6 && size[1] <= 1e6)) {
     throw InvalidArgument("{}: image_size is {:g} x {:g} px", file, size[0], size[1]);
   }
@@ -103,19 +101,19 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
                            center[0],
                            center[1]};
   std::vector<double> radial(3, 0.0), tangential(2, 0.0);
-  if (fields.Find("radial_distortion")) radial = NumbersOf(fields, "radial_distortion", 3);
+  if (fields.Find("radial_distortion")) radial = ReadNumbers(fields, "radial_distortion", 3);
   if (fields.Find("tangential_distortion")) {
-    tangential = NumbersOf(fields, "tangential_distortion", 2);
+    tangential = ReadNumbers(fields, "tangential_distortion", 2);
   }
   view->distortion.k = {radial[0], radial[1], tangential[0], tangential[1], radial[2]};
   const auto& k = view->distortion.k;
-  if (std::any_of(k.begin(), k.end(), [](double v) { return v != 0.0; })) {
+  if (std::ranges::any_of(k, [](double v) { return v != 0.0; })) {
     view->distortion.model = Distortion::Model::kBrown;
   }
 }
 
 // Returns the picture of the frame, relative to the scene's folder; empty if there is none.
-std::string PictureOf(const NamedFiles& photos, const std::string& name) {
+std::string FindPicture(const NamedFiles& photos, const std::string& name) {
   for (const char* scale : {"2x", "1x", "4x", "8x"}) {
     const std::string file = photos.Find(fmt::format("rgb/{}/{}", scale, name));
     if (file.starts_with("rgb/")) return file;
@@ -123,7 +121,7 @@ std::string PictureOf(const NamedFiles& photos, const std::string& name) {
   return "";
 }
 
-FrameTime TimeOf(const json& entry, const std::string& name, const std::string& file) {
+FrameTime ReadFrameTime(const json& entry, const std::string& name, const std::string& file) {
   const std::string place = fmt::format("{}: {}", kMetadata, name);
   if (!entry.is_object()) throw InvalidArgument("{} must be an object", place);
   const FrameFields fields(entry, entry, place);
@@ -137,8 +135,7 @@ FrameTime TimeOf(const json& entry, const std::string& name, const std::string& 
 
 // Occlusion is unknown: a point lists the views whose picture it falls into.
 std::vector<SparsePoint> ReadPoints(const fs::path& scene_folder, const Scene& scene) {
-  std::error_code error;
-  if (!fs::is_regular_file(scene_folder / kPoints, error)) return {};
+  if (!IsFile(scene_folder / kPoints)) return {};
   const NpyArray array = ReadNpy(ReadFile(scene_folder / kPoints), kPoints, 3 * kMaxPoints);
   if (array.shape.size() != 2 || array.shape[1] != 3) {
     throw InvalidArgument("{} must have three columns", kPoints);
@@ -155,9 +152,7 @@ std::vector<SparsePoint> ReadPoints(const fs::path& scene_folder, const Scene& s
 }  // namespace
 
 bool IsNerfiesFolder(const fs::path& folder) {
-  std::error_code error;
-  return fs::is_regular_file(folder / kMetadata, error) &&
-         fs::is_directory(folder / "camera", error) && fs::is_directory(folder / "rgb", error);
+  return IsFile(folder / kMetadata) && IsFolder(folder / "camera") && IsFolder(folder / "rgb");
 }
 
 Scene ReadNerfies(const fs::path& scene_folder,
@@ -173,18 +168,16 @@ Scene ReadNerfies(const fs::path& scene_folder,
       throw InvalidArgument("{}: '{}' is no name of a frame", kMetadata, name);
     }
     View view;
-    view.image_file = PictureOf(photos, name);
+    view.image_file = FindPicture(photos, name);
     if (view.image_file.empty()) {
       missing.push_back(name);
       continue;
     }
     view.name = name + fs::path(view.image_file).extension().string();
-    times.push_back(TimeOf(entry, name, view.image_file));
+    times.push_back(ReadFrameTime(entry, name, view.image_file));
     const std::string camera_file = "camera/" + name + ".json";
     ReadCamera(ParseObject(scene_folder, camera_file), camera_file, &view);
-    Photo photo{view.name, view.image_file};
-    ProbePhoto(scene_folder, &photo);
-    FitViewToPhoto(photo, &view);
+    FitViewToFile(scene_folder, &view);
     scene.views.push_back(std::move(view));
   }
   if (scene.views.size() < 2) {
@@ -195,9 +188,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
         frames.size(),
         scene.views.size());
   }
-  FrameMoments moments = MomentsOf(times);
-  for (size_t i = 0; i < times.size(); ++i) scene.views[i].moment = moments.moments[i];
-  if (warnings != nullptr && !moments.note.empty()) warnings->push_back(moments.note);
+  AddMoments(MomentsOf(times), &scene, warnings, cameras);
   if (warnings != nullptr && !missing.empty()) {
     warnings->push_back(
         fmt::format("{} of the {} frames of {} have no picture in rgb/ and were left out: {}",
@@ -206,10 +197,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
                     kMetadata,
                     SummarizeNames(missing)));
   }
-  if (cameras != nullptr) *cameras = std::move(moments.cameras);
-  std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {
-    return x.name < y.name;
-  });
+  std::ranges::sort(scene.views, {}, &View::name);
   scene.points = ReadPoints(scene_folder, scene);
   return scene;
 }

@@ -54,8 +54,7 @@ class Nerfies : public testing::Test {
       WriteCamera(name, scene.views[i]);
       Write("rgb/2x/" + name + ".png", EncodePng8(GradientPhoto(48, 32, 3)));
       metadata += fmt::format(
-          "{}\"{}\":{{\"warp_id\":{},\"time_id\":{},\"appearance_id\":0,"
-          "\"camera_id\":{}}}",
+          "{}\"{}\":{{\"warp_id\":{},\"time_id\":{},\"appearance_id\":0,\"camera_id\":{}}}",
           i == 0 ? "" : ",",
           name,
           7,

@@ -61,7 +61,8 @@ std::vector<double> Numbers(std::string_view bytes, size_t count) {
   return values;
 }
 
-std::vector<double> InCOrder(const std::vector<double>& fortran, const std::vector<size_t>& shape) {
+std::vector<double> ToRowMajor(const std::vector<double>& fortran,
+                               const std::vector<size_t>& shape) {
   std::vector<double> values(fortran.size());
   std::vector<size_t> at(shape.size(), 0);
   for (const double value : fortran) {
@@ -108,7 +109,7 @@ NpyArray ReadNpy(std::string_view bytes, const std::string& file_name, size_t ma
     if (!std::isfinite(value)) throw wrong("holds a number that is not finite");
   }
   if (After(header, "'fortran_order'").starts_with("True")) {
-    array.values = InCOrder(array.values, array.shape);
+    array.values = ToRowMajor(array.values, array.shape);
   }
   return array;
 }

@@ -136,9 +136,8 @@ class PlyPoints {
   void AddProperty(std::string_view line) {
     if (!in_vertices_) return;
     const std::string_view type_name = TakeWord(&line), name = TakeWord(&line);
-    const Type* type = std::find_if(std::begin(kTypes), std::end(kTypes), [&](const Type& t) {
-      return t.name == type_name || t.other_name == type_name;
-    });
+    const Type* type = std::ranges::find_if(
+        kTypes, [&](const Type& t) { return t.name == type_name || t.other_name == type_name; });
     if (type == std::end(kTypes)) throw Wrong("has vertices with lists, which are not read");
     for (size_t axis = 0; axis < 3; ++axis) {
       if (name.size() == 1 && name[0] == "xyz"[axis]) axes_[axis] = static_cast<int>(row_.size());

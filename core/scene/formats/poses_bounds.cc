@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/scene/formats/given_points.h"
@@ -25,7 +26,7 @@ constexpr size_t kColumns = 17;
 constexpr size_t kMaxValues = 17 * 10'000;
 constexpr double kMaxSidePx = 1e6;
 
-View ViewOf(const double* row, const std::string& place) {
+View MakeView(const double* row, const std::string& place) {
   const auto column = [&](int c) -> Eigen::Vector3d { return {row[c], row[5 + c], row[10 + c]}; };
   Eigen::Matrix3d world_from_cam;  // x right, y down, z forward
   world_from_cam << column(1), column(0), -column(2);
@@ -52,9 +53,7 @@ View ViewOf(const double* row, const std::string& place) {
                           focal,
                           0.5 * width,
                           0.5 * height};
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(world_from_cam,
-                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
+  const Eigen::Matrix3d rotation = NearestRotation(world_from_cam);
   view.cam_from_world.rotation =
       Eigen::Quaterniond(Eigen::Matrix3d(rotation.transpose())).normalized();
   view.cam_from_world.translation = -(view.cam_from_world.rotation * column(3));
@@ -73,8 +72,7 @@ NpyArray ReadRows(const fs::path& scene_folder) {
 
 std::optional<Scene> ReadPosesOfPhotos(const fs::path& scene_folder,
                                        std::vector<std::string>* warnings) {
-  std::error_code error;
-  if (!fs::is_regular_file(scene_folder / kPosesBounds, error)) return std::nullopt;
+  if (!IsFile(scene_folder / kPosesBounds)) return std::nullopt;
   const NpyArray poses = ReadRows(scene_folder);
   const std::vector<Photo> photos = ListPhotos(scene_folder);
   if (poses.shape[0] != photos.size()) {
@@ -90,12 +88,10 @@ std::optional<Scene> ReadPosesOfPhotos(const fs::path& scene_folder,
   }
   Scene scene;
   for (size_t i = 0; i < photos.size(); ++i) {
-    View view = ViewOf(&poses.values[i * kColumns], fmt::format("{}: row {}", kPosesBounds, i));
-    Photo photo = photos[i];
-    view.name = photo.name;
-    view.image_file = photo.file;
-    ProbePhoto(scene_folder, &photo);
-    FitViewToPhoto(photo, &view);
+    View view = MakeView(&poses.values[i * kColumns], fmt::format("{}: row {}", kPosesBounds, i));
+    view.name = photos[i].name;
+    view.image_file = photos[i].file;
+    FitViewToFile(scene_folder, &view);
     scene.views.push_back(std::move(view));
   }
   scene.points =
@@ -109,7 +105,7 @@ std::vector<CameraFilm> ReadPosesBounds(const fs::path& scene_folder) {
     if (HasFilmExtension(file) && file.find('/') == std::string::npos) files.push_back(file);
   }
   if (files.empty()) return {};
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   const NpyArray poses = ReadRows(scene_folder);
   if (poses.shape[0] != files.size()) {
     throw InvalidArgument(
@@ -124,8 +120,9 @@ std::vector<CameraFilm> ReadPosesBounds(const fs::path& scene_folder) {
   std::vector<CameraFilm> films;
   for (size_t i = 0; i < files.size(); ++i) {
     const std::string place = fmt::format("{}: row {}", kPosesBounds, i);
-    films.push_back(
-        {fs::path(files[i]).stem().string(), files[i], ViewOf(&poses.values[i * kColumns], place)});
+    films.push_back({fs::path(files[i]).stem().string(),
+                     files[i],
+                     MakeView(&poses.values[i * kColumns], place)});
   }
   return films;
 }

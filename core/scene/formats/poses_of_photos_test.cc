@@ -206,7 +206,7 @@ TEST_F(PosesOfPhotos, MergesFilesOfBlender) {
       Contains("the frames of transforms_train.json and transforms_test.json are taken together"));
 }
 
-// Rows as LLFF has them: axes down, right, backwards, place; height, width, focal length.
+// Rows as LLFF has them: axes down, right, backwards, position; height, width, focal length.
 std::string PosesBounds(const Scene& scene) {
   std::vector<double> values;
   for (const View& view : scene.views) {

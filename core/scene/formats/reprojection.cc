@@ -1,9 +1,10 @@
 #include "core/scene/formats/reprojection.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <unordered_map>
 
 #include "core/scene/lens.h"
@@ -62,7 +63,7 @@ std::vector<CameraReprojection> MeasureReprojection(const ColmapModel& model) {
   for (auto& [id, camera] : result) {
     if (camera.observations > 0) camera.mean_px /= static_cast<double>(camera.observations);
     camera.median_px = Median(std::move(distances[id]));
-    std::sort(camera.photos.begin(), camera.photos.end());
+    std::ranges::sort(camera.photos);
     cameras.push_back(std::move(camera));
   }
   return cameras;
@@ -82,17 +83,14 @@ std::vector<std::string> ReprojectionWarnings(const std::vector<CameraReprojecti
     const bool stands_out = !others.empty() && camera.median_px > kTimesTheOthers * usual &&
                             camera.median_px > kMinSuspiciousPx;
     if (camera.median_px <= kLargeMedianPx && !stands_out) continue;
-    std::string photos;
-    for (size_t i = 0; i < std::min(camera.photos.size(), kNamedPhotos); ++i) {
-      photos += (i == 0 ? "" : ", ") + camera.photos[i];
-    }
-    if (camera.photos.size() > kNamedPhotos) photos += ", ...";
+    const std::span named(camera.photos.data(), std::min(camera.photos.size(), kNamedPhotos));
     warnings.push_back(fmt::format(
-        "the intrinsics of camera {} ({}) do not fit its photos: points project {:.2f} px from "
+        "the intrinsics of camera {} ({}{}) do not fit its photos: points project {:.2f} px from "
         "where they are seen (median; mean {:.2f} px{}); check focal length and distortion, or "
         "give the photos without poses",
         camera.camera_id,
-        photos,
+        fmt::join(named, ", "),
+        camera.photos.size() > kNamedPhotos ? ", ..." : "",
         camera.median_px,
         camera.mean_px,
         others.empty() ? "" : fmt::format("; other cameras {:.2f} px", usual)));

@@ -44,13 +44,7 @@ Scene ReadTransformsJson(const std::vector<std::filesystem::path>& json_files,
                          const std::filesystem::path& scene_folder,
                          std::vector<std::string>* warnings = nullptr,
                          std::vector<std::string>* cameras = nullptr);
-inline Scene ReadTransformsJson(const std::filesystem::path& json_file,
-                                const std::filesystem::path& scene_folder,
-                                std::vector<std::string>* warnings = nullptr,
-                                std::vector<std::string>* cameras = nullptr) {
-  return ReadTransformsJson(
-      std::vector<std::filesystem::path>{json_file}, scene_folder, warnings, cameras);
-}
+
 // Returns the files that ReadTransformsJson reads; empty if there are none.
 std::vector<std::filesystem::path> TransformsFiles(const std::filesystem::path& scene_folder);
 // Returns the number of given photos that they place. Throws as ReadTransformsJson for files that

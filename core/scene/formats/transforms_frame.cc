@@ -57,8 +57,7 @@ Distortion ReadDistortion(const FrameFields& fields) {
                   fields.NumberOr("k4", 0),
                   fields.NumberOr("k5", 0),
                   fields.NumberOr("k6", 0)};
-  const bool any =
-      std::any_of(distortion.k.begin(), distortion.k.end(), [](double k) { return k != 0.0; });
+  const bool any = std::ranges::any_of(distortion.k, [](double k) { return k != 0.0; });
   if (any) distortion.model = Distortion::Model::kBrown;
   return distortion;
 }
@@ -123,7 +122,7 @@ Camera ReadIntrinsics(const FrameFields& fields, int width, int height) {
     throw InvalidArgument("{}: fl_x or camera_angle_x is missing", fields.place());
   }
   camera.fx = *fx;
-  camera.fy = fy.value_or(*fx);  // square pixels unless told otherwise
+  camera.fy = fy.value_or(*fx);  // square pixels unless given
   camera.cx = fields.NumberOr("cx", 0.5 * camera.width);
   camera.cy = fields.NumberOr("cy", 0.5 * camera.height);
   if (!(camera.fx > 0.0 && camera.fy > 0.0 && camera.fx < 1e9 && camera.fy < 1e9)) {
@@ -166,10 +165,8 @@ Pose ReadTransform(const FrameFields& fields) {
   }
   RequireWithinReach(m.col(3), fields.place());
   // Nearest rotation, then y and z reversed.
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d world_from_gl = svd.matrixU() * svd.matrixV().transpose();
   const Eigen::Matrix3d world_from_cam =
-      world_from_gl * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
+      NearestRotation(axes) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();
   Pose pose;
   pose.rotation = Eigen::Quaterniond(Eigen::Matrix3d(world_from_cam.transpose())).normalized();
   pose.translation = -(pose.rotation * m.col(3));

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/pose_files.h"
 #include "core/scene/formats/given_points.h"
@@ -36,7 +37,7 @@ std::vector<Source> ReadSources(const std::vector<fs::path>& files) {
   return sources;
 }
 
-std::string NamesOf(const std::vector<Source>& sources) {
+std::string JoinNames(const std::vector<Source>& sources) {
   std::string names;
   for (const Source& source : sources) names += (names.empty() ? "" : " and ") + source.name;
   return names;
@@ -50,7 +51,7 @@ struct Frame {
   std::string photo;
 };
 
-std::vector<Frame> FramesOf(const std::vector<Source>& sources) {
+std::vector<Frame> ReadFrames(const std::vector<Source>& sources) {
   std::vector<Frame> frames;
   for (const Source& source : sources) {
     for (size_t i = 0; i < source.root["frames"].size(); ++i) {
@@ -66,7 +67,8 @@ std::vector<Frame> FramesOf(const std::vector<Source>& sources) {
 }
 
 // Returns the photo of each frame; empty if there is none.
-std::vector<std::string> FilesOf(const std::vector<Frame>& frames, const fs::path& scene_folder) {
+std::vector<std::string> FindPhotos(const std::vector<Frame>& frames,
+                                    const fs::path& scene_folder) {
   std::vector<std::string> names;
   for (const Frame& frame : frames) names.push_back(frame.photo);
   return NamedFiles::Photos(scene_folder).Find(names);
@@ -116,9 +118,9 @@ void NoteMissing(const std::vector<std::string>& missing,
                   SummarizeNames(missing)));
 }
 
-void RefuseTwice(const std::vector<Frame>& frames,
-                 const std::vector<std::string>& files,
-                 const std::string& file_name) {
+void RejectDuplicateFrames(const std::vector<Frame>& frames,
+                           const std::vector<std::string>& files,
+                           const std::string& file_name) {
   std::map<std::string, size_t> frame_of_file;
   for (size_t i = 0; i < files.size(); ++i) {
     if (files[i].empty()) continue;
@@ -132,26 +134,15 @@ void RefuseTwice(const std::vector<Frame>& frames,
   }
 }
 
-void AddMoments(const std::vector<FrameTime>& times,
-                Scene* scene,
-                std::vector<std::string>* warnings,
-                std::vector<std::string>* cameras) {
-  FrameMoments moments = MomentsOf(times);
-  for (size_t i = 0; i < times.size(); ++i) scene->views[i].moment = moments.moments[i];
-  if (!moments.note.empty() && warnings != nullptr) warnings->push_back(std::move(moments.note));
-  if (cameras != nullptr) *cameras = std::move(moments.cameras);
-}
-
 }  // namespace
 
 std::vector<fs::path> TransformsFiles(const fs::path& scene_folder) {
-  std::error_code error;
-  if (const fs::path file = scene_folder / kTransformsFile; fs::is_regular_file(file, error)) {
+  if (const fs::path file = scene_folder / kTransformsFile; IsFile(file)) {
     return {file};
   }
   std::vector<fs::path> files;
   for (const std::string_view name : kBlenderFiles) {
-    if (fs::is_regular_file(scene_folder / name, error)) files.push_back(scene_folder / name);
+    if (IsFile(scene_folder / name)) files.push_back(scene_folder / name);
   }
   return files;
 }
@@ -159,8 +150,8 @@ std::vector<fs::path> TransformsFiles(const fs::path& scene_folder) {
 size_t CountTransformsPhotos(const std::vector<fs::path>& json_files,
                              const fs::path& scene_folder) {
   const std::vector<Source> sources = ReadSources(json_files);
-  const std::vector<std::string> files = FilesOf(FramesOf(sources), scene_folder);
-  return files.size() - static_cast<size_t>(std::count(files.begin(), files.end(), ""));
+  const std::vector<std::string> files = FindPhotos(ReadFrames(sources), scene_folder);
+  return files.size() - static_cast<size_t>(std::ranges::count(files, ""));
 }
 
 Scene ReadTransformsJson(const std::vector<fs::path>& json_files,
@@ -168,10 +159,10 @@ Scene ReadTransformsJson(const std::vector<fs::path>& json_files,
                          std::vector<std::string>* warnings,
                          std::vector<std::string>* cameras) {
   const std::vector<Source> sources = ReadSources(json_files);
-  const std::string file_name = NamesOf(sources);
-  const std::vector<Frame> frames = FramesOf(sources);
-  const std::vector<std::string> files = FilesOf(frames, scene_folder);
-  RefuseTwice(frames, files, file_name);
+  const std::string file_name = JoinNames(sources);
+  const std::vector<Frame> frames = ReadFrames(sources);
+  const std::vector<std::string> files = FindPhotos(frames, scene_folder);
+  RejectDuplicateFrames(frames, files, file_name);
   Scene scene;
   std::vector<std::string> missing;
   std::vector<FrameTime> times;
@@ -186,10 +177,8 @@ Scene ReadTransformsJson(const std::vector<fs::path>& json_files,
     scene.views.push_back(ReadView(fields, files[i], scene_folder));
   }
   NoteMissing(missing, frames.size(), scene.views.size(), file_name, warnings);
-  AddMoments(times, &scene, warnings, cameras);
-  std::sort(scene.views.begin(), scene.views.end(), [](const View& x, const View& y) {
-    return x.name < y.name;
-  });
+  AddMoments(MomentsOf(times), &scene, warnings, cameras);
+  std::ranges::sort(scene.views, {}, &View::name);
   if (sources.size() > 1 && warnings != nullptr) {
     warnings->push_back(fmt::format("the frames of {} are taken together", file_name));
   }

@@ -23,7 +23,7 @@ TEST(Transforms, RoundTrip) {
     const Scene scene = ArcScene(3, distortion);
     WritePhotos(scene, folder.path());
     WriteTransformsJson(scene, folder.path() / "transforms.json");
-    const Scene read = ReadTransformsJson(folder.path() / "transforms.json", folder.path());
+    const Scene read = ReadTransformsJson({folder.path() / "transforms.json"}, folder.path());
     ASSERT_EQ(read.views.size(), 3u);
     for (int i = 0; i < 3; ++i) {
       const View& g = read.views[i];
@@ -66,7 +66,7 @@ class TransformsFile : public testing::Test {
   }
   Scene Read(const std::string& text) {
     WriteFileAtomic(file(), text);
-    return ReadTransformsJson(file(), folder_.path());
+    return ReadTransformsJson({file()}, folder_.path());
   }
   std::string Said(const std::string& text) {
     return Refusal([&] { Read(text); });
@@ -121,7 +121,7 @@ TEST_F(TransformsFile, LeavesOutMissingPhotosWithWarning) {
                "{\"file_path\":\"images/gone.png\",\"transform_matrix\":[]},");
   WriteFileAtomic(file(), text);
   std::vector<std::string> warnings;
-  EXPECT_EQ(ReadTransformsJson(file(), folder_.path(), &warnings).views.size(), 2u);
+  EXPECT_EQ(ReadTransformsJson({file()}, folder_.path(), &warnings).views.size(), 2u);
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_THAT(warnings[0], HasSubstr("1 of the 3 photos"));
   EXPECT_THAT(warnings[0], HasSubstr("images/gone.png"));
@@ -130,7 +130,7 @@ TEST_F(TransformsFile, LeavesOutMissingPhotosWithWarning) {
   EXPECT_THAT(Said(text), testing::Not(HasSubstr(folder_.path().string())));
 }
 
-// Json() with the fields that each of the two frames has on its own.
+// Json() with additional fields for each of the two frames.
 std::string TimedJson(const std::string& of_a, const std::string& of_b) {
   std::string text = Json("\"fl_x\":50");
   for (const auto& [name, fields] : {std::pair("./images/a", of_a), {"images/b.png", of_b}}) {
@@ -141,7 +141,7 @@ std::string TimedJson(const std::string& of_a, const std::string& of_b) {
 }
 
 TEST_F(TransformsFile, FramesHaveTimes) {
-  EXPECT_FALSE(Read(Json("\"fl_x\":50,\"time\":3")).views[0].moment);  // of no frame
+  EXPECT_FALSE(Read(Json("\"fl_x\":50,\"time\":3")).views[0].moment);  // not in a frame
   Scene scene = Read(TimedJson("\"time\":0.75,", "\"time\":0.25,"));
   EXPECT_EQ(scene.views[0].moment, (Moment{0.5, 0}));
   EXPECT_EQ(scene.views[1].moment, (Moment{0.0, 0}));
@@ -153,7 +153,7 @@ TEST_F(TransformsFile, FramesHaveTimes) {
   EXPECT_EQ(scene.views[1].moment, (Moment{0.0, 0}));
   std::vector<std::string> warnings;
   WriteFileAtomic(file(), TimedJson("\"time\":2,", "\"time\":2,"));
-  EXPECT_FALSE(ReadTransformsJson(file(), folder_.path(), &warnings).views[0].moment);
+  EXPECT_FALSE(ReadTransformsJson({file()}, folder_.path(), &warnings).views[0].moment);
   EXPECT_THAT(warnings.at(0), HasSubstr("the scene is static"));
 }
 

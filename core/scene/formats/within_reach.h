@@ -1,7 +1,8 @@
-// Range check for camera positions in files. For this folder only.
+// Range check of camera positions, and rotations from matrices, in files. For this folder only.
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/SVD>
 #include <string>
 
 #include "core/base/error.h"
@@ -18,6 +19,12 @@ inline void RequireWithinReach(const Eigen::Vector3d& position, const std::strin
                         position.x(),
                         position.y(),
                         position.z());
+}
+
+// Returns the rotation nearest to `axes`, whose scale is ignored.
+inline Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& axes) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return svd.matrixU() * svd.matrixV().transpose();
 }
 
 }  // namespace color3d

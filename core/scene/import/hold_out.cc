@@ -22,31 +22,25 @@ std::set<double> TrainingTimes(const Scene& scene) {
   return times;
 }
 
-bool AllHaveTimes(const Scene& scene) {
-  return std::all_of(scene.views.begin(), scene.views.end(), [](const View& view) {
-    return view.moment.has_value();
-  });
-}
-
 }  // namespace
 
-const char* NameOf(HeldOutAs how) {
+const char* NameOf(HoldOutKind how) {
   switch (how) {
-    case HeldOutAs::kCamera:
+    case HoldOutKind::kCamera:
       return "camera";
-    case HeldOutAs::kMoment:
+    case HoldOutKind::kMoment:
       return "moment";
-    case HeldOutAs::kBlock:
+    case HoldOutKind::kBlock:
       return "block";
-    case HeldOutAs::kNot:
+    case HoldOutKind::kNot:
       break;
   }
   return "";
 }
 
-std::vector<HeldOutAs> HeldOutKinds(const Scene& scene) {
-  std::vector<HeldOutAs> how(scene.views.size(), HeldOutAs::kNot);
-  if (!AllHaveTimes(scene)) return how;
+std::vector<HoldOutKind> HeldOutKinds(const Scene& scene) {
+  std::vector<HoldOutKind> how(scene.views.size(), HoldOutKind::kNot);
+  if (!scene.HasTimes()) return how;
   const std::vector<double> times = scene.Times();
   const std::set<double> learnt_from = TrainingTimes(scene);
   std::set<int> cameras;  // of training views
@@ -58,17 +52,17 @@ std::vector<HeldOutAs> HeldOutKinds(const Scene& scene) {
     const View& view = scene.views[i];
     if (!view.held_out) continue;
     if (scene.capture().is_reconstructed && !cameras.contains(view.moment->shot)) {
-      how[i] = HeldOutAs::kCamera;
+      how[i] = HoldOutKind::kCamera;
       continue;
     }
-    const auto time = std::lower_bound(times.begin(), times.end(), view.time_s()) - times.begin();
-    how[i] = is_open(time - 1) || is_open(time + 1) ? HeldOutAs::kBlock : HeldOutAs::kMoment;
+    const auto time = std::ranges::lower_bound(times, view.time_s()) - times.begin();
+    how[i] = is_open(time - 1) || is_open(time + 1) ? HoldOutKind::kBlock : HoldOutKind::kMoment;
   }
   return how;
 }
 
 void HoldOutBlock(double share, Scene* scene) {
-  if (!AllHaveTimes(*scene)) {
+  if (!scene->HasTimes()) {
     throw InvalidArgument(
         "hold_out_block is {:g}, but these views have no times: it holds out a part of a film's "
         "time; leave it out",
@@ -78,8 +72,8 @@ void HoldOutBlock(double share, Scene* scene) {
   const int64_t all = std::ssize(times), count = std::llround(share * static_cast<double>(all));
   if (count < kFewestInBlock) {
     throw InvalidArgument(
-        "hold_out_block is {:g} of {} moments, which is less than two of them; give {:.2g} or more "
-        "(at most 0.5), or leave it out",
+        "hold_out_block is {:g} of {} time steps, which is less than two of them; give {:.2g} or "
+        "more (at most 0.5), or leave it out",
         share,
         all,
         static_cast<double>(kFewestInBlock) / static_cast<double>(all));
@@ -94,8 +88,8 @@ void HoldOutBlock(double share, Scene* scene) {
   const auto behind = std::distance(left.upper_bound(end_s), left.end());
   if (before >= kFewestBeside && behind >= kFewestBeside) return;
   throw InvalidArgument(
-      "hold_out_block is {:g}: of {} moments {} are left to learn from before the block and {} "
-      "behind it, and two are needed on each side; give less, or leave it out",
+      "hold_out_block is {:g}: of {} time steps, {} are left for training before the block and {} "
+      "after it, and two are needed on each side; give less, or leave it out",
       share,
       all,
       before,

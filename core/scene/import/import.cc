@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/catalogue/scene_files.h"
 #include "core/image/probe/probe.h"
 #include "core/scene/formats/nerfies.h"
@@ -39,7 +40,7 @@ constexpr size_t kMinTrainingViews = 2;
 // the views whose picture they fall into.
 void DropWeakPoints(Scene* scene) {
   auto weak = [](const SparsePoint& point) { return point.views.size() < 2; };
-  if (std::all_of(scene->points.begin(), scene->points.end(), weak)) {
+  if (std::ranges::all_of(scene->points, weak)) {
     for (SparsePoint& point : scene->points) {
       if (point.position.allFinite()) point.views = ViewsFacing(*scene, point.position, 0.0);
     }
@@ -54,8 +55,8 @@ void AddRandomPointsWhenEmpty(ImportResult* result) {
   scene.points = RandomPoints(scene, kRandomPoints, kRandomPointSeed);
   if (scene.points.empty()) {
     throw InvalidArgument(
-        "the scene has no sparse points, and its cameras look at nothing in "
-        "common; check the poses");
+        "the scene has no sparse points, and its cameras look at nothing in common; check the "
+        "poses");
   }
   result->random_points = true;
   result->warnings.push_back(fmt::format(
@@ -167,10 +168,10 @@ void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
   result->photos_found = static_cast<int>(std::max(photos.size(), result->scene.views.size()));
   std::vector<std::string> files;
   for (const View& view : result->scene.views) files.push_back(view.image_file);
-  std::sort(files.begin(), files.end());
+  std::ranges::sort(files);
   std::vector<std::string> unposed;
   for (const Photo& photo : photos) {
-    if (!std::binary_search(files.begin(), files.end(), photo.file)) unposed.push_back(photo.name);
+    if (!std::ranges::binary_search(files, photo.file)) unposed.push_back(photo.name);
   }
   if (unposed.empty()) return;
   result->warnings.push_back(fmt::format(
@@ -223,8 +224,7 @@ bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
 }
 
 void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
-  std::error_code error;
-  if (!fs::is_regular_file(scene_folder / kTimesFile, error)) return;
+  if (!IsFile(scene_folder / kTimesFile)) return;
   result->warnings.push_back(
       fmt::format("{} is not read: it goes with a COLMAP model{}",
                   kTimesFile,
@@ -233,14 +233,14 @@ void WarnOfUnreadTimes(const fs::path& scene_folder, ImportResult* result) {
                       : "; transforms.json and metadata.json have times of their own"));
 }
 
-// Dynamic scenes: holds out the views of all cameras at every eighth moment from the fifth on, so
-// that each has moments before and after it.
+// Dynamic scenes: holds out the views of all cameras at every eighth time from the fifth on, so
+// that each has times before and after it.
 void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
   std::set<double> times;
   for (const View& view : scene->views) times.insert(view.time_s());
   if (times.size() < kHoldOutEvery) {
     warnings->push_back(fmt::format(
-        "no view is held out for evaluation: the scene has only {} moments", times.size()));
+        "no view is held out for evaluation: the scene has only {} time steps", times.size()));
     return;
   }
   for (View& view : scene->views) {
@@ -250,7 +250,7 @@ void HoldOutMoments(Scene* scene, std::vector<std::string>* warnings) {
 }
 
 void HoldOutCamera(const std::string& camera, ImportResult* result) {
-  const auto found = std::find(result->cameras.begin(), result->cameras.end(), camera);
+  const auto found = std::ranges::find(result->cameras, camera);
   if (result->cameras.size() < 2) {
     throw InvalidArgument(
         "hold_out_camera is '{}', but the scene is not one of several cameras with "
@@ -295,8 +295,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
                          const RunControl& run) {
   options.Validate();
   run.cancel.ThrowIfCancelled();
-  std::error_code error;
-  if (!fs::is_directory(scene_folder, error)) {
+  if (!IsFolder(scene_folder)) {
     throw Error(ErrorCode::kNotFound, "{} is not a folder", scene_folder.string());
   }
   ImportResult result;
@@ -348,11 +347,10 @@ void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
   }
   RequireSeveralPositions(scene);
   result->photos_registered = static_cast<int>(scene.views.size());
-  result->masked_views = static_cast<int>(std::count_if(
-      scene.views.begin(), scene.views.end(), [](const View& v) { return !v.mask_file.empty(); }));
-  result->undistorted = std::any_of(scene.views.begin(), scene.views.end(), [](const View& v) {
-    return !IsUndistorted(v.distortion);
-  });
+  result->masked_views = static_cast<int>(
+      std::ranges::count_if(scene.views, [](const View& v) { return !v.mask_file.empty(); }));
+  result->undistorted =
+      std::ranges::any_of(scene.views, [](const View& v) { return !IsUndistorted(v.distortion); });
   DropWeakPoints(&scene);
   Normalise(result);
   AddRandomPointsWhenEmpty(result);
@@ -360,7 +358,7 @@ void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
   if (!options.hold_out_camera.empty()) HoldOutCamera(options.hold_out_camera, result);
   if (options.hold_out_block > 0.0) HoldOutBlock(options.hold_out_block, &scene);
   if (scene.TrainingViews().size() < kMinTrainingViews) {
-    throw InvalidArgument("only {} view is left to learn from when the others are held out",
+    throw InvalidArgument("only {} view is left for training when the others are held out",
                           scene.TrainingViews().size());
   }
 }

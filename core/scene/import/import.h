@@ -69,7 +69,7 @@ ImportResult PlaceSequence(const std::vector<SequenceFrame>& frames,
 void FinishPosedScene(const ImportOptions& options, ImportResult* result);
 
 // Marks every eighth view as held out, starting with the first; in dynamic scenes all views of
-// every eighth moment, starting with the fifth. Warns if the scene has too few.
+// every eighth time, starting with the fifth. Warns if the scene has too few.
 void HoldOutEveryEighth(Scene* scene, std::vector<std::string>* warnings);
 
 }  // namespace color3d

@@ -131,7 +131,7 @@ TEST_F(Import, HoldsOutTimeStepsWithAllCameras) {
   EXPECT_EQ(result.cameras, (std::vector<std::string>{"cam00", "cam01", "cam02"}));
   ASSERT_EQ(result.scene.views.size(), 42u);
   for (const View& view : result.scene.views) {
-    // Not the last step: after it nothing is known.
+    // Not the last step: no step follows it.
     EXPECT_EQ(view.held_out, view.name.ends_with("/14.png") || view.name.ends_with("/22.png"))
         << view.name;
     EXPECT_EQ(view.moment->shot, view.name[3] - '0');
@@ -143,7 +143,7 @@ TEST_F(Import, HoldsOutOneCamera) {
   options_.hold_out_every_eighth = true;
   options_.hold_out_camera = "cam01";
   const ImportResult result = Run();
-  EXPECT_THAT(result.warnings, testing::Contains(HasSubstr("only 3 moments")));
+  EXPECT_THAT(result.warnings, testing::Contains(HasSubstr("only 3 time steps")));
   for (const View& view : result.scene.views) {
     EXPECT_EQ(view.held_out, view.name.starts_with("cam1/")) << view.name;
   }
@@ -183,7 +183,7 @@ TEST_F(Import, IgnoresTimesWithoutColmapModel) {
               testing::Contains(HasSubstr("times.txt is not read: it goes with a COLMAP model")));
 }
 
-TEST_F(Import, HoldsOutBlockBesideCamerasAndMoments) {
+TEST_F(Import, HoldsOutBlockBesideCamerasAndTimes) {
   RigScene(20, folder_.path());
   options_.hold_out_every_eighth = true;
   options_.hold_out_camera = "cam01";

@@ -18,7 +18,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// x -> scale x + offset, cameras and points alike.
+// Maps cameras and points by x -> scale x + offset.
 Scene Moved(Scene scene, double scale, const Eigen::Vector3d& offset) {
   for (View& view : scene.views) {
     Pose& pose = view.cam_from_world;
@@ -131,7 +131,7 @@ TEST_F(ImportedScene, WritersUseWorldCoordinates) {
   WriteColmapText(scene, again.path());
   WriteTransformsJson(scene, again.path() / "transforms.json");
   const Scene colmap = ReadColmapModel(again.path(), again.path());
-  const Scene transforms = ReadTransformsJson(again.path() / "transforms.json", again.path());
+  const Scene transforms = ReadTransformsJson({again.path() / "transforms.json"}, again.path());
   const Scene written = ReadColmapModel(folder_.path(), folder_.path());
   for (size_t i = 0; i < written.views.size(); ++i) {
     const Eigen::Vector3d there = written.views[i].cam_from_world.Center();
@@ -180,7 +180,7 @@ TEST_F(ImportedScene, NamesWrongIntrinsics) {
   EXPECT_THAT(result.warnings[0],
               HasSubstr("the intrinsics of camera 2 (0003.png, 0004.png) do not fit"));
   EXPECT_THAT(result.warnings[0], HasSubstr("other cameras 0.00 px"));
-  // A little wrong, and the other camera exact: below half a pixel nothing is said.
+  // Errors below half a pixel cause no warning.
   Write(TwoCameras(), "cameras.txt", "PINHOLE 48 32 47 51", "PINHOLE 48 32 47.5 51.5");
   EXPECT_THAT(Import().warnings, IsEmpty());
 }

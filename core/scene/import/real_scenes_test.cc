@@ -119,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(Shared,
 TEST(RealTransforms, FoxHasFramesWithoutFiles) {
   const fs::path folder = fs::path(COLOR3D_SHARED_DATA) / "scenes/fox";
   if (!fs::exists(folder / "transforms.json")) GTEST_SKIP();
-  const Scene transforms = ReadTransformsJson(folder / "transforms.json", folder);
+  const Scene transforms = ReadTransformsJson({folder / "transforms.json"}, folder);
   const Scene colmap = ReadColmapModel(folder / "sparse/0", folder);
   EXPECT_GE(transforms.views.size(), 40u);
   EXPECT_LE(transforms.views.size(), colmap.views.size());

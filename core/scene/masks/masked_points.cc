@@ -14,7 +14,7 @@ std::vector<SparsePoint> UnmaskedPoints(const Scene& scene, const ViewImages& im
     if (mask == nullptr) continue;
     const Camera camera = images.WorkingCamera(view);
     for (SparsePoint& point : points) {
-      const auto seen = std::lower_bound(point.views.begin(), point.views.end(), view);
+      const auto seen = std::ranges::lower_bound(point.views, view);
       if (seen == point.views.end() || *seen != view) continue;
       const Eigen::Vector3d p = scene.views[view].cam_from_world.Apply(point.position);
       if (!(p.z() > 0.0)) continue;

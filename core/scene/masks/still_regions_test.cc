@@ -50,7 +50,7 @@ TEST(StillRegionTest, LeavesOutMovingObjects) {
   }
 }
 
-TEST(StillRegionTest, FollowsTheLens) {
+TEST(StillRegionTest, FollowsLensDistortion) {
   const ScratchFolder scratch;
   const Scene scene = SceneOf(scratch.path(), -0.3);
   const View& view = scene.views[0];

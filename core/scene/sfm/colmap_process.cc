@@ -24,7 +24,7 @@ constexpr int64_t kMaxFileBytes = int64_t{16} << 30;
 // Minimum memory that is worth an attempt, even if less is free at present.
 constexpr int64_t kLeastMemoryBytes = int64_t{1} << 30;
 
-ProcessLimits LimitsOf(std::chrono::seconds timeout) {
+ProcessLimits MakeLimits(std::chrono::seconds timeout) {
   ProcessLimits limits;
   limits.memory_bytes = std::max(AvailableMemoryBytes(), kLeastMemoryBytes);
   limits.file_bytes = kMaxFileBytes;
@@ -92,7 +92,7 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   child.log_path = log_;
   child.timeout = std::chrono::duration_cast<std::chrono::seconds>(deadline_ - Clock::now());
   if (child.timeout.count() <= 0) ThrowTooSlow();
-  child.limits = LimitsOf(child.timeout);
+  child.limits = MakeLimits(child.timeout);
   LogCounter counter(log_, phase.mark);
   run_.progress.OnProgress(0, phase.total, phase.message);
   // The child runs on a thread of its own, so that progress is reported from the calling thread,
@@ -116,7 +116,7 @@ int ColmapProcess::Run(const std::vector<std::string>& arguments, const ColmapPh
   }
   const SubprocessResult result = running.get();
   if (result.timed_out) ThrowTooSlow();
-  if (result.signal != 0 && LogSays("std::bad_alloc")) {
+  if (result.signal != 0 && LogContains("std::bad_alloc")) {
     throw Error(ErrorCode::kResourceExhausted,
                 "colmap {} ran out of memory at the {} MiB that it may take; use fewer photos or "
                 "fewer features, or {}; log: {}",
@@ -158,7 +158,7 @@ void ColmapProcess::ThrowTooSlow() const {
               timeout_.count());
 }
 
-bool ColmapProcess::LogSays(const std::string& text) const {
+bool ColmapProcess::LogContains(const std::string& text) const {
   std::ifstream in(log_);
   std::string line;
   while (std::getline(in, line)) {

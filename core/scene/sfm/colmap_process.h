@@ -43,7 +43,7 @@ class ColmapProcess {
  private:
   [[noreturn]] void ThrowTooSlow() const;
   std::string LastLogLine() const;
-  bool LogSays(const std::string& text) const;
+  bool LogContains(const std::string& text) const;
 
   std::filesystem::path log_;
   std::chrono::seconds timeout_;

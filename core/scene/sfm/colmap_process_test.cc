@@ -14,7 +14,7 @@ namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 
-// A program of that name stands in for COLMAP, which cannot be made to die when it is asked to.
+// A script replaces COLMAP, which cannot be made to fail on demand.
 class ColmapProcessTest : public testing::Test {
  protected:
   ColmapProcessTest() {

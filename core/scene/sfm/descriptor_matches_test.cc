@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-// Descriptors of the length 512, as COLMAP's are.
+// Descriptors of length 512, as COLMAP's.
 std::string RandomDescriptor(Random* random) {
   double values[SiftDescriptors::kDimensions];
   double sum = 0.0;
@@ -30,7 +30,7 @@ TEST(DescriptorMatches, MatchesMutualUnambiguousNeighbors) {
   Random random(3);
   std::string a, b;
   for (int i = 0; i < 200; ++i) a += RandomDescriptor(&random);
-  // Every other one of a, backwards, and others.
+  // Every second descriptor of a in reverse order, and unrelated ones.
   for (int i = 198; i >= 0; i -= 2) {
     b += a.substr(static_cast<size_t>(i) * SiftDescriptors::kDimensions,
                   SiftDescriptors::kDimensions);

@@ -27,7 +27,7 @@ void AddNeighbors(const SimilarityTable& similarity, int neighbors, std::set<Pho
     for (int j = 0; j < count; ++j) {
       if (j != i) others.push_back(j);
     }
-    std::sort(others.begin(), others.end(), [&](int a, int b) {
+    std::ranges::sort(others, [&](int a, int b) {
       const float of_a = similarity.At(i, a), of_b = similarity.At(i, b);
       if (of_a != of_b) return of_a > of_b;
       const int near_a = std::abs(a - i), near_b = std::abs(b - i);
@@ -50,7 +50,7 @@ void AddSequence(const std::vector<int>& sequence, std::set<PhotoPair>* pairs) {
 // Repeats Kruskal's maximum spanning tree without the pairs already taken.
 void AddSpanningTrees(const SimilarityTable& similarity, std::set<PhotoPair>* pairs) {
   std::vector<PhotoPair> edges = AllPairs(similarity.count());
-  std::sort(edges.begin(), edges.end(), [&](const PhotoPair& a, const PhotoPair& b) {
+  std::ranges::sort(edges, [&](const PhotoPair& a, const PhotoPair& b) {
     const float of_a = similarity.At(a.first, a.second), of_b = similarity.At(b.first, b.second);
     if (of_a != of_b) return of_a > of_b;
     const int apart_a = a.second - a.first, apart_b = b.second - b.first;
@@ -98,7 +98,7 @@ std::optional<std::vector<int>> SequenceOrder(const std::vector<std::string>& na
     frame = rest;
     numbered.emplace_back(std::stoll(names[i].substr(begin, end - begin)), static_cast<int>(i));
   }
-  std::sort(numbered.begin(), numbered.end());
+  std::ranges::sort(numbered);
   std::vector<int> order;
   for (size_t i = 0; i < numbered.size(); ++i) {
     if (i > 0 && numbered[i].first == numbered[i - 1].first) return std::nullopt;
@@ -118,7 +118,7 @@ std::vector<PhotoPair> AllPairs(int count) {
 namespace {
 
 // Indices by camera, each ascending.
-std::vector<std::vector<int>> FramesOf(const std::vector<int>& camera) {
+std::vector<std::vector<int>> FramesByCamera(const std::vector<int>& camera) {
   std::map<int, std::vector<int>> frames;
   for (size_t i = 0; i < camera.size(); ++i) frames[camera[i]].push_back(static_cast<int>(i));
   std::vector<std::vector<int>> all;
@@ -142,14 +142,14 @@ int CountRelated(const SimilarityTable& similarity) {
 
 PairPlan PairsInSequence(const std::vector<int>& camera) {
   PairPlan plan;
-  for (const std::vector<int>& frames : FramesOf(camera)) {
+  for (const std::vector<int>& frames : FramesByCamera(camera)) {
     for (size_t i = 0; i < frames.size(); ++i) {
       for (size_t step = 1; step <= 16 && i + step < frames.size(); step *= 2) {
         plan.pairs.push_back(Sorted(frames[i], frames[i + step]));
       }
     }
   }
-  std::sort(plan.pairs.begin(), plan.pairs.end());
+  std::ranges::sort(plan.pairs);
   plan.reason = fmt::format("{} pairs of frames up to 16 apart", plan.pairs.size());
   plan.related = static_cast<int>(camera.size());
   return plan;
@@ -157,7 +157,7 @@ PairPlan PairsInSequence(const std::vector<int>& camera) {
 
 std::vector<int> FramesToCompare(const std::vector<int>& camera) {
   constexpr size_t kMostCompared = 120;
-  const std::vector<std::vector<int>> cameras = FramesOf(camera);
+  const std::vector<std::vector<int>> cameras = FramesByCamera(camera);
   if (cameras.size() < 2) return {};
   const size_t share = std::max<size_t>(1, kMostCompared / cameras.size());
   std::vector<int> compared;
@@ -167,7 +167,7 @@ std::vector<int> FramesToCompare(const std::vector<int>& camera) {
       compared.push_back(frames[(2 * i + 1) * frames.size() / (2 * count)]);
     }
   }
-  std::sort(compared.begin(), compared.end());
+  std::ranges::sort(compared);
   return compared;
 }
 
@@ -175,7 +175,7 @@ void AddPairsAcross(const std::vector<int>& camera,
                     const std::vector<int>& compared,
                     const SimilarityTable& similarity,
                     PairPlan* plan) {
-  constexpr size_t kAlike = 4, kAtAnyRate = 8;
+  constexpr size_t kMostSimilar = 4, kPairsOfCameras = 8;
   // Similarity and index: for each frame and other camera, and for each pair of cameras.
   using Candidates = std::vector<std::pair<float, PhotoPair>>;
   std::map<std::pair<int, int>, Candidates> of_frame, of_cameras;
@@ -191,16 +191,16 @@ void AddPairsAcross(const std::vector<int>& camera,
   }
   std::set<PhotoPair> across;
   const auto take = [&](Candidates candidates, size_t most, float least) {
-    std::sort(candidates.begin(), candidates.end());
+    std::ranges::sort(candidates);
     candidates.resize(std::min(most, candidates.size()));
     for (const auto& [unlike, pair] : candidates) {
       if (-unlike >= least) across.insert(pair);
     }
   };
-  for (const auto& [frame, candidates] : of_frame) take(candidates, kAlike, kClearlySimilar);
-  for (const auto& [cameras, candidates] : of_cameras) take(candidates, kAtAnyRate, 0.0f);
+  for (const auto& [frame, candidates] : of_frame) take(candidates, kMostSimilar, kClearlySimilar);
+  for (const auto& [cameras, candidates] : of_cameras) take(candidates, kPairsOfCameras, 0.0f);
   plan->pairs.insert(plan->pairs.end(), across.begin(), across.end());
-  std::sort(plan->pairs.begin(), plan->pairs.end());
+  std::ranges::sort(plan->pairs);
   plan->reason += fmt::format(", {} across cameras", across.size());
 }
 

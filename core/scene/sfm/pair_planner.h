@@ -15,7 +15,7 @@ namespace color3d {
 using PhotoPair = std::pair<int, int>;
 
 // Returns the photos in the order of capture, judged by names that are equal except for their last
-// number ("DSC_0107.jpg", "frame_9.png", "frame_10.png"); nullopt if the names do not tell.
+// number ("DSC_0107.jpg", "frame_9.png", "frame_10.png"); nullopt if the names have no such order.
 std::optional<std::vector<int>> SequenceOrder(const std::vector<std::string>& names);
 
 struct PairPlan {

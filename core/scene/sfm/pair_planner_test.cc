@@ -15,7 +15,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Optional;
 
-// Photos on a closed ring that have the more in common the nearer they are.
+// Photos on a closed ring, more similar the nearer they are.
 SimilarityTable Ring(int count) {
   SimilarityTable table(count);
   for (int i = 0; i < count; ++i) {
@@ -116,10 +116,10 @@ TEST(PairPlanner, MatchesSimilarFramesAcrossCameras) {
   EXPECT_EQ(compared[60], 1004);  // of the second camera
   SimilarityTable similarity(7);
   similarity.Set(2, 3, 50.0f);
-  similarity.Set(0, 1, 90.0f);  // of one camera: nothing to look for
+  similarity.Set(0, 1, 90.0f);  // of one camera: ignored
   AddPairsAcross(camera, FramesToCompare(camera), similarity, &plan);
   EXPECT_TRUE(Has(plan, 2, 3));
-  EXPECT_TRUE(Connected(7, plan.pairs)) << "some of each two cameras are tried at any rate";
+  EXPECT_TRUE(Connected(7, plan.pairs)) << "some pairs of each two cameras are tried";
   EXPECT_EQ(plan.pairs.size(), 6u + 8u + 3u + 3u);
   EXPECT_TRUE(std::is_sorted(plan.pairs.begin(), plan.pairs.end()));
   EXPECT_THAT(plan.reason, HasSubstr("6 pairs of frames up to 16 apart, 14 across cameras"));

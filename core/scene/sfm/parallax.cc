@@ -38,7 +38,7 @@ struct Matched {
   Points a, b;
 };
 
-Matched PointsOf(const LocalFeatures& a, const LocalFeatures& b) {
+Matched MatchedPoints(const LocalFeatures& a, const LocalFeatures& b) {
   const auto matches = MutualMatches(a, b);
   Matched out{Points(2, matches.size()), Points(2, matches.size())};
   for (size_t i = 0; i < matches.size(); ++i) {
@@ -69,10 +69,10 @@ Eigen::Matrix3d Rotation(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
 }
 
 // Matches that the rotation explains.
-std::vector<int> Explained(const Matched& points,
-                           const Eigen::Matrix3Xd& rays,
-                           const Eigen::Matrix3d& rotation,
-                           double focal) {
+std::vector<int> Inliers(const Matched& points,
+                         const Eigen::Matrix3Xd& rays,
+                         const Eigen::Matrix3d& rotation,
+                         double focal) {
   std::vector<int> explained;
   const Eigen::Matrix3Xd turned = rotation * rays;
   for (int i = 0; i < turned.cols(); ++i) {
@@ -83,7 +83,7 @@ std::vector<int> Explained(const Matched& points,
   return explained;
 }
 
-int MostExplained(const Matched& points, double focal, Random* random) {
+int MaxInliers(const Matched& points, double focal, Random* random) {
   const Eigen::Matrix3Xd from = Rays(points.a, focal), to = Rays(points.b, focal);
   const auto count = static_cast<uint32_t>(from.cols());
   std::vector<int> best;
@@ -92,12 +92,12 @@ int MostExplained(const Matched& points, double focal, Random* random) {
                                        static_cast<int>(random->NextBelow(count))};
     if (sample[0] == sample[1]) continue;
     std::vector<int> explained =
-        Explained(points, from, Rotation(from(Eigen::all, sample), to(Eigen::all, sample)), focal);
+        Inliers(points, from, Rotation(from(Eigen::all, sample), to(Eigen::all, sample)), focal);
     if (explained.size() > best.size()) best = std::move(explained);
   }
   if (best.size() < 3) return static_cast<int>(best.size());
   const Eigen::Matrix3d refined = Rotation(from(Eigen::all, best), to(Eigen::all, best));
-  return static_cast<int>(std::max(best.size(), Explained(points, from, refined, focal).size()));
+  return static_cast<int>(std::max(best.size(), Inliers(points, from, refined, focal).size()));
 }
 
 // Groups of photos that are connected by pairs with pure rotation.
@@ -108,7 +108,7 @@ class Groups {
   int Largest() {
     std::vector<int> sizes(parent_.size(), 0);
     for (size_t i = 0; i < parent_.size(); ++i) ++sizes[Find(static_cast<int>(i))];
-    return sizes.empty() ? 0 : *std::max_element(sizes.begin(), sizes.end());
+    return sizes.empty() ? 0 : *std::ranges::max_element(sizes);
   }
 
  private:
@@ -122,7 +122,7 @@ class Groups {
 }  // namespace
 
 PairMotion MeasureMotion(const LocalFeatures& a, const LocalFeatures& b) {
-  const Matched points = PointsOf(a, b);
+  const Matched points = MatchedPoints(a, b);
   PairMotion motion;
   motion.matches = static_cast<int>(points.a.cols());
   if (motion.matches < 2) return motion;
@@ -135,7 +135,7 @@ PairMotion MeasureMotion(const LocalFeatures& a, const LocalFeatures& b) {
   int most = 0;
   double best = kFocalLengths[0];
   const auto offer = [&](double focal) {
-    const int explained = MostExplained(points, focal, &random);
+    const int explained = MaxInliers(points, focal, &random);
     if (explained <= most) return;
     most = explained;
     best = focal;
@@ -155,7 +155,7 @@ bool ParallaxEvidence::IsFromOnePlace() const {
          turned >= kTurnedPairs * matched && largest_place >= kOnePlace * photos;
 }
 
-ParallaxEvidence LookForParallax(const std::vector<LocalFeatures>& photos,
+ParallaxEvidence MeasureParallax(const std::vector<LocalFeatures>& photos,
                                  ThreadPool& pool,
                                  const CancellationToken& cancel) {
   ParallaxEvidence evidence;
@@ -193,9 +193,8 @@ ParallaxEvidence LookForParallax(const std::vector<LocalFeatures>& photos,
 
 std::string Describe(const ParallaxEvidence& e) {
   return fmt::format(
-      "{} of {} pairs of photos that show the same differ by a turn of the camera at most (they "
-      "are shifted by {:.1f} % of their width in the middle), which ties {} of {} photos to one "
-      "place",
+      "{} of {} overlapping pairs of photos differ by a rotation of the camera only (median shift "
+      "{:.1f} % of the longer side), which connects {} of {} photos to one place",
       e.turned,
       e.matched,
       100.0 * e.median_shift,

@@ -15,7 +15,7 @@ namespace color3d {
 // Motion between two photos, measured from shared features.
 struct PairMotion {
   int matches = 0;
-  double turned = 0.0;        // share of the matches that a turn of the camera explains, 0..1
+  double turned = 0.0;        // share of the matches explained by a rotation of the camera, 0..1
   double median_shift = 0.0;  // of the matches, as a share of the photos' longer side
 };
 
@@ -24,11 +24,11 @@ struct PairMotion {
 PairMotion MeasureMotion(const LocalFeatures& a, const LocalFeatures& b);
 
 struct ParallaxEvidence {
-  int photos = 0;             // looked at
-  int pairs = 0;              // looked at, spread evenly over all pairs
-  int matched = 0;            // with enough matches to tell
-  int turned = 0;             // of those, a turn explains nearly everything
-  int largest_place = 0;      // photos that turned pairs tie together, in the largest group
+  int photos = 0;             // compared
+  int pairs = 0;              // compared, spread evenly over all pairs
+  int matched = 0;            // with enough matches to judge
+  int turned = 0;             // of those, explained by a rotation
+  int largest_place = 0;      // photos in the largest group connected by such pairs
   double median_shift = 0.0;  // over the matched pairs, as a share of the longer side
 
   // True if nearly all overlapping pairs are explained by rotation, and they include nearly all
@@ -36,11 +36,11 @@ struct ParallaxEvidence {
   bool IsFromOnePlace() const;
 };
 
-ParallaxEvidence LookForParallax(const std::vector<LocalFeatures>& photos,
+ParallaxEvidence MeasureParallax(const std::vector<LocalFeatures>& photos,
                                  ThreadPool& pool,
                                  const CancellationToken& cancel);
 
-// "in 97 % of 320 pairs of photos ...", without a full stop.
+// "310 of 320 overlapping pairs of photos ...", without a full stop.
 std::string Describe(const ParallaxEvidence& evidence);
 
 }  // namespace color3d

@@ -11,8 +11,8 @@
 namespace color3d {
 namespace {
 
-// Features of points in space, seen by a camera of 384 x 288 px: position, direction, and how many
-// of 150 points move on their own.
+// Features of 150 points in space, seen by a camera of 384 x 288 px. Some points move
+// independently.
 class Points {
  public:
   explicit Points(uint64_t seed) {
@@ -56,7 +56,7 @@ class Points {
 
 ParallaxEvidence Look(const std::vector<LocalFeatures>& photos) {
   ThreadPool pool(2);
-  return LookForParallax(photos, pool, {});
+  return MeasureParallax(photos, pool, {});
 }
 
 TEST(Parallax, DetectsStaticOrRotatingCamera) {

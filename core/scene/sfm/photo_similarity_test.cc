@@ -36,7 +36,7 @@ TEST(PhotoSimilarity, CountsSharedFeatures) {
   EXPECT_EQ(CountMutualMatches(a, {}), 0);
 }
 
-// Repeated structure says nothing: of two equal features none is clearly the nearest.
+// Repeated structure does not match: neither of two equal features is clearly nearest.
 TEST(PhotoSimilarity, IgnoresAmbiguousFeatures) {
   const LocalFeatures a = RandomFeatures(10, 1);
   LocalFeatures twice = a;

@@ -72,7 +72,7 @@ class Solver {
     const bool planned = plan.pairs.size() < AllPairs(Count()).size();
     if (planned) {
       SolvePlanned(plan);
-      if (PlannedIsEnough()) return std::move(*best_);
+      if (PlannedPairsSuffice()) return std::move(*best_);
       if (order_ == PhotoOrder::kSequence) return best_ ? std::move(*best_) : ColmapModel{};
       if (IsHopeless(plan)) {
         colmap_.Note(
@@ -82,9 +82,9 @@ class Solver {
                         Count()));
         return ColmapModel{};
       }
-      Say(
-          fmt::format("{} of {} photos hang together by the planned pairs; comparing all pairs, "
-                      "which takes longer",
+      colmap_.Warn(
+          fmt::format("the planned pairs connect {} of {} photos; comparing all pairs, which takes "
+                      "longer",
                       Placed(),
                       Count()));
     }
@@ -102,7 +102,7 @@ class Solver {
     return IsHalfPlaced() && 10 * Placed() >= 9 * copies_.names.size();
   }
   // True if further attempts could only add pairs of registered photos, or finer features.
-  bool PlannedIsEnough() const {
+  bool PlannedPairsSuffice() const {
     return AreNearlyAllPlaced() ||
            (IsHalfPlaced() && (!has_coarse_features_ || copies_.names.size() > kExhaustiveLimit));
   }
@@ -110,11 +110,6 @@ class Solver {
   // The most similar pairs failed, and they are not similar.
   bool IsHopeless(const PairPlan& plan) const {
     return Placed() == 0 && plan.related < static_cast<int>(kMinPlaced);
-  }
-
-  void Say(const std::string& warning) {
-    colmap_.Note(warning);
-    run_.progress.OnWarning(warning);
   }
 
   void Extract(FeatureDetail detail) {
@@ -168,7 +163,8 @@ class Solver {
     Attempt("exhaustive", Strictness::kDefault);
     if (!AreNearlyAllPlaced()) Attempt("exhaustive_straight", Strictness::kStraight);
     if (!IsHalfPlaced()) Attempt("exhaustive_loose", Strictness::kLoose);
-    if (is_loose_) Say("camera positions were found with loose thresholds only; check them");
+    if (is_loose_)
+      colmap_.Warn("camera positions were found with loose thresholds only; check them");
   }
 
   std::vector<bool> PlacedPhotos() const {
@@ -198,7 +194,7 @@ void RequireParallax(const std::vector<LocalFeatures>& features,
                      const ColmapProcess& colmap,
                      PhotoOrder order,
                      const RunControl& run) {
-  const ParallaxEvidence evidence = LookForParallax(features, run.pool, run.cancel);
+  const ParallaxEvidence evidence = MeasureParallax(features, run.pool, run.cancel);
   colmap.Note(Describe(evidence));
   if (!evidence.IsFromOnePlace()) return;
   if (order == PhotoOrder::kSequence) {
@@ -264,9 +260,9 @@ void RequirePlaced(size_t placed, size_t count, PhotoOrder order, const fs::path
 
 // Converts COLMAP's cameras for the copies to cameras for the photos, and its image numbers to
 // views.
-SfmResult SceneOfModel(const ColmapModel& model,
-                       const std::vector<Photo>& photos,
-                       const std::vector<std::string>& copies) {
+SfmResult MakeScene(const ColmapModel& model,
+                    const std::vector<Photo>& photos,
+                    const std::vector<std::string>& copies) {
   std::map<std::string, uint32_t> image_of_copy;
   for (const auto& [id, image] : model.images) image_of_copy[image.name] = id;
   SfmResult result;
@@ -292,16 +288,7 @@ SfmResult SceneOfModel(const ColmapModel& model,
     result.scene.views.push_back(std::move(view));
   }
   for (const ColmapPoint& from : model.points) {
-    SparsePoint point;
-    point.position = from.position;
-    point.reprojection_error_px = from.error_px;
-    std::set<int> views;
-    for (uint32_t id : from.image_ids) {
-      const auto it = view_of_image.find(id);
-      if (it != view_of_image.end()) views.insert(it->second);
-    }
-    point.views.assign(views.begin(), views.end());
-    result.scene.points.push_back(std::move(point));
+    result.scene.points.push_back(MakeSparsePoint(from, view_of_image));
   }
   return result;
 }
@@ -349,7 +336,7 @@ SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
   colmap.Note("planned " + plan.reason);
   const ColmapModel model = Solver(colmap, work, copies, options, order, run, &report).Solve(plan);
   RequirePlaced(model.images.size(), photos.size(), order, colmap.log());
-  SfmResult result = SceneOfModel(model, photos, copies.names);
+  SfmResult result = MakeScene(model, photos, copies.names);
   result.report = std::move(report);
   return result;
 }

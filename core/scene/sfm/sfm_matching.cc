@@ -58,9 +58,9 @@ std::map<int, SiftDescriptors> DescriptorsFor(const SfmWorkspace& work,
 
 // Matches of a pair in COLMAP's import format: the names, a line for each match, an empty line.
 // Empty if there are too few matches.
-std::string TextOfMatches(const FeatureImages& photos,
-                          const PhotoPair& pair,
-                          const std::vector<std::pair<int, int>>& matches) {
+std::string MatchesText(const FeatureImages& photos,
+                        const PhotoPair& pair,
+                        const std::vector<std::pair<int, int>>& matches) {
   constexpr size_t kFewest = 15;  // as in the mapper
   if (matches.size() < kFewest) return "";
   std::string text = photos.names[pair.first] + " " + photos.names[pair.second] + "\n";
@@ -135,7 +135,7 @@ void MatchPairs(ColmapProcess& colmap,
     run.pool.ForEach(static_cast<int64_t>(some.size()), [&](int64_t i, int) {
       run.cancel.ThrowIfCancelled();
       const PhotoPair& pair = some[static_cast<size_t>(i)];
-      texts[static_cast<size_t>(i)] = TextOfMatches(
+      texts[static_cast<size_t>(i)] = MatchesText(
           photos, pair, MatchDescriptors(descriptors.at(pair.first), descriptors.at(pair.second)));
     });
     std::string text;

@@ -33,7 +33,7 @@ bool ExtractFeatures(ColmapProcess& colmap,
                      FeatureDetail detail);
 
 // Matches and verifies the pairs that the database lacks. Deterministic for the same photos and
-// pairs, whatever the number of threads, unlike COLMAP's own matcher (its feature trees are
+// pairs, regardless of the number of threads, unlike COLMAP's own matcher (its feature trees are
 // random).
 void MatchPairs(ColmapProcess& colmap,
                 const SfmWorkspace& work,

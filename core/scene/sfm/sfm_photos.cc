@@ -128,8 +128,8 @@ FeatureImages WriteFeatureImages(const std::vector<Photo>& photos,
     run.progress.OnProgress(begin, count, fmt::format("reading photos {}/{}", begin + 1, count));
     run.pool.ForEach(std::min(batch, count - begin), [&](int64_t i, int) { write(begin + i); });
   }
-  written.masked = std::any_of(
-      photos.begin(), photos.end(), [](const Photo& photo) { return !photo.mask_file.empty(); });
+  written.masked =
+      std::ranges::any_of(photos, [](const Photo& photo) { return !photo.mask_file.empty(); });
   std::map<std::string, size_t> group_of_folder;
   for (size_t i = 0; i < photos.size(); ++i) {
     const auto [it, is_new] = group_of_folder.emplace(folders[i], written.groups.size());

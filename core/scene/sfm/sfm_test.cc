@@ -101,8 +101,7 @@ TEST_F(Sfm, FindsCamerasOfRenderedRoom) {
   }
 }
 
-// Something that goes along with the camera, as a bonnet does, would tell that it stands still.
-// Whatever the number of threads, and whichever of them is ready first.
+// The result depends neither on the number of threads nor on their timing.
 TEST_F(Sfm, IsDeterministic) {
   const std::vector<Pose> poses = RoomPoses(6);
   for (int i = 0; i < 6; ++i) {
@@ -118,6 +117,7 @@ TEST_F(Sfm, IsDeterministic) {
   }
 }
 
+// An object that moves with the camera, e.g. a bonnet, would make it look static.
 TEST_F(Sfm, IgnoresMaskedFeatures) {
   const std::vector<Pose> truth = RoomPoses(7);
   Random random(5);
@@ -150,7 +150,7 @@ TEST_F(Sfm, IgnoresMaskedFeatures) {
   }
 }
 
-// Enough photos that most pairs are left out, from a camera that says its focal length.
+// Enough photos that most pairs are left out, with a known focal length.
 TEST_F(Sfm, MatchesPlannedPairsWithFocalLength) {
   constexpr int kCount = 14;
   const Camera camera = kRoomCamera.Scaled(320, 240);
@@ -187,7 +187,7 @@ TEST_F(Sfm, RefusesUnrelatedPhotosInOneLine) {
   EXPECT_EQ(said.find('\n'), std::string::npos);
 }
 
-// Many: comparing all pairs would take minutes and find nothing.
+// Comparing all pairs of many photos would take minutes and find nothing.
 TEST_F(Sfm, RefusesManyUnrelatedPhotosQuickly) {
   for (int i = 0; i < 24; ++i) {
     Random random(static_cast<uint64_t>(i + 1));
@@ -201,7 +201,7 @@ TEST_F(Sfm, RefusesManyUnrelatedPhotosQuickly) {
   EXPECT_EQ(progress_.messages.find("widened"), std::string::npos);
 }
 
-// A film of a fixed camera: noise, and something that passes by. COLMAP has not even started.
+// A film of a fixed camera, with noise and a passing object, is refused before COLMAP starts.
 TEST_F(Sfm, RefusesStaticCameraAtOnce) {
   const Image background = RenderCorner(kRoomCamera, RoomPoses(3)[1]);
   Random random(4);
@@ -269,7 +269,7 @@ TEST(Parallax, TellsRealCapturesFromStaticCamera) {
                              "video/athlete4cam/cam03"}) {
     if (!fs::exists(data / folder)) continue;
     const bool fixed = std::string(folder).find("athlete") != std::string::npos;
-    const ParallaxEvidence evidence = LookForParallax(FeaturesOf(data / folder), pool, {});
+    const ParallaxEvidence evidence = MeasureParallax(FeaturesOf(data / folder), pool, {});
     EXPECT_EQ(evidence.IsFromOnePlace(), fixed) << folder << ": " << Describe(evidence);
     const double share = evidence.matched > 0 ? 1.0 * evidence.turned / evidence.matched : 0.0;
     EXPECT_TRUE(fixed ? share > 0.95 : share < 0.75) << folder << ": " << Describe(evidence);

@@ -47,7 +47,8 @@ class ChromaTrainer {
     Resume();
     const double earlier = state_.elapsed_seconds;
     guard.Keep(state_);
-    while (state_.iteration < options_.iterations && !fitting_.OutOfTime(state_.elapsed_seconds)) {
+    while (state_.iteration < options_.iterations &&
+           !fitting_.IsOutOfTime(state_.elapsed_seconds)) {
       run_.cancel.ThrowIfCancelled();
       if (!Step()) {
         guard.Restore(state_);

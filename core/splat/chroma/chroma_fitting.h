@@ -32,7 +32,7 @@ struct ChromaFitting {
     problem.snapshot(iteration, [&] { return parameters.ToModel(geometry); });
   }
   // Returns true if the seconds of this attempt and the earlier ones exceed the limit.
-  bool OutOfTime(double seconds) const {
+  bool IsOutOfTime(double seconds) const {
     return options.time_limit_seconds > 0.0 && seconds >= options.time_limit_seconds;
   }
 };

@@ -74,8 +74,8 @@ class ChromaSolver {
   using Pair = std::array<double, 2>;  // of a', b'
 
   double Seconds() const { return earlier_seconds_ + fitting_.clock.Seconds(); }
-  bool OutOfTime() const { return fitting_.OutOfTime(Seconds()); }
-  bool Ended() const { return state_.iteration >= options_.iterations || OutOfTime(); }
+  bool IsOutOfTime() const { return fitting_.IsOutOfTime(Seconds()); }
+  bool Ended() const { return state_.iteration >= options_.iterations || IsOutOfTime(); }
 
   ChromaVector FromParameters() const {
     const int n = parameters_.coefficients();

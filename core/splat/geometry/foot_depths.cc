@@ -12,28 +12,28 @@ namespace {
 constexpr int kFramesBeside = 8;  // before and behind, that tell of a thing's depth
 
 // A moving region, or several that form one object.
-struct Thing {
+struct MovingObject {
   int left = 0, right = 0;  // columns, both included
   int foot = 0;             // its lowest row
   double depth = 0.0;       // there
 };
 
-struct Things {
+struct MovingObjects {
   std::vector<int> of_pixel;  // -1: nothing moves
-  std::vector<Thing> list;
+  std::vector<MovingObject> list;
 };
 
 // Connected components of the moving pixels.
-Things RegionsOf(const SurveyedView& view) {
+MovingObjects RegionsOf(const SurveyedView& view) {
   const Image& moving = view.moving;
   const double usual = MedianDepth(view);
-  Things things;
+  MovingObjects things;
   things.of_pixel.assign(moving.data.size(), -1);
   std::vector<int> region;
   for (int start = 0; start < static_cast<int>(moving.data.size()); ++start) {
     if (moving.data[start] == 0.0f || things.of_pixel[start] >= 0) continue;
     const auto number = static_cast<int>(things.list.size());
-    Thing thing{moving.width, -1, -1};
+    MovingObject thing{moving.width, -1, -1};
     int foot_pixel = start;
     const auto reach = [&](int x, int y) {
       if (x < 0 || y < 0 || x >= moving.width || y >= moving.height) return;
@@ -64,24 +64,24 @@ Things RegionsOf(const SurveyedView& view) {
   return things;
 }
 
-int SharedColumns(const Thing& a, const Thing& b) {
+int SharedColumns(const MovingObject& a, const MovingObject& b) {
   return std::max(0, std::min(a.right, b.right) - std::max(a.left, b.left) + 1);
 }
 
-int Columns(const Thing& thing) { return thing.right - thing.left + 1; }
+int Columns(const MovingObject& thing) { return thing.right - thing.left + 1; }
 
 // Torn-off limbs, and the shadow below, belong to the object above which they hang.
-void JoinOneAboveTheOther(Things* things) {
+void MergeStackedRegions(MovingObjects* things) {
   std::vector<int> joined(things->list.size());
   std::vector<int> order(things->list.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     return things->list[a].foot > things->list[b].foot;
   });
-  std::vector<Thing> list;
+  std::vector<MovingObject> list;
   for (const int region : order) {  // the lowest first: theirs is the foot
-    const Thing& thing = things->list[region];
-    const auto below = std::find_if(list.begin(), list.end(), [&](const Thing& other) {
+    const MovingObject& thing = things->list[region];
+    const auto below = std::find_if(list.begin(), list.end(), [&](const MovingObject& other) {
       return 2 * SharedColumns(thing, other) >= Columns(thing);
     });
     joined[region] = static_cast<int>(below - list.begin());
@@ -99,10 +99,10 @@ void JoinOneAboveTheOther(Things* things) {
 }
 
 // Depth of the object at the same position in `frame`; 0 without one.
-double DepthInPlaceOf(const Thing& thing, const Things& frame) {
+double OverlappingDepth(const MovingObject& thing, const MovingObjects& frame) {
   double depth = 0.0;
   int most = 0;
-  for (const Thing& other : frame.list) {
+  for (const MovingObject& other : frame.list) {
     const int shared = SharedColumns(thing, other);
     if (shared <= most || 2 * shared < std::min(Columns(thing), Columns(other))) continue;
     most = shared;
@@ -120,15 +120,15 @@ std::vector<size_t> InOrderOfTime(const std::vector<SurveyedView>& views) {
   return order;
 }
 
-void SteadyDepths(const std::vector<size_t>& order, std::vector<Things>* frames) {
-  const std::vector<Things> before = *frames;
+void SteadyDepths(const std::vector<size_t>& order, std::vector<MovingObjects>* frames) {
+  const std::vector<MovingObjects> before = *frames;
   const auto count = static_cast<int>(order.size());
   for (int i = 0; i < count; ++i) {
-    for (Thing& thing : (*frames)[order[i]].list) {
+    for (MovingObject& thing : (*frames)[order[i]].list) {
       std::vector<double> depths{thing.depth};
       for (int k = std::max(0, i - kFramesBeside); k <= std::min(count - 1, i + kFramesBeside);
            ++k) {
-        const double depth = k == i ? 0.0 : DepthInPlaceOf(thing, before[order[k]]);
+        const double depth = k == i ? 0.0 : OverlappingDepth(thing, before[order[k]]);
         if (depth > 0.0) depths.push_back(depth);
       }
       thing.depth = Median(std::move(depths));
@@ -161,10 +161,10 @@ std::vector<Image> FootDepths(const std::vector<SurveyedView>& views, ThreadPool
   if (views.empty()) return {};
   const auto count = static_cast<int64_t>(views.size());
   const bool are_of_one_pose = AreOfOnePose(views);
-  std::vector<Things> frames(views.size());
+  std::vector<MovingObjects> frames(views.size());
   pool.ForEach(count, [&](int64_t i, int) {
     frames[i] = RegionsOf(views[i]);
-    if (are_of_one_pose) JoinOneAboveTheOther(&frames[i]);
+    if (are_of_one_pose) MergeStackedRegions(&frames[i]);
   });
   if (are_of_one_pose) SteadyDepths(InOrderOfTime(views), &frames);
   std::vector<Image> depths(views.size());

@@ -148,7 +148,7 @@ class GeometryTrainer {
     const auto target = [&](const PosedCamera& view, int level) {
       return targets_.Get(view, level);
     };
-    const FoundMovers found =
+    const MoverSearchResult found =
         FindMovingPart(problem_, times_, state_.parameters, Colors(), target, options_, run_.pool);
     run_.progress.OnError(state_.iteration, "moving_share", found.moving_share);
     if (found.moving.parameters.count() == 0) return;
@@ -175,8 +175,8 @@ class GeometryTrainer {
     clock_.Enter(Phase::kLoss);
     const bool exposed = !state_.exposures.empty();
     if (exposed) Expose(state_.exposures[drawn], pipeline_.color(), run_.pool, exposed_);
-    const LossValue loss =
-        Compare(exposed ? exposed_ : pipeline_.color(), target, LearntFrom(view, level), weights);
+    const LossValue loss = Compare(
+        exposed ? exposed_ : pipeline_.color(), target, TrainingTarget(view, level), weights);
     if (!std::isfinite(loss.total)) return false;
     if (exposed) {
       FitExposure(pipeline_.color(),
@@ -206,7 +206,7 @@ class GeometryTrainer {
   }
 
   // The training mask: until motion has been searched for, moving pixels are excluded.
-  std::shared_ptr<const PlaneBuffer> LearntFrom(const PosedCamera& view, int level) {
+  std::shared_ptr<const PlaneBuffer> TrainingTarget(const PosedCamera& view, int level) {
     const std::shared_ptr<const PlaneBuffer> mask = MaskOf(view, level);
     if (!problem_.still || !MayMove() || fraction_ >= kSurveyAt) return mask;
     const std::shared_ptr<const PlaneBuffer> still = still_.Get(view, level);
@@ -226,10 +226,10 @@ class GeometryTrainer {
       return loss_.Evaluate(drawn, *target, nullptr, weights, run_.pool, d_color_);
     }
     masked_target_ = *target;
-    TakeWhereMasked(*mask, drawn, masked_target_);
+    CopyMasked(*mask, drawn, masked_target_);
     const LossValue loss =
         loss_.Evaluate(drawn, masked_target_, mask.get(), weights, run_.pool, d_color_);
-    ClearWhereMasked(*mask, d_color_);
+    ZeroMasked(*mask, d_color_);
     return loss;
   }
 

@@ -30,13 +30,13 @@ double CountingShare(const PlaneBuffer* mask) {
 
 }  // namespace
 
-void TakeWhereMasked(const PlaneBuffer& mask, const PlaneBuffer& other, PlaneBuffer& planes) {
+void CopyMasked(const PlaneBuffer& mask, const PlaneBuffer& other, PlaneBuffer& planes) {
   ForMasked(mask, planes.channels, [&](int c, int y, int x) {
     planes.Row(c, y)[x] = other.Row(c, y)[x];
   });
 }
 
-void ClearWhereMasked(const PlaneBuffer& mask, PlaneBuffer& planes) {
+void ZeroMasked(const PlaneBuffer& mask, PlaneBuffer& planes) {
   ForMasked(mask, planes.channels, [&](int c, int y, int x) { planes.Row(c, y)[x] = 0.0f; });
 }
 
@@ -45,7 +45,7 @@ PictureQuality CompareClamped(const PlaneBuffer& truth,
                               ImageLoss& loss,
                               ThreadPool& pool,
                               PlaneBuffer& drawn) {
-  if (mask != nullptr) TakeWhereMasked(*mask, truth, drawn);
+  if (mask != nullptr) CopyMasked(*mask, truth, drawn);
   double squares = 0.0;
   for (int c = 0; c < drawn.channels; ++c) {
     for (int y = 0; y < drawn.height; ++y) {

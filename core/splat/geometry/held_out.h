@@ -23,9 +23,9 @@ PictureQuality CompareClamped(const PlaneBuffer& truth,
                               PlaneBuffer& drawn);
 
 // Copies all channels of `other` to `planes` where `mask` is 0. Requires equal sizes.
-void TakeWhereMasked(const PlaneBuffer& mask, const PlaneBuffer& other, PlaneBuffer& planes);
+void CopyMasked(const PlaneBuffer& mask, const PlaneBuffer& other, PlaneBuffer& planes);
 // Sets all channels to 0 where `mask` is 0.
-void ClearWhereMasked(const PlaneBuffer& mask, PlaneBuffer& planes);
+void ZeroMasked(const PlaneBuffer& mask, PlaneBuffer& planes);
 
 Image ImageFromPlanes(const PlaneBuffer& planes);
 

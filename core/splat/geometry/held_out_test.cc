@@ -40,7 +40,7 @@ TEST(CompareClampedTest, ComparesMaskedPixelsOnly) {
   EXPECT_NEAR(quality.psnr_db, 20.0, 1e-3);
   EXPECT_NEAR(quality.l1, 0.1, 1e-5);
   EXPECT_EQ(drawn.Row(0, 5)[20], 0.5f);
-  ClearWhereMasked(mask, drawn);
+  ZeroMasked(mask, drawn);
   EXPECT_EQ(drawn.Row(0, 5)[20], 0.0f);
   EXPECT_EQ(drawn.Row(0, 5)[10], 0.6f);
 }

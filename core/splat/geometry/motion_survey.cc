@@ -16,7 +16,7 @@ constexpr int kRadiusPx = 2;
 constexpr double kDeviations = 5.0;
 constexpr double kLeastResidual = 0.03;
 constexpr size_t kMedianFrames = 31;  // at most, evenly over time
-constexpr size_t kFewestFrames = 5;   // that say what stands still
+constexpr size_t kFewestFrames = 5;   // to tell what is static
 constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
 constexpr double kConfirmed = 0.1;    // of what was seen to move, by residuals, at least
 // Maximum shares of such pixels in static scenes: with a median over time or known moving regions,
@@ -25,10 +25,10 @@ constexpr double kStillShare = 0.002;
 constexpr double kStillShareAlone = 0.005;
 constexpr size_t kNoiseStep = 7;  // every so many pixels tell the scene's deviation
 
-using Stand = std::tuple<double, double, double, double, double, double, double, int, int>;
+using PoseKey = std::tuple<double, double, double, double, double, double, double, int, int>;
 
 // Views with equal pose and size belong to a static camera.
-Stand StandOf(const PosedCamera& p) {
+PoseKey MakePoseKey(const PosedCamera& p) {
   const Eigen::Quaterniond& q = p.cam_from_world.rotation;
   const Eigen::Vector3d& t = p.cam_from_world.translation;
   return {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z(), p.camera.width, p.camera.height};
@@ -41,10 +41,10 @@ Image ResidualOf(const SurveyedView& view) {
 }
 
 // Subtracts the median over time, pixel by pixel.
-void RemoveStanding(const std::vector<size_t>& frames,
-                    ThreadPool& pool,
-                    std::vector<Image>& residuals) {
-  const std::vector<size_t> some = EvenlyOf(frames, kMedianFrames);
+void SubtractTemporalMedian(const std::vector<size_t>& frames,
+                            ThreadPool& pool,
+                            std::vector<Image>& residuals) {
+  const std::vector<size_t> some = PickEvenly(frames, kMedianFrames);
   const auto pixels = static_cast<int64_t>(residuals[frames.front()].data.size());
   pool.ForRanges(pixels, [&](int64_t begin, int64_t end, int) {
     std::vector<double> values(some.size());
@@ -87,7 +87,7 @@ void AddSeenMoving(SurveyedView& view) {
 
 // Returns true if the previously detected moving pixels have high residuals; otherwise they are
 // static.
-bool SeenIsConfirmed(const std::vector<SurveyedView>& views) {
+bool IsMotionConfirmed(const std::vector<SurveyedView>& views) {
   double seen = 0.0, confirmed = 0.0;
   for (const SurveyedView& view : views) {
     for (size_t i = 0; i < view.still.data.size(); ++i) {
@@ -116,13 +116,13 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
   std::vector<Image> residuals(views.size());
   pool.ForEach(static_cast<int64_t>(views.size()),
                [&](int64_t i, int) { residuals[i] = ResidualOf(views[i]); });
-  std::map<Stand, std::vector<size_t>> stands;
-  for (size_t i = 0; i < views.size(); ++i) stands[StandOf(views[i].posed)].push_back(i);
+  std::map<PoseKey, std::vector<size_t>> cameras;
+  for (size_t i = 0; i < views.size(); ++i) cameras[MakePoseKey(views[i].posed)].push_back(i);
   bool has_median = false;
-  for (const auto& [stand, frames] : stands) {
+  for (const auto& [key, frames] : cameras) {
     if (frames.size() < kFewestFrames) continue;
     has_median = true;
-    RemoveStanding(frames, pool, residuals);
+    SubtractTemporalMedian(frames, pool, residuals);
   }
   survey.threshold = std::max(kLeastResidual, kDeviations * DeviationOf(residuals));
   double residual = 0.0, moving = 0.0, pixels = 0.0;
@@ -131,7 +131,7 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
                                : MaskOf(residuals[i], survey.threshold);
     residual += Sum(views[i].moving);
   }
-  const bool seen = !one_time && SeenIsConfirmed(views);
+  const bool seen = !one_time && IsMotionConfirmed(views);
   survey.least_share = has_median || seen ? kStillShare : kStillShareAlone;
   for (SurveyedView& view : views) {
     if (seen) AddSeenMoving(view);

@@ -253,7 +253,7 @@ TEST(FindMovingPartTest, LongFilmHasMoversAtAllTimes) {
   options.sh_degree = 0;
   options.max_gaussians = kMost;
   ThreadPool pool(2);
-  const FoundMovers found =
+  const MoverSearchResult found =
       FindMovingPart(problem, TimeSpanOf(problem), wall, color, target, options, pool);
   EXPECT_GT(found.moving_share, 0.02);
   const ParameterBlock& movers = found.moving.parameters;

@@ -31,7 +31,7 @@ Image MeanImage(const PlaneBuffer& planes, int channels) {
 }
 
 // Replaces masked pixels by the render, so that nothing moves there. `mask` may be larger.
-void TakeMasked(const Image& mask, const Image& luminance, Image& drawn) {
+void CopyMasked(const Image& mask, const Image& luminance, Image& drawn) {
   for (int y = 0; y < drawn.height; ++y) {
     for (int x = 0; x < drawn.width; ++x) {
       const int from_y = static_cast<int>(int64_t{y} * mask.height / drawn.height);
@@ -67,7 +67,7 @@ std::vector<SurveyedView> SurveyedViews(const GeometryProblem& problem,
     view.drawn = MeanImage(pipeline.color(), color.channels);
     view.depth = MeanImage(pipeline.median_depth(), 1);
     const std::shared_ptr<const Image> mask = problem.mask ? problem.mask(posed.view) : nullptr;
-    if (mask != nullptr) TakeMasked(*mask, view.luminance, view.drawn);
+    if (mask != nullptr) CopyMasked(*mask, view.luminance, view.drawn);
     const std::shared_ptr<const Image> seen = problem.still ? problem.still(posed.view) : nullptr;
     if (seen != nullptr) {
       view.still = ResizeMask(*seen, view.luminance.width, view.luminance.height);
@@ -127,20 +127,20 @@ std::vector<std::vector<PosedCamera>> BlocksOfTime(const std::vector<PosedCamera
   return blocks;
 }
 
-FoundMovers FindMovingPart(const GeometryProblem& problem,
-                           const TimeSpan& times,
-                           const ParameterBlock& still,
-                           const ColorSpec& color,
-                           const LevelTarget& target,
-                           const GeometryOptions& options,
-                           ThreadPool& pool) {
+MoverSearchResult FindMovingPart(const GeometryProblem& problem,
+                                 const TimeSpan& times,
+                                 const ParameterBlock& still,
+                                 const ColorSpec& color,
+                                 const LevelTarget& target,
+                                 const GeometryOptions& options,
+                                 ThreadPool& pool) {
   MoverSeedOptions seeds;
   seeds.rows = still.rows();
   seeds.channels = color.channels;
   seeds.coefficients = ShCoefficients(options.sh_degree);
   seeds.width = TuningOf(options).seed_width;
   seeds.interval = times.Interval();
-  FoundMovers found;
+  MoverSearchResult found;
   double residual_share = 0.0, least_share = 0.0;
   ParameterBlock& parameters = found.moving.parameters;
   for (const std::vector<PosedCamera>& block : BlocksOfTime(problem.training)) {

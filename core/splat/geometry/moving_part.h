@@ -50,18 +50,18 @@ std::vector<std::vector<PosedCamera>> BlocksOfTime(const std::vector<PosedCamera
 using LevelTarget =
     std::function<std::shared_ptr<const PlaneBuffer>(const PosedCamera& view, int level)>;
 
-struct FoundMovers {
+struct MoverSearchResult {
   double moving_share = 0.0;  // motion energy: share of the pixels
   MovingPart moving;          // empty if motion is negligible and the scene is static
 };
 // Decides if and where the scene moves; `still` renders the static part well enough at this time.
-FoundMovers FindMovingPart(const GeometryProblem& problem,
-                           const TimeSpan& times,
-                           const ParameterBlock& still,
-                           const ColorSpec& color,
-                           const LevelTarget& target,
-                           const GeometryOptions& options,
-                           ThreadPool& pool);
+MoverSearchResult FindMovingPart(const GeometryProblem& problem,
+                                 const TimeSpan& times,
+                                 const ParameterBlock& still,
+                                 const ColorSpec& color,
+                                 const LevelTarget& target,
+                                 const GeometryOptions& options,
+                                 ThreadPool& pool);
 
 // Both parts at the time `t`, the static one first. `hidden`: see ApplyMotion.
 void ComposeAt(const ParameterBlock& still,

@@ -186,7 +186,7 @@ class PlyReader {
 
  private:
   bool Has(const std::string& name) const { return header_.properties.contains(name); }
-  bool HasBytesOfColor() const {
+  bool HasByteColors() const {
     const auto red = header_.properties.find("red");
     return red != header_.properties.end() && IsByte(red->second.type) && Has("green") &&
            Has("blue");
@@ -226,7 +226,7 @@ class PlyReader {
                              "opacity"}) {
       if (missing.empty() && !Has(name)) missing = name;
     }
-    if (missing.empty() && !HasBytesOfColor()) {
+    if (missing.empty() && !HasByteColors()) {
       for (const char* name : {"f_dc_0", "f_dc_1", "f_dc_2"}) {
         if (missing.empty() && !Has(name)) missing = name;
       }

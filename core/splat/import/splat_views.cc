@@ -99,7 +99,7 @@ class CameraChooser {
         up_(EstimateUp(model, options.up)) {}
 
   std::vector<SplatCamera> Choose() {
-    LookAround();
+    ScoreCoarseCandidates();
     const Candidate best = *std::max_element(
         coarse_.begin(), coarse_.end(), [](const Candidate& a, const Candidate& b) {
           return a.seen < b.seen;
@@ -123,7 +123,7 @@ class CameraChooser {
   }
 
   // The best distance of each coarse direction.
-  void LookAround() {
+  void ScoreCoarseCandidates() {
     const std::vector<Eigen::Vector3d> directions = Directions(kCoarseDirections);
     for (const Eigen::Vector3d& direction : directions) {
       Candidate best{direction, place_.radius, 0.0};
@@ -183,11 +183,11 @@ class CameraChooser {
                                kCoarseDirections + options_.views,
                                "looking for views");
     }
-    return InAPath(std::move(chosen));
+    return SortAlongPath(std::move(chosen));
   }
 
   // Orders views by proximity, so that consecutive names are neighbours.
-  static std::vector<SplatCamera> InAPath(std::vector<SplatCamera> cameras) {
+  static std::vector<SplatCamera> SortAlongPath(std::vector<SplatCamera> cameras) {
     for (size_t i = 1; i < cameras.size(); ++i) {
       const Eigen::Vector3d last = cameras[i - 1].cam_from_world.Center();
       const auto nearest = std::min_element(cameras.begin() + static_cast<std::ptrdiff_t>(i),

@@ -95,7 +95,7 @@ class Gunzip {
   }
   // Returns false if the file ends before its checksum or the checksum differs. Further bytes may
   // follow.
-  bool EndsWell() {
+  bool HasValidEnd() {
     Bytef more = 0;
     stream_.next_out = &more;
     stream_.avail_out = 1;
@@ -115,7 +115,7 @@ std::string StreamsOfGzip(std::string_view bytes, const SplatSource& source, Hea
   if (header->bytes() > kMostInflated * bytes.size()) ThrowShort(source);
   CheckCount(header->count, source);
   plain.clear();
-  if (!gunzip.Append(header->bytes(), &plain) || !gunzip.EndsWell()) ThrowShort(source);
+  if (!gunzip.Append(header->bytes(), &plain) || !gunzip.HasValidEnd()) ThrowShort(source);
   return plain;
 }
 

@@ -20,7 +20,7 @@ struct PointCloud {
   }
 };
 
-bool Nearer(const NeighborTree::Neighbor& a, const NeighborTree::Neighbor& b) {
+bool IsNearer(const NeighborTree::Neighbor& a, const NeighborTree::Neighbor& b) {
   return a.squared_distance != b.squared_distance ? a.squared_distance < b.squared_distance
                                                   : a.index < b.index;
 }
@@ -35,9 +35,9 @@ class NearestInOrder {
       : k_(k), nearest_(nearest) {}
   bool addPoint(float squared_distance, uint32_t index) {
     const NeighborTree::Neighbor here{index, squared_distance};
-    if (full() && !Nearer(here, nearest_.back())) return true;
+    if (full() && !IsNearer(here, nearest_.back())) return true;
     if (full()) nearest_.pop_back();
-    nearest_.insert(std::upper_bound(nearest_.begin(), nearest_.end(), here, Nearer), here);
+    nearest_.insert(std::upper_bound(nearest_.begin(), nearest_.end(), here, IsNearer), here);
     return true;
   }
   bool full() const { return nearest_.size() == k_; }

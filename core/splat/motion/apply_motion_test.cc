@@ -16,7 +16,7 @@ constexpr int64_t kStill = 5;
 constexpr int64_t kMoving = 23;
 
 // One Gaussian that moves, in float64: parameters, then motion. Returns its rows at `t`.
-std::vector<double> TwinAt(const std::vector<double>& p, double t) {
+std::vector<double> ReferenceMotion(const std::vector<double>& p, double t) {
   std::vector<double> at(p.begin(), p.begin() + kRows);
   const double* m = p.data() + kRows;
   const double tau = t - m[kCenterRow], scaled = tau / std::exp(m[kLogWidthRow]);
@@ -73,7 +73,8 @@ TEST_P(ApplyMotionTest, AgreesWithFloat64Reference) {
     const ParameterBlock at = At(t), still = RandomRows(kRows, kStill + kMoving, 3);
     for (int64_t i = 0; i < kStill; ++i) EXPECT_EQ(Column(at, i), Column(still, i));
     for (int64_t i = 0; i < kMoving; ++i) {
-      const std::vector<double> twin = TwinAt(Column(moving_, i), t), ours = Column(at, kStill + i);
+      const std::vector<double> twin = ReferenceMotion(Column(moving_, i), t),
+                                ours = Column(at, kStill + i);
       for (int r = 0; r < kRows; ++r) EXPECT_NEAR(ours[r], twin[r], 2e-5 * (1 + std::abs(twin[r])));
     }
   }
@@ -87,7 +88,7 @@ TEST_P(ApplyMotionTest, GradientAgreesWithFloat64Reference) {
     for (int64_t i = 0; i < kMoving; ++i) {
       const std::vector<double> d = Column(d_at, kStill + i), parameters = Column(moving_, i);
       const auto value = [&](const std::vector<double>& p) {
-        const std::vector<double> at = TwinAt(p, t);
+        const std::vector<double> at = ReferenceMotion(p, t);
         double sum = 0.0;
         for (int r = 0; r < kRows; ++r) sum += d[r] * at[r];
         return sum;

@@ -67,7 +67,7 @@ RigidMotion Fit(const std::vector<Neighbor>& neighbors) {
 }
 
 // Weights down neighbours with a different motion: another object's, or a wrong one.
-void Distrust(const RigidMotion& motion, std::vector<Neighbor>* neighbors) {
+void DownweightOutliers(const RigidMotion& motion, std::vector<Neighbor>* neighbors) {
   std::vector<double> off;
   for (const Neighbor& n : *neighbors) off.push_back((n.velocity - motion.At(n.position)).norm());
   std::vector<double> sorted = off;
@@ -143,7 +143,7 @@ void ShareMotion(const SharedMotionOptions& options, ThreadPool& pool, Parameter
         neighbors.clear();
         for (const NeighborTree::Neighbor& n : nearest) neighbors.push_back(all[n.index]);
         const Vector3d acceleration = MeanAcceleration(neighbors);
-        Distrust(Fit(neighbors), &neighbors);
+        DownweightOutliers(Fit(neighbors), &neighbors);
         const Vector3d velocity = Fit(neighbors).At(all[m].position);
         const int64_t i = members[m];
         MoveTowards(velocity, options.share, options.row + kVelocityRow, i, moving);

@@ -97,14 +97,14 @@ void CarryFilm(const CarryInputs& inputs, StageContext& context) {
   const auto fill = [&](int frame, const CarriedColor& second) {
     AbMap map = DecodeAbPng(done.Png(frame), artifact::kCarried);
     CarriedColor color{std::move(map.ab), std::move(map.confidence)};
-    if (FillOpen(second, &color) == 0) return;
+    if (FillUncertain(second, &color) == 0) return;
     done.Replace(frame, CoveredShare(color), EncodeAbPng(color.ab, color.confidence));
   };
   const auto carry = [&](const std::vector<FilmKey>& from) {
     CarryAlongFilm(frames, from, options.film, context.pool(), context.cancel(), add, resume, fill);
   };
   carry(keys);
-  const std::vector<int> middles = MiddlesWithoutKey(frames.shot, inputs.key_views);
+  const std::vector<int> middles = UnkeyedShotMiddles(frames.shot, inputs.key_views);
   std::optional<ReturningShots> returning;
   for (size_t i = 0; i < middles.size(); ++i) {
     done.ReportProgress(fmt::format(

@@ -61,7 +61,7 @@ std::shared_ptr<const Encoder> StageContext::LoadEncoder(const std::string& mode
 std::filesystem::path StageContext::Input(const std::string& name) const {
   const auto found = setup_.inputs.find(name);
   if (found == setup_.inputs.end()) {
-    const Stage* maker = StageThatLeaves(name);
+    const Stage* maker = FindProducer(name);
     throw Error(ErrorCode::kFailedPrecondition,
                 "this stage needs {}, which a {} job makes: name one among the inputs",
                 name,
@@ -108,7 +108,7 @@ void StageContext::TakeOutput(const std::string& name, const std::filesystem::pa
   outputs_.push_back(name);
 }
 
-void StageContext::PassOn(const std::string& name) {
+void StageContext::ForwardInput(const std::string& name) {
   Input(name);
   passed_on_.push_back(name);
 }

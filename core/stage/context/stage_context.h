@@ -85,7 +85,7 @@ class StageContext {
   // As WriteOutput for a finished file in the scratch folder, which is moved.
   void TakeOutput(const std::string& name, const std::filesystem::path& file);
   // An input that this stage publishes again under its name.
-  void PassOn(const std::string& name);
+  void ForwardInput(const std::string& name);
 
   const std::vector<std::string>& outputs() const { return outputs_; }
   const std::vector<std::string>& passed_on() const { return passed_on_; }

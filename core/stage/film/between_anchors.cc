@@ -30,7 +30,7 @@ InferredColor InferBetweenAnchors(const CarriedColor& of_anchors,
                                   const Image& luminance,
                                   const ColorSources& sources) {
   InferredColor answer;
-  if (ShareOpen(carried_surely, of_anchors) > kWorthInferring) {
+  if (UncertainShare(carried_surely, of_anchors) > kWorthInferring) {
     answer = sources.infer(luminance, KnownPixels(of_anchors, carried_surely));
   } else {
     answer = {Image(luminance.width, luminance.height, 2),
@@ -82,7 +82,7 @@ CarriedColor BlendAnchors(CarriedColor before, const CarriedColor& behind, doubl
   return before;
 }
 
-double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors) {
+double UncertainShare(const Image& carried_confidence, const CarriedColor& of_anchors) {
   const std::vector<float>& one = carried_confidence.data;
   const std::vector<float>& other = of_anchors.confidence.data;
   size_t open = 0;
@@ -91,7 +91,7 @@ double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors
   return static_cast<double>(open) / static_cast<double>(one.size());
 }
 
-size_t FillOpen(const CarriedColor& others, CarriedColor* color) {
+size_t FillUncertain(const CarriedColor& others, CarriedColor* color) {
   size_t filled = 0;
   for (size_t i = 0; i < others.confidence.data.size(); ++i) {
     float& confidence = color->confidence.data[i];
@@ -104,12 +104,12 @@ size_t FillOpen(const CarriedColor& others, CarriedColor* color) {
   return filled;
 }
 
-void TakeNeighborsColor(const CarriedColor& answer, CarriedColor* color) {
+void FillFromNeighbor(const CarriedColor& answer, CarriedColor* color) {
   CarriedColor followed = answer;
   for (float& confidence : followed.confidence.data) {
     if (confidence > kAnswerFollowed) confidence = std::max(confidence, kJustFollowed);
   }
-  FillOpen(followed, color);
+  FillUncertain(followed, color);
 }
 
 FusedColor ColorBetweenAnchors(const Image& luminance,

@@ -19,12 +19,12 @@ CarriedColor BlendAnchors(CarriedColor before, const CarriedColor& behind, doubl
 // Open share of a frame above which its colours are inferred.
 inline constexpr double kWorthInferring = 0.02;
 // Share of a frame that neither carried colours nor anchors cover surely.
-double ShareOpen(const Image& carried_confidence, const CarriedColor& of_anchors);
+double UncertainShare(const Image& carried_confidence, const CarriedColor& of_anchors);
 // Takes `others` where they are sure and `color` is not. Returns the number of these pixels.
-size_t FillOpen(const CarriedColor& others, CarriedColor* color);
+size_t FillUncertain(const CarriedColor& others, CarriedColor* color);
 // Takes the colours inferred for a neighbouring frame where `color` is not sure. They are
 // propagated with less confidence than seen colours, since inferring them anew would be no surer.
-void TakeNeighborsColor(const CarriedColor& answer, CarriedColor* color);
+void FillFromNeighbor(const CarriedColor& answer, CarriedColor* color);
 
 // Fuses the colour of a frame: carried colours; those of the anchors, where they are propagated
 // surely, in place of inferred ones; and inferred ones where neither is sure, if that is more than

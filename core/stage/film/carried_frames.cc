@@ -47,7 +47,7 @@ CarriedFrames::CarriedFrames(const Scene& scene,
       [&](int frame, const CarriedColor& second) {
         const int view = order[frame];
         CarriedColor color = Of(view);
-        if (FillOpen(second, &color) == 0) return;
+        if (FillUncertain(second, &color) == 0) return;
         WriteFileAtomic(FileOf(view), EncodeAbPng(color.ab, color.confidence));
       });
 }

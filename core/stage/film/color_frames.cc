@@ -88,7 +88,7 @@ class ShotColorer {
         context_(context) {}
 
   void Run() {
-    size_t begin = FirstToColor();
+    size_t begin = FirstUncoloredFrame();
     while (begin < shot_.frames.size()) {
       const size_t end = EndOfStretch(begin);
       Color({shot_.frames.begin() + static_cast<std::ptrdiff_t>(begin),
@@ -100,7 +100,7 @@ class ShotColorer {
 
  private:
   // An interrupted run resumes at the last anchor before all frames that are left.
-  size_t FirstToColor() const {
+  size_t FirstUncoloredFrame() const {
     const auto begin = shot_.frames.begin();
     const auto open = std::find_if(begin, shot_.frames.end(), [&](int frame) {
       return !coloring_.was_done(view_of_frame_[frame]);
@@ -181,7 +181,7 @@ class ShotColorer {
       return x.end - x.begin > y.end - y.begin;
     });
     pool.ForEach(static_cast<int64_t>(gaps.size()), [&](int64_t i, int) {
-      InferOpenFrames(gaps[i], stretch, flow, &of_anchors, &colored);
+      InferUncertainFrames(gaps[i], stretch, flow, &of_anchors, &colored);
     });
     pool.ForEach(count, [&](int64_t i, int) {
       if (colored[i].color.ab.Empty()) colored[i].color = ColorOf(stretch[i], &of_anchors[i]);
@@ -236,20 +236,20 @@ class ShotColorer {
 
   // Infers the frames of a gap that propagation leaves open, the most open one first. Inferred
   // colours are propagated into the other frames.
-  void InferOpenFrames(const Gap& gap,
-                       const std::vector<int>& stretch,
-                       const Flow& flow,
-                       std::vector<CarriedColor>* of_anchors,
-                       std::vector<Colored>* colored) const {
+  void InferUncertainFrames(const Gap& gap,
+                            const std::vector<int>& stretch,
+                            const Flow& flow,
+                            std::vector<CarriedColor>* of_anchors,
+                            std::vector<Colored>* colored) const {
     const std::vector<int> frames(stretch.begin() + static_cast<std::ptrdiff_t>(gap.begin),
                                   stretch.begin() + static_cast<std::ptrdiff_t>(gap.end));
     std::vector<Image> carried;  // confidences
     std::vector<double> open(frames.size());
     const auto measure = [&](size_t i) {
-      open[i] = ShareOpen(carried[i], (*of_anchors)[gap.begin + i]);
+      open[i] = UncertainShare(carried[i], (*of_anchors)[gap.begin + i]);
     };
     for (size_t i = 0; i < frames.size(); ++i) {
-      carried.push_back(std::move(CarriedInto(frames[i]).confidence));
+      carried.push_back(std::move(PropagatedColor(frames[i]).confidence));
       measure(i);
     }
     for (size_t left = frames.size(); left > 0; --left) {
@@ -264,13 +264,13 @@ class ShotColorer {
                 [&](int frame, const CarriedColor& color) {
                   const auto i = std::find(frames.begin(), frames.end(), frame) - frames.begin();
                   if (open[i] == 0.0) return;
-                  TakeNeighborsColor(color, &(*of_anchors)[gap.begin + i]);
+                  FillFromNeighbor(color, &(*of_anchors)[gap.begin + i]);
                   measure(i);
                 });
     }
   }
 
-  CarriedColor CarriedInto(int frame) const {
+  CarriedColor PropagatedColor(int frame) const {
     const int view = view_of_frame_[frame];
     const Camera camera = images_.WorkingCamera(view);
     return ReadCarried(context_, scene_.views[view], camera.width, camera.height);
@@ -281,7 +281,7 @@ class ShotColorer {
     context_.cancel().ThrowIfCancelled();
     const int view = view_of_frame_[frame];
     const auto luminance = frames_.luminance(frame);
-    const CarriedColor carried = CarriedInto(frame);
+    const CarriedColor carried = PropagatedColor(frame);
     ColorSources sources = coloring_.sources(view);
     if (of_anchors != nullptr) {
       if (!guessed_.contains(shot_.AnchorUpTo(frame)) &&
@@ -300,7 +300,7 @@ class ShotColorer {
     const size_t end =
         is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
     // Colours of different key frames are not averaged.
-    std::vector<FrameInMotion> neighbors;
+    std::vector<MovingFrame> neighbors;
     int last_nearest = -1;
     for (const Colored& one : colored_) {
       const int nearest = near_[one.frame].nearest;

@@ -128,9 +128,9 @@ std::vector<int> CandidatesOfFilm(const Scene& scene, const std::string& named) 
   return {candidates.begin(), candidates.end()};
 }
 
-bool TakeFromLongestShot(const Scene& scene,
-                         const std::vector<int>& candidates,
-                         KeyViewSelection* selection) {
+bool PreferLongestShot(const Scene& scene,
+                       const std::vector<int>& candidates,
+                       KeyViewSelection* selection) {
   for (const Shot& shot : ShotsOf(scene)) {
     for (const RankedView& ranked : selection->ranking) {
       if (!ranked.set_aside.empty()) continue;

@@ -20,9 +20,9 @@ namespace color3d {
 std::vector<int> CandidatesOfFilm(const Scene& scene, const std::string& named);
 
 // Moves the selection to the best view of the film's longest shot. False when it is there already.
-bool TakeFromLongestShot(const Scene& scene,
-                         const std::vector<int>& candidates,
-                         KeyViewSelection* selection);
+bool PreferLongestShot(const Scene& scene,
+                       const std::vector<int>& candidates,
+                       KeyViewSelection* selection);
 
 // Chooses `count` of the candidates: one in each shot, the longest first, shots that show the place
 // of a shot with a key frame last; then where there are most frames for each key frame. Within a

@@ -71,9 +71,9 @@ std::map<int, std::vector<int>> FramesByShot(const Scene& scene) {
 }
 
 // Publishes the file of the scratch folder under each of the names.
-void LeaveAs(const std::vector<std::string>& artifacts,
-             const fs::path& file,
-             StageContext& context) {
+void PublishUnderNames(const std::vector<std::string>& artifacts,
+                       const fs::path& file,
+                       StageContext& context) {
   for (size_t i = 1; i < artifacts.size(); ++i) {
     const fs::path copy = file.string() + ".copy";
     fs::copy_file(file, copy);
@@ -141,15 +141,14 @@ void WriteColoredFilm(const Scene& scene,
     context.progress().OnProgress(begin + size, count, "writing frames of " + film.artifacts[0]);
   }
   movie.Finish();
-  LeaveAs(film.artifacts, file, context);
+  PublishUnderNames(film.artifacts, file, context);
 }
 
 void WriteFilmsOfCameras(const Scene& scene, bool pictures, StageContext& context) {
   const int key = ReadKeyView(context, scene);
   const std::optional<ImportFacts> facts = FindImportFacts(context);
   if (!facts || facts->cameras.size() < 2) {
-    return WriteColoredFilm(
-        scene, {scene.FramesOfShotOf(key), {artifact::kFilm}, pictures}, context);
+    return WriteColoredFilm(scene, {scene.FramesInShot(key), {artifact::kFilm}, pictures}, context);
   }
   std::set<std::string> taken;
   for (auto& [shot, frames] : FramesByShot(scene)) {

@@ -45,9 +45,9 @@ Image MedianPicture(const ViewImages& images, const std::vector<int>& views) {
   return median;
 }
 
-class Sightings {
+class CameraSurvey {
  public:
-  Sightings(const fs::path& frames_root, const Scene& frames, StageContext& context)
+  CameraSurvey(const fs::path& frames_root, const Scene& frames, StageContext& context)
       : frames_root_(frames_root),
         frames_(frames),
         context_(context),
@@ -209,7 +209,7 @@ PlacedCameras PlaceCameras(const fs::path& frames_root,
                            const std::vector<FramesOfCamera>& cameras,
                            const ImportOptions& options,
                            StageContext& context) {
-  const Sightings sightings(frames_root, frames, context);
+  const CameraSurvey sightings(frames_root, frames, context);
   std::vector<Sighting> seen;
   std::vector<SequenceFrame> pictures;
   for (size_t i = 0; i < cameras.size(); ++i) {

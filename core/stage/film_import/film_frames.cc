@@ -25,7 +25,7 @@ namespace {
 
 constexpr size_t kNamed = 5;  // frames in a warning
 
-const char* WhyUnused(NoFilm scene) {
+const char* UnusedReason(NoFilm scene) {
   switch (scene) {
     case NoFilm::kPosedFilms:
       return "films whose poses are given have times and places of their own, and are taken as "
@@ -71,7 +71,7 @@ std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
   return times;
 }
 
-std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options) {
+std::vector<int> RequestedFrames(const std::vector<double>& times, const FilmOptions& options) {
   std::vector<int> wanted;
   int64_t inside = 0;
   for (size_t i = 0; i < times.size(); ++i) {
@@ -106,7 +106,7 @@ void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext&
   context.progress().OnWarning(fmt::format("{} {} left aside: {}",
                                            fmt::join(unused, ", "),
                                            unused.size() == 1 ? "is" : "are",
-                                           WhyUnused(scene)));
+                                           UnusedReason(scene)));
 }
 
 void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {

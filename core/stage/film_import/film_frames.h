@@ -26,7 +26,7 @@ std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
 
 // Indices of the frames that are asked for, of a film whose frames are shown at `times`. Throws
 // Error{kInvalidArgument} when there is none.
-std::vector<int> FramesAskedFor(const std::vector<double>& times, const FilmOptions& options);
+std::vector<int> RequestedFrames(const std::vector<double>& times, const FilmOptions& options);
 
 // What a scene is that is not a film of one camera without poses.
 enum class NoFilm { kPosedFilms, kCameraFilms, kCameraPictures, kTimedPictures, kPhotos };

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 namespace {
 
 // Cameras that run at their own rates or begin at odd times share no moment.
-void WarnOfOddTimes(const std::vector<View>& views, size_t longest, StageContext& context) {
+void WarnOfUnequalTimes(const std::vector<View>& views, size_t longest, StageContext& context) {
   std::set<double> times;
   for (const View& view : views) times.insert(view.time_s());
   if (2 * times.size() <= 3 * longest) return;
@@ -64,7 +64,7 @@ class CameraFilmsImport {
       result.layout = CaptureLayout::kFilms;
     }
     result.photos_found = count_;
-    TellMoments(&result);
+    ReportTimes(&result);
     FinishPosedScene(options, &result);
     KeepFrames(result.scene);
     return result;
@@ -144,7 +144,7 @@ class CameraFilmsImport {
     return std::move(placed.result);
   }
 
-  void TellMoments(ImportResult* result) {
+  void ReportTimes(ImportResult* result) {
     std::vector<FrameTime> times;
     std::map<std::string, size_t> frames;
     for (const View& view : result->scene.views) {
@@ -157,7 +157,7 @@ class CameraFilmsImport {
     if (!moments.note.empty()) result->warnings.push_back(std::move(moments.note));
     size_t longest = 0;
     for (const auto& [camera, count] : frames) longest = std::max(longest, count);
-    if (result->scene.views[0].moment) WarnOfOddTimes(result->scene.views, longest, context_);
+    if (result->scene.views[0].moment) WarnOfUnequalTimes(result->scene.views, longest, context_);
   }
 
   void KeepFrames(const Scene& scene) {

@@ -39,7 +39,7 @@ struct FrameStream {
 
 // Indices of the frames that are asked for.
 std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& options) {
-  std::vector<int> wanted = FramesAskedFor(times, options);
+  std::vector<int> wanted = RequestedFrames(times, options);
   CheckFrameCount(wanted.size(), times[wanted.back()] - times[wanted.front()], options);
   if (wanted.size() == 1) {
     throw InvalidArgument(
@@ -49,7 +49,7 @@ std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& opt
   return wanted;
 }
 
-void TellShots(const FilmShots& shots, Scene* scene, StageContext& context) {
+void ReportShots(const FilmShots& shots, Scene* scene, StageContext& context) {
   std::vector<std::string> blank, alien, cuts;
   for (size_t i = 0; i < scene->views.size(); ++i) {
     View& view = scene->views[i];
@@ -91,7 +91,7 @@ View ViewOf(const FrameStream& stream, int i, const Image& luminance, bool is_dr
 }
 
 // Kept aside until it is known which frames stay.
-void KeepAside(const View& view, Image luminance, const StageContext& context) {
+void WriteScratchFrame(const View& view, Image luminance, const StageContext& context) {
   const fs::path file = context.scratch_folder() / view.image_file;
   fs::create_directories(file.parent_path());
   WriteFileAtomic(file, EncodeGrayFrame(std::move(luminance)));
@@ -126,7 +126,7 @@ ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& cont
     }
     frames.thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
     if (deflicker) frames.tones.push_back(FitWithin(luminance, kTonePicturePx));
-    if (stream.is_video && !deflicker) KeepAside(view, std::move(luminance), context);
+    if (stream.is_video && !deflicker) WriteScratchFrame(view, std::move(luminance), context);
     views.push_back(std::move(view));
     frames.index.push_back(i);
   }
@@ -148,9 +148,10 @@ void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageConte
   for (int i = 0; i < count; ++i) {
     context.cancel().ThrowIfCancelled();
     context.progress().OnProgress(i, count, "steadying exposure");
-    KeepAside(frames.scene.views[i],
-              Toned(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
-              context);
+    WriteScratchFrame(
+        frames.scene.views[i],
+        ApplyToneCurve(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
+        context);
   }
   constexpr double kNothingL = 1e-6;
   if (std::abs(tones.flicker_before - tones.flicker_after) < kNothingL) {
@@ -172,7 +173,7 @@ void ImportFrames(const FrameStream& stream,
                   StageContext& context) {
   ReadFrames frames = ReadAll(stream, options.deflicker, context);
   Scene& scene = frames.scene;
-  TellShots(FindShots(frames.thumbnails), &scene, context);
+  ReportShots(FindShots(frames.thumbnails), &scene, context);
   if (options.deflicker) WriteSteady(stream, frames, context);
   const bool is_drawn = stream.is_video || options.deflicker;
   ImportFacts facts;

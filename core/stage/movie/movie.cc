@@ -86,7 +86,7 @@ Stations CamerasOfFile(const RenderOptions& options, const Scene& scene, const C
 std::vector<PathCamera> CamerasOfViews(const RenderOptions& options, const Scene& scene, int home) {
   std::vector<int> order;
   for (const std::string& name : options.views) order.push_back(scene.FindView(name));
-  if (order.empty()) order = scene.HasTimes() ? scene.FramesOfShotOf(home) : ViewsInOrder(scene);
+  if (order.empty()) order = scene.HasTimes() ? scene.FramesInShot(home) : ViewsInOrder(scene);
   std::vector<PathCamera> cameras;
   for (const int index : order) {
     const View& view = scene.views[index];
@@ -105,14 +105,14 @@ std::vector<PathCamera> StillCamera(const Scene& scene, int home) {
 }
 
 // Returns true if a movie without a given length shows every camera of its path once.
-bool IsOneByOne(const RenderOptions& options, const Scene& scene) {
+bool ShowsEachCameraOnce(const RenderOptions& options, const Scene& scene) {
   using Path = RenderOptions::Path;
   return options.path == Path::kCameras || options.path == Path::kStill ||
          (options.path == Path::kPhotos && scene.HasTimes());
 }
 
 // The cameras as they are, and back again for --bounce.
-std::vector<PathCamera> OneByOne(std::vector<PathCamera> cameras, bool bounce) {
+std::vector<PathCamera> EachCameraOnce(std::vector<PathCamera> cameras, bool bounce) {
   const size_t count = cameras.size();
   for (size_t i = count - 1; bounce && i-- > 1;) cameras.push_back(cameras[i]);
   return cameras;
@@ -219,11 +219,11 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
   for (PathCamera& station : stations.cameras) {
     station.camera = CoverPicture(station.camera, picture.width, picture.height);
   }
-  const bool one_by_one = !options.frames && IsOneByOne(options, scene);
+  const bool one_by_one = !options.frames && ShowsEachCameraOnce(options, scene);
   const bool file_tells = stations.have_times && options.path == RenderOptions::Path::kCameras;
   std::vector<PathCamera> frames;
   if (one_by_one) {
-    frames = OneByOne(stations.cameras, options.bounce);
+    frames = EachCameraOnce(stations.cameras, options.bounce);
   } else {
     const Eigen::Vector3d focus = FocusOfView(view, model, context.pool());
     const double unit = (focus - view.cam_from_world.Center()).norm();
@@ -246,7 +246,8 @@ std::optional<FilmClock> ClockOfScene(const RenderOptions& options,
                                       const std::vector<PathCamera>& frames,
                                       const StageContext& context) {
   const bool own = !options.frames && !options.time_s && frames.size() > 1 && scene.HasTimes() &&
-                   options.path != RenderOptions::Path::kCameras && IsOneByOne(options, scene);
+                   options.path != RenderOptions::Path::kCameras &&
+                   ShowsEachCameraOnce(options, scene);
   if (!own || !TimesAreSeconds(scene, FindImportFacts(context))) return std::nullopt;
   std::vector<double> times;
   for (const PathCamera& frame : frames) times.push_back(frame.time_s);

@@ -60,7 +60,7 @@ void MixIn(const CarriedColor& color, Image* ab) {
 
 // Channels to propagate from a key view: a, b and the painted share. Unpainted parts have their
 // present colours. Confidence is 1 everywhere.
-CarriedColor PaintedOver(Image ab, const CarriedColor& color) {
+CarriedColor PaintOver(Image ab, const CarriedColor& color) {
   MixIn(color, &ab);
   CarriedColor key{Image(ab.width, ab.height, 3), Image(ab.width, ab.height, 1, 1.0f)};
   std::copy(ab.data.begin(), ab.data.end(), key.ab.data.begin());
@@ -74,7 +74,7 @@ struct FrameToRecolor {
   Image changed;         // these, changed as the corrector infers
   Image change_share;    // confidence of that change; may be empty
   Image provenance;      // of the present colours; may be empty
-  CarriedColor painted;  // propagated from key views: see PaintedOver
+  CarriedColor painted;  // propagated from key views: see PaintOver
 };
 
 // Known colours of a frame: painted or left colours where they are propagated surely, elsewhere
@@ -157,7 +157,7 @@ class RangeColorer {
       PlacedPicture picture = film_.Picture(key.view);
       const auto frame = std::find(range_.views.begin(), range_.views.end(), key.view);
       keys_.push_back(
-          {static_cast<int>(frame - range_.views.begin()), PaintedOver(picture.ab, color)});
+          {static_cast<int>(frame - range_.views.begin()), PaintOver(picture.ab, color)});
       // Unpainted parts are right as they are, and correct nothing.
       Image wanted = picture.ab;
       MixIn(color, &wanted);
@@ -197,8 +197,8 @@ class RangeColorer {
                    keep,
                    {},
                    [&](int frame, const CarriedColor& second) {
-                     CarriedColor color = CarriedInto(frame);
-                     if (FillOpen(second, &color) > 0) keep(frame, color);
+                     CarriedColor color = PropagatedColor(frame);
+                     if (FillUncertain(second, &color) > 0) keep(frame, color);
                    });
   }
 
@@ -206,7 +206,7 @@ class RangeColorer {
     return folder_ / fmt::format("{}_{}.png", what, frame);
   }
 
-  CarriedColor CarriedInto(int frame) const {
+  CarriedColor PropagatedColor(int frame) const {
     const AbMap map = DecodeAbPng(ReadFile(FileOf(frame, "colors")), "colors");
     const Image painted = DecodeImage(ReadFile(FileOf(frame, "painted")), "painted");
     CarriedColor color{Image(map.ab.width, map.ab.height, 3), map.confidence};
@@ -248,7 +248,7 @@ class RangeColorer {
         picture.ab,
         {},
         ReadProvenance(film_.context, film_.scene.views[view], luminance.width, luminance.height),
-        CarriedInto(frame)};
+        PropagatedColor(frame)};
     if (corrector_) {
       CorrectedColor corrected = corrector_->Predict(picture, 0);
       for (size_t i = 0; i < recolored.changed.data.size(); ++i) {
@@ -278,7 +278,7 @@ class RangeColorer {
     const size_t end =
         is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
     // Colours of different key views are not averaged.
-    std::vector<FrameInMotion> neighbors;
+    std::vector<MovingFrame> neighbors;
     for (size_t i = 0; i < colored_.size(); ++i) {
       const size_t frame = first_ + i;
       const bool alike = frame > 0 && near_[frame].nearest == near_[frame - 1].nearest;

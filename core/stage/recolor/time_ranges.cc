@@ -108,7 +108,7 @@ std::vector<RecoloredRange> RangesOf(const std::vector<RangeKeyView>& keys, cons
   for (const RangeKeyView& key : keys) {
     const int view = FindAdditionalKeyView(scene, key.view);
     CheckRange(key, scene.views[view], film);
-    std::vector<int> views = scene.FramesOfShotOf(view);
+    std::vector<int> views = scene.FramesInShot(view);
     std::erase_if(views, [&](int v) { return !IsInside(key, scene.views[v].time_s()); });
     AddTo(&ranges, std::move(views), {view, &key}, scene);
   }

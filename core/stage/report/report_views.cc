@@ -31,8 +31,8 @@ std::vector<int> ChosenViews(const Scene& scene, bool has_model, const StageCont
     if (!has_model && !HasRender(scene.views[i], context)) continue;
     (scene.views[i].held_out ? held_out : training).push_back(static_cast<int>(i));
   }
-  std::vector<int> chosen = EvenlyOf(held_out, kMaxViews / 2);
-  const std::vector<int> others = EvenlyOf(training, kMaxViews - chosen.size());
+  std::vector<int> chosen = PickEvenly(held_out, kMaxViews / 2);
+  const std::vector<int> others = PickEvenly(training, kMaxViews - chosen.size());
   chosen.insert(chosen.end(), others.begin(), others.end());
   return chosen;
 }

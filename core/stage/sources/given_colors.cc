@@ -130,10 +130,10 @@ GivenColors ReadGivenColors(const PaintedColors& painted,
   return colors;
 }
 
-CarriedColor UndistortGiven(const Image& ab,
-                            const Image& given,
-                            int view,
-                            const ViewImages& images) {
+CarriedColor UndistortGivenColors(const Image& ab,
+                                  const Image& given,
+                                  int view,
+                                  const ViewImages& images) {
   Image weighted = ab;
   for (int c = 0; c < 2; ++c) {
     for (size_t i = 0; i < given.data.size(); ++i) weighted.Plane(c)[i] *= given.data[i];

@@ -30,9 +30,9 @@ GivenColors ReadGivenColors(const PaintedColors& painted,
 
 // Undistorts colours of the photo of `view` (2 channels, size as captured) to the size of `images`.
 // `given`: 1 channel, 0..1, their weight, so that pixels without a colour do not leak into others.
-CarriedColor UndistortGiven(const Image& ab,
-                            const Image& given,
-                            int view,
-                            const ViewImages& images);
+CarriedColor UndistortGivenColors(const Image& ab,
+                                  const Image& given,
+                                  int view,
+                                  const ViewImages& images);
 
 }  // namespace color3d

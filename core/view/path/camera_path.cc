@@ -8,7 +8,7 @@
 #include "core/base/error.h"
 #include "core/base/text/name_order.h"
 #include "core/view/path/turn.h"
-#include "core/view/stand.h"
+#include "core/view/scene_placement.h"
 
 namespace color3d {
 namespace {
@@ -135,8 +135,8 @@ std::vector<PathCamera> TurnFrames(const Scene& scene,
                                    int key_view,
                                    const Vector3d& focus,
                                    const std::vector<double>& shares) {
-  const Stand stand = StandOf(scene, key_view, focus);
-  const Turn turn = TurnOf(scene, key_view, stand);
+  const ScenePlacement placement = PlaceScene(scene, key_view, focus);
+  const Turn turn = TurnOf(scene, key_view, placement);
   Camera camera = scene.views.at(static_cast<size_t>(key_view)).camera;
   camera.cx = 0.5 * camera.width;
   camera.cy = 0.5 * camera.height;
@@ -155,8 +155,10 @@ std::vector<PathCamera> TurnFrames(const Scene& scene,
     Eigen::Matrix3d camera_from_page;
     camera_from_page << right.transpose(), forward.cross(right).transpose(), forward.transpose();
     PathCamera frame{camera, {}};
-    frame.cam_from_world.rotation = (Quaterniond(camera_from_page) * stand.rotation).normalized();
-    const Vector3d center = stand.center + stand.rotation.conjugate() * position / stand.scale;
+    frame.cam_from_world.rotation =
+        (Quaterniond(camera_from_page) * placement.rotation).normalized();
+    const Vector3d center =
+        placement.center + placement.rotation.conjugate() * position / placement.scale;
     frame.cam_from_world.translation = -(frame.cam_from_world.rotation * center);
     frames.push_back(frame);
   }

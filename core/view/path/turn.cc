@@ -16,7 +16,7 @@ constexpr double kNearAround = 0.45, kNearUp = 0.35, kNearAway = 0.5;
 constexpr double kHome = 0.02;       // weight of the key view's height and distance everywhere
 constexpr double kHomeAround = 0.6;  // radians from the key view on which the way leaves it
 
-Turn::Place PlaceOf(const Eigen::Vector3d& position) {
+Turn::Place ToSpherical(const Eigen::Vector3d& position) {
   return {std::atan2(position.x(), position.z()),
           std::atan2(position.y(), std::hypot(position.x(), position.z())),
           std::log(std::max(position.norm(), 1e-6))};
@@ -28,7 +28,7 @@ double Nearness(double angle, double deviation) {
 }
 
 // Mean height and distance of the photos near this angle.
-Turn::Place AmongPhotos(const Turn& turn, double angle) {
+Turn::Place MeanOfNearbyPhotos(const Turn& turn, double angle) {
   double weights = kHome;
   double height = kHome * turn.start.height, log_distance = kHome * turn.start.log_distance;
   for (const Turn::Place& photo : turn.photos) {
@@ -45,13 +45,13 @@ Turn::Place AmongPhotos(const Turn& turn, double angle) {
 
 }  // namespace
 
-Turn TurnOf(const Scene& scene, int key_view, const Stand& stand) {
+Turn TurnOf(const Scene& scene, int key_view, const ScenePlacement& placement) {
   Turn turn;
-  turn.start =
-      PlaceOf(stand.Apply(scene.views.at(static_cast<size_t>(key_view)).cam_from_world.Center()));
+  turn.start = ToSpherical(
+      placement.Apply(scene.views.at(static_cast<size_t>(key_view)).cam_from_world.Center()));
   std::vector<double> angles;  // 0..2 pi
   for (const View& view : scene.views) {
-    Turn::Place photo = PlaceOf(stand.Apply(view.cam_from_world.Center()));
+    Turn::Place photo = ToSpherical(placement.Apply(view.cam_from_world.Center()));
     photo.angle -= turn.start.angle;
     turn.photos.push_back(photo);
     angles.push_back(photo.angle - kTwoPi * std::floor(photo.angle / kTwoPi));
@@ -86,7 +86,7 @@ Eigen::Vector3d TurnPosition(const Turn& turn, double share) {
     const double start = std::asin(std::clamp(-turn.middle / turn.reach, -1.0, 1.0));
     angle = turn.middle + turn.reach * std::sin(start + angle);
   }
-  const Turn::Place here = AmongPhotos(turn, angle), home = AmongPhotos(turn, 0.0);
+  const Turn::Place here = MeanOfNearbyPhotos(turn, angle), home = MeanOfNearbyPhotos(turn, 0.0);
   const double near = Nearness(angle, kHomeAround);  // the key view itself is on the way
   const double height = here.height + near * (turn.start.height - home.height);
   const double distance =

@@ -7,12 +7,12 @@
 #include <vector>
 
 #include "core/scene/scene.h"
-#include "core/view/stand.h"
+#include "core/view/scene_placement.h"
 
 namespace color3d {
 
 struct Turn {
-  // A camera seen from the origin of the page's world (stand.h), in radians.
+  // A camera seen from the origin of the page's world (scene_placement.h), in radians.
   struct Place {
     double angle = 0.0;         // around the y axis
     double height = 0.0;        // elevation
@@ -26,8 +26,8 @@ struct Turn {
   std::vector<Place> photos;  // all of them
 };
 
-// `stand`: that of the key view (StandOf).
-Turn TurnOf(const Scene& scene, int key_view, const Stand& stand);
+// `placement`: that of the key view (PlaceScene).
+Turn TurnOf(const Scene& scene, int key_view, const ScenePlacement& placement);
 
 // The camera after this share of the turn, in the page's units. The share wraps; 0 is the key view.
 // The camera looks at the origin.

@@ -38,7 +38,9 @@ Scene SceneOf(const std::vector<double>& degrees) {
   return scene;
 }
 
-Turn TurnOf(const Scene& scene, int key) { return TurnOf(scene, key, StandOf(scene, key, kFocus)); }
+Turn TurnOf(const Scene& scene, int key) {
+  return TurnOf(scene, key, PlaceScene(scene, key, kFocus));
+}
 
 TEST(TurnTest, SurroundingPhotosGiveCircleOthersSway) {
   std::vector<double> ring;
@@ -64,16 +66,16 @@ TEST(TurnTest, PathBeginsAtKeyViewAndStaysNearPhotos) {
   const std::vector<double> arc = {-75, -50, -25, 0};
   for (int key = 0; key < 4; ++key) {
     const Scene scene = SceneOf(arc);
-    const Stand stand = StandOf(scene, key, kFocus);
-    const Turn turn = TurnOf(scene, key, stand);
+    const ScenePlacement placement = PlaceScene(scene, key, kFocus);
+    const Turn turn = TurnOf(scene, key, placement);
     const auto angle = [](const Vector3d& p) { return std::atan2(p.x(), p.z()); };
     double low = 10.0, high = -10.0;
     for (const View& view : scene.views) {
-      const double at = angle(stand.Apply(view.cam_from_world.Center()));
+      const double at = angle(placement.Apply(view.cam_from_world.Center()));
       low = std::min(low, at);
       high = std::max(high, at);
     }
-    const Vector3d home = stand.Apply(scene.views[key].cam_from_world.Center());
+    const Vector3d home = placement.Apply(scene.views[key].cam_from_world.Center());
     EXPECT_LT((TurnPosition(turn, 0.0) - home).norm(), 1e-9);
     for (int i = 0; i <= 100; ++i) {
       const double at = angle(TurnPosition(turn, i / 100.0));
@@ -90,8 +92,8 @@ TEST(TurnTest, PathFollowsHeightOfNearbyPhotos) {
     scene.views.push_back(ViewAt(angle, 4.0, 1.0 + 0.5 * std::cos(angle * kDegree)));
     scene.views.push_back(ViewAt(angle, 0.5, 6.0));  // from above
   }
-  const Stand stand = StandOf(scene, 0, kFocus);
-  const Turn turn = TurnOf(scene, 0, stand);
+  const ScenePlacement placement = PlaceScene(scene, 0, kFocus);
+  const Turn turn = TurnOf(scene, 0, placement);
   ASSERT_TRUE(turn.around);
   const auto height = [](const Vector3d& p) { return std::atan2(p.y(), std::hypot(p.x(), p.z())); };
   EXPECT_NEAR(height(TurnPosition(turn, 0.0)), std::atan2(1.5, 4.0), 0.02);
@@ -108,7 +110,7 @@ TEST(TurnFramesTest, LoopClosesUprightAndCentered) {
     const std::vector<PathCamera> frames =
         TurnFrames(scene, 2, kFocus, FrameShares(kFrames, false, true));
     ASSERT_EQ(frames.size(), static_cast<size_t>(kFrames));
-    const Vector3d level = UpOf(scene.views);  // as far as cameras tell
+    const Vector3d level = UpVector(scene.views);  // as far as cameras tell
     const Vector3d key = scene.views[2].cam_from_world.Center();
     EXPECT_LT((frames[0].cam_from_world.Center() - key).norm(), 1e-9);
     double longest = 0.0, shortest = 1e9;

@@ -20,7 +20,7 @@ bool IsLowHex(std::string_view text) {
       text, [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
 }
 
-bool IsSaneId(std::string_view id) {
+bool IsValidRequestId(std::string_view id) {
   return !id.empty() && id.size() <= 64 && std::ranges::all_of(id, [](unsigned char c) {
     return std::isalnum(c) != 0 || c == '-' || c == '_' || c == '.';
   });
@@ -41,7 +41,7 @@ class CallWatch final : public grpc::experimental::Interceptor {
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
       TakeMetadata(*methods->GetRecvInitialMetadata());
-      TakePeer();
+      RecordPeer();
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       methods->GetSendTrailingMetadata()->insert({"x-request-id", request_id_});
@@ -61,7 +61,7 @@ class CallWatch final : public grpc::experimental::Interceptor {
     trace_ = ParseTraceId(find("traceparent"));
   }
 
-  void TakePeer() {
+  void RecordPeer() {
     if (!peers_.on_begin || method_.starts_with("/grpc.")) return;
     peer_ = info_->server_context()->peer();
     if (!peer_.empty()) peers_.on_begin(peer_);
@@ -152,7 +152,7 @@ std::string ParseTraceId(std::string_view traceparent) {
 }
 
 std::string ChooseRequestId(std::string_view header) {
-  return IsSaneId(header) ? std::string(header) : NewId();
+  return IsValidRequestId(header) ? std::string(header) : NewId();
 }
 
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(

@@ -100,7 +100,7 @@ struct RpcParts {
   std::filesystem::path job_logs;           // folder; empty: no logs
   std::vector<std::string> notify_allowed;  // see CheckNotifyUrl
   std::function<void()> drain;              // asks the program to end
-  std::function<bool()> make_room;          // see WithRoomMade; may be empty
+  std::function<bool()> make_room;          // see RetryAfterMakingRoom; may be empty
 };
 
 // An authorized call: caller, store of the caller's project, trace.

@@ -231,7 +231,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext*
   return AnswerWrite(
       parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
         CheckName(in.name(), "jobs");
-        *out = ToProto(WithRoomMade(parts_.make_room, [&] {
+        *out = ToProto(RetryAfterMakingRoom(parts_.make_room, [&] {
           return call.store.Cancel(in.name(), IdempotencyKey("CancelJob", in));
         }));
         spdlog::info("[job={}] cancellation requested", in.name());
@@ -261,7 +261,7 @@ grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext*
                      response,
                      [this](const Call& call, const auto& in, v1::DeleteJobResponse*) {
                        CheckName(in.name(), "jobs");
-                       WithRoomMade(parts_.make_room, [&] {
+                       RetryAfterMakingRoom(parts_.make_room, [&] {
                          call.store.Delete(in.name(), IdempotencyKey("DeleteJob", in));
                        });
                      });

@@ -121,7 +121,7 @@ grpc::ServerUnaryReactor* SceneServiceImpl::DeleteScene(grpc::CallbackServerCont
                      response,
                      [this](const Call& call, const auto& in, v1::DeleteSceneResponse*) {
                        CheckName(in.name(), "scenes");
-                       WithRoomMade(parts_.make_room, [&] {
+                       RetryAfterMakingRoom(parts_.make_room, [&] {
                          call.store.DeleteScene(in.name(), IdempotencyKey("DeleteScene", in));
                        });
                      });

@@ -46,7 +46,7 @@ class CoreLiveEngine : public LiveEngine {
   };
   Picture Prepare(const Request& request);
   // ab of pictures of any scenes; those of one size share a pass of the encoder.
-  static std::vector<Image> Together(const std::vector<Picture>& group);
+  static std::vector<Image> ColorizeBatch(const std::vector<Picture>& group);
   // Colours, answers and empties the group.
   void Finish(std::vector<Picture>& group);
   void Answer(const Picture& picture, const Image& ab, internal::v1::ColorizeImageResponse* answer);
@@ -160,7 +160,7 @@ void CoreLiveEngine::Answer(const Picture& picture,
   answer->set_image_size_bytes(blob.size_bytes);
 }
 
-std::vector<Image> CoreLiveEngine::Together(const std::vector<Picture>& group) {
+std::vector<Image> CoreLiveEngine::ColorizeBatch(const std::vector<Picture>& group) {
   std::vector<RoutedPicture> routed;
   std::map<std::string, std::shared_ptr<const Colorizer>> colorizers;
   for (const Picture& picture : group) {
@@ -173,7 +173,7 @@ std::vector<Image> CoreLiveEngine::Together(const std::vector<Picture>& group) {
 void CoreLiveEngine::Finish(std::vector<Picture>& group) {
   std::vector<Image> ab(group.size());
   try {
-    ab = Together(group);
+    ab = ColorizeBatch(group);
   } catch (const std::exception&) {
     // One of them is to blame: below each is tried on its own.
   }

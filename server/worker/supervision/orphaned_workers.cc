@@ -51,7 +51,7 @@ std::optional<std::string> OrphanId(pid_t pid, const fs::path& data_folder) {
   return name + "-" + std::to_string(pid);
 }
 
-bool HasEnded(int handle, int wait_ms) {
+bool HasExited(int handle, int wait_ms) {
   pollfd look{handle, POLLIN, 0};
   return ::poll(&look, 1, wait_ms) == 1;
 }
@@ -80,7 +80,7 @@ OrphanedWorkers::OrphanedWorkers(const fs::path& data_folder, std::chrono::milli
   }
   Look();
   for (const Orphan& orphan : orphans_) {
-    if (orphan.killed) HasEnded(orphan.handle, kEndMs);
+    if (orphan.killed) HasExited(orphan.handle, kEndMs);
   }
 }
 
@@ -92,7 +92,7 @@ std::vector<std::string> OrphanedWorkers::Look() {
   std::vector<std::string> gone;
   const bool late = std::chrono::steady_clock::now() >= end_at_;
   for (Orphan& orphan : orphans_) {
-    if (HasEnded(orphan.handle, 0)) {
+    if (HasExited(orphan.handle, 0)) {
       gone.push_back(orphan.id);
       ::close(orphan.handle);
       orphan.handle = -1;

@@ -84,7 +84,7 @@ void Supervisor::StartWorker(Slot* slot) {
   ::posix_spawnattr_setflags(
       &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
   // Neither tokens nor keys of ours: workers decode strangers' files.
-  std::vector<std::string> variables = EnvironmentToHandOn();
+  std::vector<std::string> variables = InheritedEnvironment();
   std::vector<char*> environment;
   for (std::string& variable : variables) environment.push_back(variable.data());
   environment.push_back(nullptr);
@@ -187,7 +187,7 @@ bool Supervisor::IsStoreFull() const {
 }
 
 // One that hangs outside of an attempt has no lease whose end would tell.
-void Supervisor::KillTheSilent() {
+void Supervisor::KillSilentWorkers() {
   const auto now = SteadyClock::now();
   if (now < next_listening_) return;
   next_listening_ = now + std::min<SteadyClock::duration>(kListening, options_.max_silent / 4);
@@ -215,7 +215,7 @@ void Supervisor::KillTheSilent() {
   }
 }
 
-void Supervisor::SeeOrphansOff() {
+void Supervisor::EndOrphans() {
   const auto now = SteadyClock::now();
   if (!options_.orphans || now < next_orphans_) return;
   next_orphans_ = now + kOrphans;
@@ -246,8 +246,8 @@ void Supervisor::Loop() {
   while (true) {
     for (Slot& slot : slots_) CheckWorker(&slot);
     ReapStrangers();
-    SeeOrphansOff();
-    KillTheSilent();
+    EndOrphans();
+    KillSilentWorkers();
     if (draining_.load()) {
       const bool kill = SteadyClock::now() >= kill_at_.load();
       bool running = false;

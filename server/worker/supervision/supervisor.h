@@ -98,8 +98,8 @@ class Supervisor {
   void KillIfFrozen(Slot* slot);
   bool IsStoreHeld() const;
   bool IsStoreFull() const;
-  void KillTheSilent();
-  void SeeOrphansOff();
+  void KillSilentWorkers();
+  void EndOrphans();
   void ReapStrangers();
 
   const SupervisorOptions options_;

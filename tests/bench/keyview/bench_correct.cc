@@ -92,7 +92,7 @@ nlohmann::ordered_json Score(LocalPipeline* pipeline) {
 void Run(const Arguments& args) {
   LocalPipeline pipeline(args.scene_folder, args.out_folder, args.threads, 1, {});
   for (const std::string& name : ListFiles(args.run_folder)) {
-    const Stage* stage = StageThatLeaves(name);
+    const Stage* stage = FindProducer(name);
     if (stage != nullptr && std::string_view(stage->kind) != kind::kSolveChroma) {
       pipeline.Take(name, std::filesystem::path(args.run_folder) / name);
     }

@@ -342,7 +342,7 @@ std::string CmykProfile() {
   return Saved(Profile(cmsCreateInkLimitingDeviceLink(cmsSigCmykData, 300.0)));
 }
 
-Image InSpaceOf(const Image& srgb, const std::string& bytes) {
+Image ConvertToProfile(const Image& srgb, const std::string& bytes) {
   const Profile space(
       cmsOpenProfileFromMem(bytes.data(), static_cast<cmsUInt32Number>(bytes.size())));
   const bool gray = cmsGetColorSpace(space.get()) == cmsSigGrayData;

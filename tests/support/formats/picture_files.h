@@ -46,6 +46,6 @@ std::string GrayGammaProfile(double gamma);
 std::string DotGainProfile(double percent);  // of dots of 50 %
 std::string CmykProfile();
 // The image in the space of `profile`, 1 or 3 channels.
-Image InSpaceOf(const Image& srgb, const std::string& profile);
+Image ConvertToProfile(const Image& srgb, const std::string& profile);
 
 }  // namespace color3d

@@ -127,7 +127,7 @@ void DynamicScene::AddSparsePoints() {
   }
 }
 
-const std::vector<std::optional<Solid>>& DynamicScene::MoversOf(int view) const {
+const std::vector<std::optional<Solid>>& DynamicScene::MovingGaussians(int view) const {
   return movers_[view % times_];
 }
 
@@ -137,7 +137,7 @@ Hit DynamicScene::TraceMovers(int view,
                               double limit) const {
   Hit best, hit;
   best.distance = limit;
-  const auto& movers = MoversOf(view);
+  const auto& movers = MovingGaussians(view);
   for (size_t i = 0; i < movers.size(); ++i) {
     if (!movers[i] || movers[i]->Misses(origin, direction)) continue;
     if (!movers[i]->Intersect(origin, direction, &hit) || hit.distance >= best.distance) continue;
@@ -166,7 +166,7 @@ Image DynamicScene::RenderSrgb(int view_index) const {
           sum += still.color;
           continue;
         }
-        sum += PaintedColor(*MoversOf(view_index)[hit.object],
+        sum += PaintedColor(*MovingGaussians(view_index)[hit.object],
                             hit,
                             center + hit.distance * direction,
                             sample.Footprint(view, direction, hit.distance),
@@ -189,7 +189,7 @@ SeenPoint DynamicScene::Look(int view_index, double x_px, double y_px) const {
   seen.position = center + hit.distance * direction;
   if (hit.object >= 0 && IsMoving(options_.which)) {
     seen.mover = hit.object;
-    seen.on_mover = MoversOf(view_index)[hit.object]->OnMaterial(seen.position);
+    seen.on_mover = MovingGaussians(view_index)[hit.object]->OnMaterial(seen.position);
   }
   return seen;
 }

@@ -70,7 +70,7 @@ class DynamicScene {
 
  private:
   const View& ViewAt(int view) const { return scene_.views.at(static_cast<size_t>(view)); }
-  const std::vector<std::optional<Solid>>& MoversOf(int view) const;
+  const std::vector<std::optional<Solid>>& MovingGaussians(int view) const;
   // Of the things at the view's time the nearest that is nearer than `limit`; object -1: none.
   Hit TraceMovers(int view,
                   const Eigen::Vector3d& origin,

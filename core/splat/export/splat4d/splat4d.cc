@@ -27,7 +27,7 @@ constexpr int kOpacityBound = 1;      // of 255
 // Maximum digits that an offset and a length add to the header.
 constexpr size_t kDigitsOfSpan = 40;
 
-Quantizer OfPositions(const ViewerGaussians& g) {
+Quantizer PositionQuantizer(const ViewerGaussians& g) {
   std::vector<float> sizes = g.log_scale;
   const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
   std::nth_element(sizes.begin(), middle, sizes.end());
@@ -37,7 +37,7 @@ Quantizer OfPositions(const ViewerGaussians& g) {
   return {3, bound, 2.0 * bound, bound};
 }
 
-Quantizer OfWholeNumbers(int channels, int bound) {
+Quantizer IntegerQuantizer(int channels, int bound) {
   return {channels, static_cast<double>(bound), 2.0 * bound + 1.0, 1.0};
 }
 
@@ -56,9 +56,9 @@ class Encoder {
         span_s_(model.motion.end_s - model.motion.begin_s),
         frames_(frames),
         first_mover_(model.size() - model.motion.size()),
-        tracks_{HeldTrack(OfPositions(g_), model.motion.size()),
-                HeldTrack(OfWholeNumbers(4, 0), model.motion.size()),
-                HeldTrack(OfWholeNumbers(1, kOpacityBound), model.motion.size())} {
+        tracks_{HeldTrack(PositionQuantizer(g_), model.motion.size()),
+                HeldTrack(IntegerQuantizer(4, 0), model.motion.size()),
+                HeldTrack(IntegerQuantizer(1, kOpacityBound), model.motion.size())} {
     CheckFinite(g_);
   }
 
@@ -120,7 +120,7 @@ class Encoder {
   }
 
   // Moving Gaussians, in the file's order, whose attribute changes.
-  std::vector<size_t> MoversOf(Attribute attribute) const {
+  std::vector<size_t> MovingGaussians(Attribute attribute) const {
     std::vector<size_t> movers;
     for (const uint32_t i : order_) {
       if ((Changing(i) >> attribute & 1u) != 0) movers.push_back(i - first_mover_);
@@ -197,7 +197,7 @@ class Encoder {
     std::array<std::vector<int32_t>, 3> before;
     std::vector<Stream> keys, deltas;
     for (int a = 0; a < 3; ++a) {
-      movers[a] = MoversOf(attributes[a]);
+      movers[a] = MovingGaussians(attributes[a]);
       keys.push_back({attributes[a], kKey, {}});
       deltas.push_back({attributes[a], kDelta, {}});
     }
@@ -274,7 +274,7 @@ class Encoder {
                        {"alpha", 2 * kOpacityBound + 1},
                        {"rot", 1}};
     for (int a = 0; a < kAttributes; ++a) {
-      header["dyn"][kNames[a]] = MoversOf(static_cast<Attribute>(a)).size();
+      header["dyn"][kNames[a]] = MovingGaussians(static_cast<Attribute>(a)).size();
     }
     header["groups"] = nlohmann::ordered_json::array();
     for (size_t n = 0, begin = 0; n < order_.size(); begin = n) {

@@ -1,4 +1,4 @@
-#include "core/view/stand.h"
+#include "core/view/scene_placement.h"
 
 #include <cmath>
 
@@ -20,7 +20,7 @@ Vector3d AxisOf(const View& view, const Vector3d& in_camera) {
 
 }  // namespace
 
-Vector3d UpOf(const std::vector<View>& views) {
+Vector3d UpVector(const std::vector<View>& views) {
   Vector3d up = Vector3d::Zero(), against_look = Vector3d::Zero();
   Eigen::Matrix3d rights = Eigen::Matrix3d::Zero();
   for (const View& view : views) {
@@ -40,14 +40,14 @@ Vector3d UpOf(const std::vector<View>& views) {
   return level.ldlt().solve(kTiltWeight * up).normalized();
 }
 
-Stand StandOf(const Scene& scene, int key_view, const Vector3d& focus) {
+ScenePlacement PlaceScene(const Scene& scene, int key_view, const Vector3d& focus) {
   const View& key = scene.views.at(key_view);
   const double distance = (focus - key.cam_from_world.Center()).norm();
   if (!(distance > 0.0) || !std::isfinite(distance)) {
     throw InvalidArgument("the key view {} looks at nothing: its focus is where its camera is",
                           key.name);
   }
-  const Vector3d y = UpOf(scene.views);
+  const Vector3d y = UpVector(scene.views);
   // +z towards the key view's camera, level; from straight above: the lower edge of its picture.
   const auto level = [&y](const Vector3d& v) { return Vector3d(v - v.dot(y) * y); };
   Vector3d z = level(-AxisOf(key, Vector3d::UnitZ()));
@@ -59,12 +59,12 @@ Stand StandOf(const Scene& scene, int key_view, const Vector3d& focus) {
   return {Eigen::Quaterniond(rows), focus, kKeyDistance / distance};
 }
 
-StandingCamera CameraOn(const Stand& stand, const View& view) {
-  StandingCamera camera;
-  camera.position = stand.Apply(view.cam_from_world.Center());
+PageCamera PlaceCamera(const ScenePlacement& placement, const View& view) {
+  PageCamera camera;
+  camera.position = placement.Apply(view.cam_from_world.Center());
   const Eigen::Quaterniond flip(0.0, 1.0, 0.0, 0.0);  // y down, z forward -> y up, z back
-  camera.rotation = stand.rotation * view.cam_from_world.rotation.conjugate() * flip;
-  const Vector3d look = stand.rotation * AxisOf(view, Vector3d::UnitZ());
+  camera.rotation = placement.rotation * view.cam_from_world.rotation.conjugate() * flip;
+  const Vector3d look = placement.rotation * AxisOf(view, Vector3d::UnitZ());
   const double ahead = -camera.position.dot(look);
   // Points behind a camera or very close to it are unsuitable as centre.
   const double least = 0.2 * kKeyDistance;

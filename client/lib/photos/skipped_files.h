@@ -1,5 +1,5 @@
 // Files in a user's folder that are no photos of the scene: thumbnails of cameras, servers and
-// viewers, results of this program, pictures in unsupported formats. Counts them, to tell the user.
+// viewers, results of this program, pictures in unsupported formats. Counts them for the user.
 // Reads names, and the contents of HEIC files.
 #pragma once
 
@@ -12,11 +12,11 @@
 namespace color3d::client {
 
 // Files that were skipped, by kind.
-class PassedOver {
+class SkippedFiles {
  public:
   // `kind`: plural noun; after an optional '|', the remedy.
   void Add(const std::string& kind, const std::string& name, size_t count = 1);
-  // Returns one line for each kind, the most frequent first: "HEIC pictures passed over: 10
+  // Returns one line for each kind, the most frequent first: "HEIC pictures skipped: 10
   // (a.heic, b.heic, ...); convert them to JPEG".
   std::vector<std::string> Notes() const;
   // Returns the first three in one line, to append to an error; empty if nothing was skipped.
@@ -33,11 +33,11 @@ class PassedOver {
 };
 
 // Returns pictures that may be photos: supported extensions, without the files listed above. Paths
-// are relative to `folder`, with '/' separators, sorted. `passed_over` may be null. Throws
+// are relative to `folder`, with '/' separators, sorted. `skipped` may be null. Throws
 // Error{kFailedPrecondition} if the folder cannot be read.
 std::vector<std::string> ListPictures(const std::filesystem::path& folder,
                                       bool with_subfolders,
-                                      PassedOver* passed_over);
+                                      SkippedFiles* skipped);
 
 // Returns the first subfolder of `root`, by name, with pictures in supported formats; else empty.
 std::string SubfolderWithPictures(const std::filesystem::path& root);
@@ -46,7 +46,7 @@ std::string SubfolderWithPictures(const std::filesystem::path& root);
 // other than `used`.
 void AddUnusedNeighbors(const std::filesystem::path& root,
                         const std::vector<std::string>& used,
-                        PassedOver* passed_over);
+                        SkippedFiles* skipped);
 
 // Returns true for files that this program writes into the folder of -o: key_view.png and the like,
 // and films and splats beside its own records.

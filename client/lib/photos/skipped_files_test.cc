@@ -1,4 +1,4 @@
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,14 +20,14 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// A HEIC file's first bytes, as exports leave them whose pictures are in a cloud.
+// First bytes of a HEIC file, as left by exports whose pictures are stored in a cloud.
 const std::string kStub = std::string(
                               "\0\0\0\x18"
                               "ftypheic\0\0\0\0mif1heic",
                               24) +
                           std::string(64, '\0');
 
-class PassedOverFilesTest : public ::testing::Test {
+class SkippedFilesTest : public ::testing::Test {
  protected:
   void Write(const std::string& path, const std::string& bytes = "x") {
     fs::create_directories((root() / path).parent_path());
@@ -53,7 +53,7 @@ class PassedOverFilesTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(PassedOverFilesTest, CountsUnsupportedPicturesWithRemedy) {
+TEST_F(SkippedFilesTest, CountsUnsupportedPicturesWithRemedy) {
   for (const char* name : {"a.jpg",
                            "b.jpg",
                            "c.NEF",
@@ -74,9 +74,9 @@ TEST_F(PassedOverFilesTest, CountsUnsupportedPicturesWithRemedy) {
   EXPECT_THAT(Photos(), ElementsAre("a.jpg", "b.jpg"));
   const std::vector<std::string> notes = Notes();
   EXPECT_EQ(notes.size(), 10u);
-  EXPECT_THAT(notes[0],
-              AllOf(HasSubstr("raw files passed over: 4 (c.NEF, d.nef, e.cr3, ...)"),
-                    HasSubstr("darktable")));
+  EXPECT_THAT(
+      notes[0],
+      AllOf(HasSubstr("raw files skipped: 4 (c.NEF, d.nef, e.cr3, ...)"), HasSubstr("darktable")));
   for (const char* kind : {"files of paint programs",
                            "DPX",
                            "GIF",
@@ -90,7 +90,7 @@ TEST_F(PassedOverFilesTest, CountsUnsupportedPicturesWithRemedy) {
   }
 }
 
-TEST_F(PassedOverFilesTest, ReportsHeicStubsAndKeepsOthers) {
+TEST_F(SkippedFilesTest, ReportsHeicStubsAndKeepsOthers) {
   Write("a.jpg"), Write("b.jpg"), Write("c.HEIC", kStub), Write("d.heic", kStub);
   EXPECT_THAT(Photos(), ElementsAre("a.jpg", "b.jpg"));
   EXPECT_THAT(
@@ -104,7 +104,7 @@ TEST_F(PassedOverFilesTest, ReportsHeicStubsAndKeepsOthers) {
                     HasSubstr("heif-convert")));
 }
 
-TEST_F(PassedOverFilesTest, TakesHeicWebpAndBmpWithoutCopies) {
+TEST_F(SkippedFilesTest, TakesHeicWebpAndBmpWithoutCopies) {
   const std::string heic = HeicFile(Image(64, 64, 3, 0.5f));
   const bool reads_heic = !heic.empty();
   Write("a.jpg"), Write("b.bmp"), Write("c.webp"), Write("e.png");
@@ -118,11 +118,11 @@ TEST_F(PassedOverFilesTest, TakesHeicWebpAndBmpWithoutCopies) {
   EXPECT_EQ(Photos().size(), reads_heic ? 5u : 4u);
   EXPECT_THAT(Notes(),
               ElementsAre(HasSubstr("pictures beside another of the same name "
-                                    "passed over: " +
+                                    "skipped: " +
                                     std::string(reads_heic ? "3" : "2"))));
 }
 
-TEST_F(PassedOverFilesTest, SkipsThumbnailsOfOtherPrograms) {
+TEST_F(SkippedFilesTest, SkipsThumbnailsOfOtherPrograms) {
   for (const char* name : {"images/a.jpg",
                            "images/left/b.jpg",
                            "images/@eaDir/a.jpg/SYNOPHOTO_THUMB_XL.jpg",
@@ -140,11 +140,11 @@ TEST_F(PassedOverFilesTest, SkipsThumbnailsOfOtherPrograms) {
   EXPECT_THAT(Photos(), ElementsAre("images/a.jpg", "images/left/b.jpg"));
   EXPECT_THAT(Notes(),
               ElementsAre(HasSubstr("folders that programs keep for thumbnails and the "
-                                    "like passed over: 7 ("),
-                          HasSubstr("hidden pictures passed over: 1 (._a.jpg)")));
+                                    "like skipped: 7 ("),
+                          HasSubstr("hidden pictures skipped: 1 (._a.jpg)")));
 }
 
-TEST_F(PassedOverFilesTest, FollowsOrReportsLinks) {
+TEST_F(SkippedFilesTest, FollowsOrReportsLinks) {
   Write("images/a.jpg"), Write("images/b.jpg"), Write("elsewhere/c.jpg");
   fs::create_symlink(root() / "elsewhere/c.jpg", root() / "images/c.jpg");
   fs::create_symlink(root() / "gone.jpg", root() / "images/d.jpg");
@@ -153,11 +153,11 @@ TEST_F(PassedOverFilesTest, FollowsOrReportsLinks) {
   fs::create_directory_symlink(root(), root() / "images/loop");
   EXPECT_THAT(Photos(), ElementsAre("images/a.jpg", "images/b.jpg", "images/c.jpg"));
   EXPECT_THAT(Notes(),
-              ElementsAre(HasSubstr("links that lead nowhere passed over: 2 (d.jpg, e.jpg)"),
-                          HasSubstr("links to folders passed over: 2 (loop, more)")));
+              ElementsAre(HasSubstr("links that lead nowhere skipped: 2 (d.jpg, e.jpg)"),
+                          HasSubstr("links to folders skipped: 2 (loop, more)")));
 }
 
-TEST_F(PassedOverFilesTest, SkipsResults) {
+TEST_F(SkippedFilesTest, SkipsResults) {
   for (const char* name : {"a.jpg",
                            "b.jpg",
                            "key_view.png",
@@ -170,8 +170,8 @@ TEST_F(PassedOverFilesTest, SkipsResults) {
   }
   EXPECT_THAT(Photos(), ElementsAre("a.jpg", "b.jpg"));
   EXPECT_THAT(Notes(),
-              Contains(AllOf(HasSubstr("results of color3d passed over: 4"), HasSubstr("-o"))));
-  // Below images/ the folders of results, but not other folders of their names.
+              Contains(AllOf(HasSubstr("results of color3d skipped: 4"), HasSubstr("-o"))));
+  // Below images/, skips folders of results, but no other folders of their names.
   for (const char* name : {"images/a.jpg",
                            "images/b.jpg",
                            "images/metrics.json",
@@ -183,7 +183,7 @@ TEST_F(PassedOverFilesTest, SkipsResults) {
   EXPECT_THAT(Photos(), ElementsAre("images/a.jpg", "images/b.jpg", "images/left/frames/c.jpg"));
 }
 
-TEST_F(PassedOverFilesTest, SkipsOwnFilmsAndSplats) {
+TEST_F(SkippedFilesTest, SkipsOwnFilmsAndSplats) {
   for (const char* name : {"walk.mov",
                            "film.mp4",
                            "scene.mp4",
@@ -191,19 +191,19 @@ TEST_F(PassedOverFilesTest, SkipsOwnFilmsAndSplats) {
                            "scene.sog",
                            "metrics.json",
                            "report.html"}) {
-    Write(name, name);  // films of equal bytes would be copies
+    Write(name, name);  // equal films would be copies
   }
   const PhotoFolder folder = CollectPhotos(root());
   EXPECT_FALSE(folder.splat.has_value());
   EXPECT_TRUE(folder.camera_films.empty());
   ASSERT_TRUE(folder.film.has_value());
   EXPECT_EQ(folder.film->path, "walk.mov");
-  // Without a record of ours they are the user's.
+  // Without a record of results they are films of the user.
   fs::remove(root() / "metrics.json"), fs::remove(root() / "report.html");
   EXPECT_EQ(CollectPhotos(root()).camera_films.size(), 3u);
 }
 
-TEST_F(PassedOverFilesTest, ReportsUnusedNeighbors) {
+TEST_F(SkippedFilesTest, ReportsUnusedNeighbors) {
   for (const char* name : {"a.jpg",
                            "b.jpg",
                            "a.mov",
@@ -217,11 +217,11 @@ TEST_F(PassedOverFilesTest, ReportsUnusedNeighbors) {
     Write(name);
   }
   EXPECT_THAT(Notes(),
-              ElementsAre(HasSubstr("pictures in subfolders passed over: 2 (more/)"),
-                          HasSubstr("films passed over: 1 (walk.mp4)")));
+              ElementsAre(HasSubstr("pictures in subfolders skipped: 2 (more/)"),
+                          HasSubstr("films skipped: 1 (walk.mp4)")));
 }
 
-TEST_F(PassedOverFilesTest, SkipsThumbnailsOfMasksAndAugmentations) {
+TEST_F(SkippedFilesTest, SkipsThumbnailsOfMasksAndAugmentations) {
   const std::string mask = EncodePng8(Image(4, 4, 1, 1.0f));
   Write("a.png", mask), Write("b.png", mask);
   Write("augment/x.png"), Write("augment/@eaDir/x.png"), Write("augment/Thumbs.db");
@@ -232,7 +232,7 @@ TEST_F(PassedOverFilesTest, SkipsThumbnailsOfMasksAndAugmentations) {
   EXPECT_EQ(folder.mask_files.size(), 1u);
 }
 
-TEST_F(PassedOverFilesTest, SkipsThumbnailsOfFrames) {
+TEST_F(SkippedFilesTest, SkipsThumbnailsOfFrames) {
   for (const char* camera : {"left", "right", "@eaDir", "lost+found"}) {
     for (const char* name : {"1.png", "2.png"}) Write(std::string(camera) + "/" + name);
   }

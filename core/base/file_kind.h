@@ -2,8 +2,9 @@
 #pragma once
 
 #include <filesystem>
+#include <system_error>
 
-namespace color3d::client {
+namespace color3d {
 
 inline bool IsFile(const std::filesystem::path& path) {
   std::error_code none;
@@ -14,4 +15,4 @@ inline bool IsFolder(const std::filesystem::path& path) {
   return std::filesystem::is_directory(path, none);
 }
 
-}  // namespace color3d::client
+}  // namespace color3d

@@ -1,4 +1,4 @@
-#include "core/view/stand.h"
+#include "core/view/scene_placement.h"
 
 #include <gtest/gtest.h>
 
@@ -37,44 +37,44 @@ TEST(UpTest, CamerasLookingDownFromOneSideAreLevel) {
     views.push_back(Looking(3.0 * around + 3.0 * up, Vector3d::Zero(), up));
   }
   // Their mean leans by 40 degrees; level horizons tell the truth.
-  EXPECT_GT(UpOf(views).dot(up), std::cos(12.0 * M_PI / 180));
+  EXPECT_GT(UpVector(views).dot(up), std::cos(12.0 * M_PI / 180));
 }
 
 TEST(UpTest, AveragesRollAndAcceptsOverheadViews) {
   const Vector3d up = -Vector3d::UnitY();
   const std::vector<View> rolled = {Looking({0, 0, -2}, Vector3d::Zero(), up, 0.2),
                                     Looking({0.1, 0, -2}, Vector3d::Zero(), up, -0.2)};
-  EXPECT_GT(UpOf(rolled).dot(up), 0.998);
+  EXPECT_GT(UpVector(rolled).dot(up), 0.998);
   std::vector<View> overhead;
   for (int i = 0; i < 4; ++i) {
     overhead.push_back(Looking({0.1, 0.1, 5.0}, {0.1, 0.1, 0.0}, Vector3d::UnitX(), i * M_PI / 2));
   }
-  EXPECT_GT(UpOf(overhead).dot(Vector3d::UnitZ()), 0.999);
-  EXPECT_EQ(UpOf({}), -Vector3d::UnitY());
+  EXPECT_GT(UpVector(overhead).dot(Vector3d::UnitZ()), 0.999);
+  EXPECT_EQ(UpVector({}), -Vector3d::UnitY());
 }
 
 TEST(StandTest, KeyViewIsInFrontWithSamePicture) {
   Scene scene;
   const Vector3d up = Vector3d(0.1, -1.0, 0.2).normalized(), focus(1.0, 2.0, 3.0);
   scene.views = {Looking({5, 1, 0}, focus, up), Looking({4, 1, -4}, focus, up)};
-  const Stand stand = StandOf(scene, 1, focus);
-  EXPECT_LT(stand.Apply(focus).norm(), 1e-12);
-  const StandingCamera key = CameraOn(stand, scene.views[1]);
+  const ScenePlacement placement = PlaceScene(scene, 1, focus);
+  EXPECT_LT(placement.Apply(focus).norm(), 1e-12);
+  const PageCamera key = PlaceCamera(placement, scene.views[1]);
   EXPECT_NEAR(key.position.norm(), 2.0, 1e-12);
   EXPECT_NEAR(key.position.x(), 0.0, 1e-9);
   EXPECT_GT(key.position.z(), 0.0);
   EXPECT_LT(key.target.norm(), 1e-9);
-  EXPECT_GT((stand.rotation * up).y(), 0.999);
+  EXPECT_GT((placement.rotation * up).y(), 0.999);
   // A point has the same place before the camera in both worlds, but for the size and the axes.
   const Vector3d point(1.5, 2.5, 2.0);
   for (const View& view : scene.views) {
-    const StandingCamera camera = CameraOn(stand, view);
+    const PageCamera camera = PlaceCamera(placement, view);
     const Vector3d there =
-        camera.rotation.conjugate() * (stand.Apply(point) - camera.position) / stand.scale;
+        camera.rotation.conjugate() * (placement.Apply(point) - camera.position) / placement.scale;
     const Vector3d here = view.cam_from_world.Apply(point);
     EXPECT_LT((Vector3d(here.x(), -here.y(), -here.z()) - there).norm(), 1e-9);
   }
-  EXPECT_THROW(StandOf(scene, 1, scene.views[1].cam_from_world.Center()), Error);
+  EXPECT_THROW(PlaceScene(scene, 1, scene.views[1].cam_from_world.Center()), Error);
 }
 
 TEST(StandTest, OverheadCameraHasUprightPicture) {
@@ -83,12 +83,13 @@ TEST(StandTest, OverheadCameraHasUprightPicture) {
                  Looking({0, 0, -3}, Vector3d::Zero(), -Vector3d::UnitY()),
                  Looking({3, 0, 0}, Vector3d::Zero(), -Vector3d::UnitY()),
                  Looking({-3, 0, 0}, Vector3d::Zero(), -Vector3d::UnitY())};
-  const Stand stand = StandOf(scene, 0, Vector3d::Zero());
-  EXPECT_NEAR(std::abs(stand.rotation.toRotationMatrix().determinant()), 1.0, 1e-12);
-  EXPECT_GT(CameraOn(stand, scene.views[0]).position.y(), 1.8);
+  const ScenePlacement placement = PlaceScene(scene, 0, Vector3d::Zero());
+  EXPECT_NEAR(std::abs(placement.rotation.toRotationMatrix().determinant()), 1.0, 1e-12);
+  EXPECT_GT(PlaceCamera(placement, scene.views[0]).position.y(), 1.8);
   // What is behind a camera is nothing to turn around.
   View away = Looking({0, 0, -3}, {0, 0, -9}, -Vector3d::UnitY());
-  EXPECT_GT((CameraOn(stand, away).target - CameraOn(stand, away).position).norm(), 1.0);
+  EXPECT_GT((PlaceCamera(placement, away).target - PlaceCamera(placement, away).position).norm(),
+            1.0);
 }
 
 }  // namespace

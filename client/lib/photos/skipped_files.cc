@@ -1,6 +1,6 @@
-#include "client/lib/photos/passed_over_files.h"
+#include "client/lib/photos/skipped_files.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/base/text/lower_case.h"
 #include "core/catalogue/artifacts.h"
@@ -87,8 +88,8 @@ constexpr const char* kResultRecords[] = {artifact::kKeyView,
                                           artifact::kImportFacts,
                                           artifact::kReport};
 template <typename List>
-bool Holds(const List& list, std::string_view text) {
-  return std::find(std::begin(list), std::end(list), text) != std::end(list);
+bool Contains(const List& list, std::string_view text) {
+  return std::ranges::find(list, text) != std::end(list);
 }
 
 std::string EndingOf(std::string_view name) {
@@ -117,10 +118,8 @@ bool IsCopyFormat(std::string_view name) {
 }
 
 bool HasResultRecord(const fs::path& folder) {
-  std::error_code none;
-  return std::any_of(std::begin(kResultRecords), std::end(kResultRecords), [&](const char* name) {
-    return fs::is_regular_file(folder / name, none);
-  });
+  return std::ranges::any_of(kResultRecords,
+                             [&](const char* name) { return IsFile(folder / name); });
 }
 
 // Counts files in `folder` itself, by names only; 0 if it cannot be read.
@@ -134,7 +133,7 @@ size_t CountPictures(const fs::path& folder) {
   return count;
 }
 
-bool HoldsPictures(const fs::path& folder) {
+bool ContainsPictures(const fs::path& folder) {
   std::error_code error;
   constexpr auto kOptions = fs::directory_options::skip_permission_denied;
   fs::recursive_directory_iterator entries(folder, kOptions, error);
@@ -146,18 +145,18 @@ bool HoldsPictures(const fs::path& folder) {
 
 class Lister {
  public:
-  Lister(fs::path root, bool with_subfolders, PassedOver* passed_over)
-      : root_(std::move(root)), with_subfolders_(with_subfolders), passed_over_(passed_over) {}
+  Lister(fs::path root, bool with_subfolders, SkippedFiles* skipped)
+      : root_(std::move(root)), with_subfolders_(with_subfolders), skipped_(skipped) {}
 
   std::vector<std::string> List() {
     ListFolder("");
-    std::sort(found_.begin(), found_.end());
+    std::ranges::sort(found_);
     return std::move(found_);
   }
 
  private:
-  void PassOver(const std::string& kind, const std::string& path) {
-    if (passed_over_ != nullptr) passed_over_->Add(kind, path);
+  void Skip(const std::string& kind, const std::string& path) {
+    if (skipped_ != nullptr) skipped_->Add(kind, path);
   }
 
   // `below`: empty, or the folder's path below the root with a trailing '/'.
@@ -176,53 +175,53 @@ class Lister {
       const std::string name = entry.path().filename().string();
       std::error_code none;
       if (entry.is_directory(none)) {
-        LookAtFolder(entry, below + name, name, has_results);
-      } else if (LookAtFile(entry, below + name, name)) {
+        VisitFolder(entry, below + name, name, has_results);
+      } else if (VisitFile(entry, below + name, name)) {
         pictures.push_back(name);
       }
     }
     AddWithoutCopies(below, std::move(pictures));
   }
 
-  void LookAtFolder(const fs::directory_entry& entry,
-                    const std::string& path,
-                    const std::string& name,
-                    bool beside_results) {
+  void VisitFolder(const fs::directory_entry& entry,
+                   const std::string& path,
+                   const std::string& name,
+                   bool beside_results) {
     if (!with_subfolders_) return;
     if (IsSystemFolder(name)) {
-      if (!HoldsPictures(entry.path())) return;
-      PassOver("folders that programs keep for thumbnails and the like", path);
+      if (!ContainsPictures(entry.path())) return;
+      Skip("folders that programs keep for thumbnails and the like", path);
       return;
     }
     if (name.starts_with('.')) return;
     std::error_code none;
     if (entry.is_symlink(none)) {
-      PassOver("links to folders|put the photographs themselves there", path);
+      Skip("links to folders|put the photographs themselves there", path);
     } else if (beside_results && FindArtifact(name + "/") != nullptr) {
-      PassOver("folders of results", path);
+      Skip("folders of results", path);
     } else {
       ListFolder(path + "/");
     }
   }
 
   // Returns true for files that may be photos.
-  bool LookAtFile(const fs::directory_entry& entry,
-                  const std::string& path,
-                  const std::string& name) {
+  bool VisitFile(const fs::directory_entry& entry,
+                 const std::string& path,
+                 const std::string& name) {
     std::error_code none;
     const bool readable = HasImageExtension(name);
     const Kind* kind = KindOf(name);
     if (!readable && kind == nullptr) return false;
     if (IsSystemFile(name)) {
-      PassOver("hidden pictures", path);
+      Skip("hidden pictures", path);
     } else if (entry.is_symlink(none) && !fs::exists(entry.status(none))) {
-      PassOver("links that lead nowhere|put the pictures themselves there", path);
+      Skip("links that lead nowhere|put the pictures themselves there", path);
     } else if (!entry.is_regular_file(none)) {
       return false;
     } else if (IsResultFile(entry.path())) {
-      PassOver("results of color3d|name another folder with -o to keep them apart", path);
+      Skip("results of color3d|name another folder with -o to keep them apart", path);
     } else if (!readable) {
-      PassOver(std::string(kind->name) + "|" + kind->remedy, path);
+      Skip(std::string(kind->name) + "|" + kind->remedy, path);
     } else if (IsHeic(name)) {
       return IsGoodHeic(entry.path(), path);
     } else {
@@ -237,22 +236,22 @@ class Lister {
       ProbeImage(ReadFile(file), path);
       return true;
     } catch (const Error& e) {
-      PassOver(fmt::format("HEIC pictures that cannot be read|{} ({})", kKinds[0].remedy, e.what()),
-               path);
+      Skip(fmt::format("HEIC pictures that cannot be read|{} ({})", kKinds[0].remedy, e.what()),
+           path);
       return false;
     }
   }
 
   // Keeps "a.jpg" of "a.heic" and "a.jpg", and one of "a.heic" and "a.webp".
   void AddWithoutCopies(const std::string& below, std::vector<std::string> pictures) {
-    std::sort(pictures.begin(), pictures.end());
+    std::ranges::sort(pictures);
     std::set<std::string> stems;
     for (const std::string& name : pictures) {
       if (!IsCopyFormat(name)) stems.insert(LowerCase(fs::path(name).stem().string()));
     }
     for (const std::string& name : pictures) {
       if (IsCopyFormat(name) && !stems.insert(LowerCase(fs::path(name).stem().string())).second) {
-        PassOver("pictures beside another of the same name", below + name);
+        Skip("pictures beside another of the same name", below + name);
       } else {
         found_.push_back(below + name);
       }
@@ -261,47 +260,44 @@ class Lister {
 
   const fs::path root_;
   const bool with_subfolders_;
-  PassedOver* const passed_over_;
+  SkippedFiles* const skipped_;
   std::vector<std::string> found_;
 };
 
 }  // namespace
 
-void PassedOver::Add(const std::string& kind, const std::string& name, size_t count) {
+void SkippedFiles::Add(const std::string& kind, const std::string& name, size_t count) {
   const size_t bar = kind.find('|');
   Files& files = kinds_[kind.substr(0, bar)];
   // If remedies differ by file, gives that of the first one.
   if (files.count == 0 && bar != std::string::npos) files.remedy = kind.substr(bar + 1);
   files.count += count;
   files.first.push_back(name);
-  std::sort(files.first.begin(), files.first.end());
+  std::ranges::sort(files.first);
   if (files.first.size() <= kShownNames) return;
   files.first.pop_back();
   files.has_more_names = true;
 }
 
-std::vector<std::string> PassedOver::Notes() const {
+std::vector<std::string> SkippedFiles::Notes() const {
   std::vector<std::pair<size_t, std::string>> lines;
   for (const auto& [kind, files] : kinds_) {
-    std::string names;
-    for (const std::string& name : files.first) names += (names.empty() ? "" : ", ") + name;
     lines.push_back({files.count,
-                     fmt::format("{} passed over: {} ({}{}){}{}",
+                     fmt::format("{} skipped: {} ({}{}){}{}",
                                  kind,
                                  files.count,
-                                 names,
+                                 fmt::join(files.first, ", "),
                                  files.has_more_names ? ", ..." : "",
                                  files.remedy.empty() ? "" : "; ",
                                  files.remedy)});
   }
-  std::stable_sort(
-      lines.begin(), lines.end(), [](const auto& x, const auto& y) { return x.first > y.first; });
+  std::ranges::stable_sort(lines, std::ranges::greater(), &std::pair<size_t, std::string>::first);
   std::vector<std::string> notes;
   for (auto& [count, line] : lines) notes.push_back(std::move(line));
   return notes;
 }
 
-std::string PassedOver::Clause() const {
+std::string SkippedFiles::Clause() const {
   constexpr size_t kShownKinds = 3;
   const std::vector<std::string> notes = Notes();
   std::string clause;
@@ -322,7 +318,7 @@ std::string SubfolderWithPictures(const fs::path& root) {
 
 void AddUnusedNeighbors(const fs::path& root,
                         const std::vector<std::string>& used,
-                        PassedOver* passed_over) {
+                        SkippedFiles* skipped) {
   constexpr std::string_view kOurs[] = {"augment", "masks", "sparse"};
   const std::vector<std::string> photos = ListPictures(root, /*with_subfolders=*/false, nullptr);
   std::set<std::string> stems;
@@ -335,23 +331,22 @@ void AddUnusedNeighbors(const fs::path& root,
       if (IsResultFile(entry.path())) continue;
       // A companion file that a phone stores beside the photo of the same name.
       if (stems.contains(LowerCase(fs::path(name).stem().string()))) continue;
-      passed_over->Add("films|give the film itself to colour it", name);
-    } else if (entry.is_directory(none) && !IsSystemFolder(name) && !Holds(kOurs, name) &&
-               !Holds(used, name) && !HasResultRecord(entry.path())) {
+      skipped->Add("films|give the film itself to colour it", name);
+    } else if (entry.is_directory(none) && !IsSystemFolder(name) && !Contains(kOurs, name) &&
+               !Contains(used, name) && !HasResultRecord(entry.path())) {
       const size_t count = CountPictures(entry.path());
       if (count == 0) continue;
-      passed_over->Add(
-          "pictures in subfolders|put all photographs into one folder, or below images/",
-          name + "/",
-          count);
+      skipped->Add("pictures in subfolders|put all photographs into one folder, or below images/",
+                   name + "/",
+                   count);
     }
   }
 }
 
 std::vector<std::string> ListPictures(const fs::path& folder,
                                       bool with_subfolders,
-                                      PassedOver* passed_over) {
-  return Lister(folder, with_subfolders, passed_over).List();
+                                      SkippedFiles* skipped) {
+  return Lister(folder, with_subfolders, skipped).List();
 }
 
 bool IsResultFile(const fs::path& file) {
@@ -363,14 +358,14 @@ bool IsResultFile(const fs::path& file) {
 
 bool IsSystemFolder(std::string_view name) {
   const std::string lowered = LowerCase(name);
-  return Holds(kSystemFolders, lowered) || lowered == ".thumbnails" || lowered == ".thumbs" ||
+  return Contains(kSystemFolders, lowered) || lowered == ".thumbnails" || lowered == ".thumbs" ||
          lowered == ".appledouble" || lowered == ".picasaoriginals" || lowered == ".trash" ||
          lowered.starts_with(".trash-") || lowered.ends_with(".lrdata") ||
          lowered.ends_with(".photoslibrary");
 }
 
 bool IsSystemFile(std::string_view name) {
-  return name.starts_with('.') || Holds(kSystemFiles, LowerCase(name));
+  return name.starts_with('.') || Contains(kSystemFiles, LowerCase(name));
 }
 
 bool IsSystemPath(std::string_view path) {

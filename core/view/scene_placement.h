@@ -11,7 +11,7 @@
 namespace color3d {
 
 // page = scale * (rotation * (scene - center)).
-struct Stand {
+struct ScenePlacement {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double scale = 1.0;
@@ -24,19 +24,19 @@ struct Stand {
 // Unit up vector estimated from the cameras: the mean of their up vectors, levelled with their
 // horizons. If those cancel out (all cameras look straight down), opposite to the viewing
 // direction. -y without views.
-Eigen::Vector3d UpOf(const std::vector<View>& views);
+Eigen::Vector3d UpVector(const std::vector<View>& views);
 
 // `focus`: the point that the key view looks at, in the scene's units. Throws
 // Error{kInvalidArgument} if it is the camera's centre.
-Stand StandOf(const Scene& scene, int key_view, const Eigen::Vector3d& focus);
+ScenePlacement PlaceScene(const Scene& scene, int key_view, const Eigen::Vector3d& focus);
 
 // A view's camera in the page's world, axes as in OpenGL: x right, y up, looking along -z.
-struct StandingCamera {
+struct PageCamera {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // from the camera to the page
   // The centre of orbit: on the camera's axis, at the distance of the focus.
   Eigen::Vector3d target = Eigen::Vector3d::Zero();
 };
-StandingCamera CameraOn(const Stand& stand, const View& view);
+PageCamera PlaceCamera(const ScenePlacement& placement, const View& view);
 
 }  // namespace color3d
