@@ -307,13 +307,12 @@ Image SweepPlanes(const PosedLuminance& reference,
                   const CancellationToken& cancel) {
   options.Validate();
   if (sources.empty() || static_cast<int>(sources.size()) > kMaxSweepSources) {
-    throw InvalidArgument("plane sweep compares a view with 1 to {} others, not {}",
-                          kMaxSweepSources,
-                          sources.size());
+    throw InvalidArgument(
+        "the plane sweep takes 1 to {} sources, but got {}", kMaxSweepSources, sources.size());
   }
   if (!(nearest > 0.0 && farthest > nearest && std::isfinite(farthest))) {
     throw InvalidArgument(
-        "plane sweep between depths {} and {}: nothing lies between them", nearest, farthest);
+        "the depth range {} to {} of the plane sweep is empty", nearest, farthest);
   }
   const auto depth_of = [&](double plane) {
     const double t = plane / (options.planes - 1.0);

@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "core/carry/fusion.h"
+#include "core/carry/view_color.h"
 #include "core/film/film_carry.h"
 #include "core/film/steady_colors.h"
 #include "core/stage/context/stage_context.h"
