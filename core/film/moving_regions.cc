@@ -261,9 +261,9 @@ PairResidual CompareFrames(const Image& from, const Image& to) {
   return Compare(from, DenseFlow(from, to), DenseFlow(to, from));
 }
 
-ShotMotion MotionOfCamera(const ShotFrames& frames,
-                          ThreadPool& pool,
-                          const CancellationToken& cancel) {
+ShotMotion MeasureCameraMotion(const ShotFrames& frames,
+                               ThreadPool& pool,
+                               const CancellationToken& cancel) {
   const std::vector<std::pair<int, int>> pairs = SpreadPairs(frames.count);
   std::vector<double> shift(pairs.size(), -1.0);
   pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
@@ -286,7 +286,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
                              const CancellationToken& cancel,
                              const std::function<void(int frame, const Image& moving)>& on_frame) {
   constexpr int kAtOnce = 16;  // frames; bounds memory
-  ShotMotion motion = MotionOfCamera(frames, pool, cancel);
+  ShotMotion motion = MeasureCameraMotion(frames, pool, cancel);
   Mutex adding, handing_over;
   std::vector<Votes> votes(frames.count);
   std::vector<double> share(frames.count, 0.0);
@@ -327,7 +327,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
   return motion;
 }
 
-double FootRow(const Image& moving) {
+double LowestMovingRow(const Image& moving) {
   constexpr double kMinShare = 0.003;
   cv::Mat is_moving(moving.height, moving.width, CV_8U);
   std::transform(moving.data.begin(), moving.data.end(), is_moving.begin<uint8_t>(), [](float v) {

@@ -66,7 +66,7 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     const CarriedColor carried =
         ReadCarried(context, scene.views[index], luminance->width, luminance->height);
     ThreadPool one(1);
-    done.Add(number, ColorOfView(*luminance, carried, sources(number), one, context.cancel()));
+    done.Add(number, FuseViewColor(*luminance, carried, sources(number), one, context.cancel()));
   });
 }
 

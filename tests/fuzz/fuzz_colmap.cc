@@ -47,7 +47,7 @@ int ReadTimes(const fs::path& file, std::string_view text) {
   return ReadOrRefuse([&] {
     std::vector<FrameTime> times;
     for (const auto& [name, time] : LoadColmapTimes(file)) times.push_back(time);
-    for (const std::optional<Moment>& moment : MomentsOf(times).moments) {
+    for (const std::optional<Moment>& moment : AssignMoments(times).moments) {
       if (moment && !std::isfinite(moment->time_s)) std::abort();
     }
   });

@@ -122,7 +122,7 @@ FusedColor ColorBetweenAnchors(const Image& luminance,
     return InferBetweenAnchors(of_anchors, carried_surely, l, sources);
   };
   ThreadPool one(1);
-  FusedColor fused = ColorOfView(luminance, carried, with_anchors, one, cancel);
+  FusedColor fused = FuseViewColor(luminance, carried, with_anchors, one, cancel);
   // Guessed colours of an anchor count as guessed here, too.
   for (size_t i = 0; i < fused.provenance.PlaneSize(); ++i) {
     if (of_anchors.confidence.data[i] <= kDecisiveConfidence) continue;

@@ -281,7 +281,7 @@ class ShotColorer {
       return ColorBetweenAnchors(*luminance, carried, *of_anchors, sources, context_.cancel());
     }
     ThreadPool one(1);
-    return ColorOfView(*luminance, carried, sources, one, context_.cancel());
+    return FuseViewColor(*luminance, carried, sources, one, context_.cancel());
   }
 
   const ShotToColor& shot_;

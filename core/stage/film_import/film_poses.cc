@@ -76,7 +76,7 @@ Scene ReliefScene(const Scene& film, const std::vector<int>& shot, const MovingR
   for (const int frame : shot) {
     scene.views.push_back(film.views[frame]);
     const std::string file = files.MovingFile(frame).string();
-    const double foot = FootRow(DecodeImage(ReadFile(file), file));
+    const double foot = LowestMovingRow(DecodeImage(ReadFile(file), file));
     if (foot >= 0.0) feet.push_back(foot);
   }
   scene.relief = FitRelief(std::move(feet));

@@ -135,7 +135,7 @@ TEST_F(FilmPosesTest, MakesReliefOfStandingCamera) {
   }
   for (int i = 0; i < kFrames; ++i) {
     const Image moving = ReadImage(scratch_.path() / "out/moving" / Name(i));
-    const double foot = FootRow(moving);
+    const double foot = LowestMovingRow(moving);
     EXPECT_GT(foot, scene.relief->foot) << "the board stands in front of the backdrop";
   }
 }

@@ -119,7 +119,7 @@ bool IsInside(double time_s, const FilmOptions& options, double margin_s) {
 
 // Sets the times of frames that repeat the time of the one before them to kNoTime.
 void DropRepeatedFrames(std::vector<Footage>* all) {
-  // Relative to the time from first to last; MomentsOf treats smaller distances as one time.
+  // Relative to the time from first to last; AssignMoments treats smaller distances as one time.
   constexpr double kApart = 2e-6;
   double first_s = std::numeric_limits<double>::infinity(), last_s = 0.0;
   for (const Footage& footage : *all) {
@@ -151,7 +151,7 @@ bool AlignTimes(const FilmOptions& options, std::vector<Footage>* all, StageCont
       times.push_back(&time_s);
     }
   }
-  const FrameMoments moments = MomentsOf(frames);
+  const FrameMoments moments = AssignMoments(frames);
   if (moments.cameras.empty()) return true;  // no frames, or all at one time
   if (!moments.note.empty()) context.Warn(moments.note);
   double begin_s = std::numeric_limits<double>::infinity();

@@ -150,7 +150,7 @@ class CameraFilmsImport {
       times.push_back(times_.at(view.name));
       ++frames[times.back().camera];
     }
-    FrameMoments moments = MomentsOf(times);
+    FrameMoments moments = AssignMoments(times);
     for (size_t i = 0; i < times.size(); ++i) result->scene.views[i].moment = moments.moments[i];
     result->cameras = std::move(moments.cameras);
     if (!moments.note.empty()) result->warnings.push_back(std::move(moments.note));

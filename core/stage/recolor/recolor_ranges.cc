@@ -246,7 +246,7 @@ class RangeColorer {
                                {},
                                film_.colorizer.relative_chroma()};
     ThreadPool one(1);
-    FusedColor color = ColorOfView(luminance, known, sources, one, film_.context.cancel());
+    FusedColor color = FuseViewColor(luminance, known, sources, one, film_.context.cancel());
     SetProvenance(recolored, is_old, &color.provenance);
     if (const FilmKey* key = KeyAt(frame)) {
       std::copy_n(key->color.ab.data.begin(), color.ab.data.size(), color.ab.data.begin());

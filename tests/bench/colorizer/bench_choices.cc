@@ -220,7 +220,7 @@ class ChoiceBench {
           ReadCarried(context, scene_.views[view], luminance.width, luminance.height);
       point->alone += ChromaError(truth, JoinLab(luminance, colorizer.Colorize(luminance)));
       const FusedColor fused =
-          ColorOfView(luminance, carried, SourcesOf(colorizer), pool_, cancel_);
+          FuseViewColor(luminance, carried, SourcesOf(colorizer), pool_, cancel_);
       point->delivered += ChromaError(truth, JoinLab(luminance, fused.ab));
       ++point->views;
     }
