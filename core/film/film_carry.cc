@@ -386,9 +386,8 @@ void CarryAlongFilm(const FilmFrames& frames,
                     const FilmCarryOptions& options,
                     ThreadPool& pool,
                     const CancellationToken& cancel,
-                    const OnCarriedFrame& on_frame,
-                    const FilmResume& resume,
-                    const OnCarriedFrame& on_second) {
+                    const FilmCarrySinks& sinks,
+                    const FilmResume& resume) {
   options.Validate();
   for (size_t i = 0; i < keys.size(); ++i) {
     if (keys[i].frame < 0 || keys[i].frame >= static_cast<int>(frames.shot.size())) {
@@ -402,7 +401,7 @@ void CarryAlongFilm(const FilmFrames& frames,
       }
     }
   }
-  for (const FilmKey& key : keys) on_frame(key.frame, key.color);
+  for (const FilmKey& key : keys) sinks.on_frame(key.frame, key.color);
   Mutex handing_over;
   const auto go = [&](size_t count, const OnCarriedFrame& to, Walk* walk) {
     if (count == 0) return;
@@ -417,10 +416,11 @@ void CarryAlongFilm(const FilmFrames& frames,
     walk->before = walker.State();
     walk->Drop(count);
   };
-  std::vector<Walk> walks = PlanWalks(frames, keys, on_second != nullptr, resume.walks);
+  std::vector<Walk> walks = PlanWalks(frames, keys, sinks.on_second != nullptr, resume.walks);
   const auto count = static_cast<int64_t>(walks.size());
-  pool.ForEach(count, [&](int64_t i, int) { go(walks[i].nearest, on_frame, &walks[i]); });
-  pool.ForEach(count, [&](int64_t i, int) { go(walks[i].frames.size(), on_second, &walks[i]); });
+  pool.ForEach(count, [&](int64_t i, int) { go(walks[i].nearest, sinks.on_frame, &walks[i]); });
+  pool.ForEach(count,
+               [&](int64_t i, int) { go(walks[i].frames.size(), sinks.on_second, &walks[i]); });
 }
 
 }  // namespace color3d

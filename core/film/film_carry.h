@@ -88,19 +88,22 @@ CarriedColor CarryIntoReappearing(const FilmKey& key,
 
 using OnCarriedFrame = std::function<void(int frame, const CarriedColor& color)>;
 
-// Carries into every frame of the shots with a key frame from the nearest one, and calls `on_frame`
-// with each, in any order, from several threads, one call at a time. Then calls `on_second`, unless
-// it is empty, with the colours that the second nearest key frame gives the frames of shots with
-// several. Memory does not grow with the number of frames. Resumed walks give the same bits; key
-// frames are passed again. Throws Error{kInvalidArgument} for keys that are no frames or are given
-// twice, kCancelled.
+// Receivers of carried colours. Called in any order, from several threads, one call at a time.
+struct FilmCarrySinks {
+  OnCarriedFrame on_frame;   // colours of the nearest key frame
+  OnCarriedFrame on_second;  // colours of the second nearest, after all others; may be empty
+};
+
+// Carries into every frame of the shots with a key frame from the nearest one, and then, for
+// `sinks.on_second`, into the frames of shots with several from the second nearest. Memory does not
+// grow with the number of frames. Resumed walks give the same bits; key frames are passed again.
+// Throws Error{kInvalidArgument} for keys that are no frames or are given twice, kCancelled.
 void CarryAlongFilm(const FilmFrames& frames,
                     const std::vector<FilmKey>& keys,
                     const FilmCarryOptions& options,
                     ThreadPool& pool,
                     const CancellationToken& cancel,
-                    const OnCarriedFrame& on_frame,
-                    const FilmResume& resume = {},
-                    const OnCarriedFrame& on_second = {});
+                    const FilmCarrySinks& sinks,
+                    const FilmResume& resume = {});
 
 }  // namespace color3d

@@ -82,9 +82,9 @@ std::map<int, CarriedColor> Carry(const Scenery& scenery,
   const FilmFrames frames{std::move(shots), [&](int frame) {
                             return std::make_shared<const Image>(scenery.Luminance(frame));
                           }};
-  CarryAlongFilm(frames, keys, {}, pool, cancel, [&](int frame, const CarriedColor& color) {
-    EXPECT_TRUE(colors.emplace(frame, color).second) << frame;
-  });
+  CarryAlongFilm(frames, keys, {}, pool, cancel, {[&](int frame, const CarriedColor& color) {
+                   EXPECT_TRUE(colors.emplace(frame, color).second) << frame;
+                 }});
   return colors;
 }
 
@@ -181,21 +181,20 @@ TEST(FilmCarryTest, PassesSecondKeyFrameLast) {
   const auto carry = [&](int killed_after) {
     FilmResume resume{{}, [&](const FilmWalk& walk) { walks[{walk.key, walk.direction}] = walk; }};
     for (const auto& [place, walk] : walks) resume.walks.push_back(walk);
-    CarryAlongFilm(
-        frames,
-        keys,
-        {},
-        pool,
-        cancel,
-        [&](int frame, const CarriedColor& color) { first[frame] = color; },
-        resume,
-        [&](int frame, const CarriedColor& color) {
-          EXPECT_EQ(first.size(), 12u);
-          EXPECT_TRUE(second.emplace(frame, color).second) << frame;
-          if (static_cast<int>(second.size()) == killed_after) {
-            throw Error(ErrorCode::kAborted, "killed");
-          }
-        });
+    CarryAlongFilm(frames,
+                   keys,
+                   {},
+                   pool,
+                   cancel,
+                   {[&](int frame, const CarriedColor& color) { first[frame] = color; },
+                    [&](int frame, const CarriedColor& color) {
+                      EXPECT_EQ(first.size(), 12u);
+                      EXPECT_TRUE(second.emplace(frame, color).second) << frame;
+                      if (static_cast<int>(second.size()) == killed_after) {
+                        throw Error(ErrorCode::kAborted, "killed");
+                      }
+                    }},
+                   resume);
   };
   carry(0);
   ASSERT_EQ(second.size(), 12u);
@@ -232,10 +231,10 @@ TEST(FilmCarryTest, GivesLostPixelsNoConfidence) {
                  {},
                  pool,
                  cancel,
-                 [&](int frame, const CarriedColor& color) {
+                 {[&](int frame, const CarriedColor& color) {
                    if (frame == 0) return;
                    EXPECT_LT(ErrorOf(color, cut.Ab(1)).coverage, 0.45);
-                 });
+                 }});
 }
 
 // A blank frame interrupts the optical flow.
@@ -249,12 +248,12 @@ TEST(FilmCarryTest, FindsReappearingRegions) {
   ThreadPool pool(2);
   CancellationToken cancel;
   CarryAlongFilm(
-      frames, {KeyOf(scenery, 0)}, {}, pool, cancel, [&](int frame, const CarriedColor& color) {
+      frames, {KeyOf(scenery, 0)}, {}, pool, cancel, {[&](int frame, const CarriedColor& color) {
         if (frame != 4) return;
         const Deviation error = ErrorOf(color, scenery.Ab(frame));
         EXPECT_GT(error.coverage, 0.7);
         EXPECT_LT(error.weighted, 3.0);
-      });
+      }});
 }
 
 TEST(FilmCarryTest, ResumesWithSameBits) {
@@ -278,18 +277,17 @@ TEST(FilmCarryTest, ResumesWithSameBits) {
     FilmResume resume{{}, told};
     for (const auto& [place, walk] : walks) resume.walks.push_back(walk);
     try {
-      CarryAlongFilm(
-          frames,
-          keys,
-          {},
-          pool,
-          cancel,
-          [&](int frame, const CarriedColor& color) {
-            const bool is_new = colors.emplace(frame, color).second;
-            EXPECT_TRUE(is_new || frame == 3 || frame == 9) << frame;
-            if (is_new && ++steps % 2 == 0) throw Error(ErrorCode::kAborted, "killed");
-          },
-          resume);
+      CarryAlongFilm(frames,
+                     keys,
+                     {},
+                     pool,
+                     cancel,
+                     {[&](int frame, const CarriedColor& color) {
+                       const bool is_new = colors.emplace(frame, color).second;
+                       EXPECT_TRUE(is_new || frame == 3 || frame == 9) << frame;
+                       if (is_new && ++steps % 2 == 0) throw Error(ErrorCode::kAborted, "killed");
+                     }},
+                     resume);
       done = true;
     } catch (const Error& e) {
       ASSERT_EQ(e.code(), ErrorCode::kAborted);
@@ -305,8 +303,7 @@ TEST(FilmCarryTest, ResumesWithSameBits) {
   read.clear();
   FilmResume resume{{}, {}};
   for (const auto& [place, walk] : walks) resume.walks.push_back(walk);
-  CarryAlongFilm(
-      frames, keys, {}, pool, cancel, [](int, const CarriedColor&) {}, resume);
+  CarryAlongFilm(frames, keys, {}, pool, cancel, {[](int, const CarriedColor&) {}}, resume);
   EXPECT_TRUE(read.empty());
 }
 
@@ -320,7 +317,7 @@ TEST(FilmCarryTest, AcceptsShortFilmsAndRefusesBadKeys) {
   CancellationToken cancel;
   EXPECT_THROW(
       CarryAlongFilm(
-          {}, {}, {.cycle_tolerance_px = 0.0}, pool, cancel, [](int, const CarriedColor&) {}),
+          {}, {}, {.cycle_tolerance_px = 0.0}, pool, cancel, {[](int, const CarriedColor&) {}}),
       Error);
 }
 

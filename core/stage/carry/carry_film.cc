@@ -49,9 +49,9 @@ CarriedColor CarriedToFrame(const FilmFrames& frames,
                  options,
                  context.pool(),
                  context.cancel(),
-                 [&](int at, const CarriedColor& carried) {
+                 {[&](int at, const CarriedColor& carried) {
                    if (at == frame) color = carried;
-                 });
+                 }});
   return color;
 }
 
@@ -98,7 +98,8 @@ void CarryFilm(const CarryInputs& inputs, StageContext& context) {
     done.Replace(frame, CoveredShare(color), EncodeAbPng(color.ab, color.confidence));
   };
   const auto carry = [&](const std::vector<FilmKey>& from) {
-    CarryAlongFilm(frames, from, options.film, context.pool(), context.cancel(), add, resume, fill);
+    CarryAlongFilm(
+        frames, from, options.film, context.pool(), context.cancel(), {add, fill}, resume);
   };
   carry(keys);
   const std::vector<int> middles = UnkeyedShotMiddles(frames.shot, inputs.key_views);

@@ -37,12 +37,10 @@ CarriedFrames::CarriedFrames(const Scene& scene,
                  options,
                  context.pool(),
                  context.cancel(),
-                 keep,
-                 {},
-                 [&](int frame, const CarriedColor& second) {
-                   CarriedColor color = Of(order[frame]);
-                   if (FillUncertain(second, &color) > 0) keep(frame, color);
-                 });
+                 {keep, [&](int frame, const CarriedColor& second) {
+                    CarriedColor color = Of(order[frame]);
+                    if (FillUncertain(second, &color) > 0) keep(frame, color);
+                  }});
 }
 
 std::vector<int> CarriedFrames::NearestTo(int view) const {

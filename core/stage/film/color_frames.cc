@@ -57,26 +57,27 @@ struct Gap {
 
 using Flow = std::function<std::shared_ptr<const FlowPair>(int earlier, int later)>;
 
+struct FilmToColor {
+  const Scene& scene;
+  const ViewImages& images;
+  std::vector<int> view_of_frame;
+  FilmFrames frames;
+  std::vector<NearKeyFrames> near;  // of each frame
+};
+
 // Colours one shot by stretches, runs of frames that end at an anchor or with the shot. Colours do
 // not depend on the length of stretches.
 class ShotColorer {
  public:
   ShotColorer(const ShotToColor& shot,
-              const FilmFrames& frames,
-              const std::vector<int>& view_of_frame,
+              const FilmToColor& film,
               const FrameColoring& coloring,
-              const Scene& scene,
-              const ViewImages& images,
-              std::vector<NearKeyFrames> near,
               StageContext& context)
       : shot_(shot),
-        frames_(frames),
-        view_of_frame_(view_of_frame),
+        film_(film),
         coloring_(coloring),
-        scene_(scene),
-        images_(images),
         context_(context),
-        steady_(std::move(near), [this](int frame) { return WasDone(frame); }) {}
+        steady_(film.near, [this](int frame) { return WasDone(frame); }) {}
 
   void Run() {
     size_t begin = FirstUncoloredFrame();
@@ -87,13 +88,13 @@ class ShotColorer {
       begin = end;
       steady_.Deliver(
           end == shot_.frames.size(), context_, [&](int frame, const FusedColor& color) {
-            coloring_.deliver(view_of_frame_[frame], color);
+            coloring_.deliver(film_.view_of_frame[frame], color);
           });
     }
   }
 
  private:
-  bool WasDone(int frame) const { return coloring_.was_done(view_of_frame_[frame]); }
+  bool WasDone(int frame) const { return coloring_.was_done(film_.view_of_frame[frame]); }
 
   // An interrupted run resumes at the last anchor before all frames that are left.
   size_t FirstUncoloredFrame() const {
@@ -107,7 +108,7 @@ class ShotColorer {
   }
 
   size_t EndOfStretch(size_t begin) const {
-    const auto luminance = frames_.luminance(shot_.frames[begin]);
+    const auto luminance = film_.frames.luminance(shot_.frames[begin]);
     const auto at_once = static_cast<size_t>(
         kStretchBytes / (kBytesPerPixel * static_cast<int64_t>(luminance->PlaneSize())));
     size_t end = begin;
@@ -133,7 +134,7 @@ class ShotColorer {
       const int last = i > 0 ? stretch[i - 1] : last_;
       if (last < 0) return;
       colored[i].flow_from_last =
-          FlowBetween(*frames_.luminance(last), *frames_.luminance(stretch[i]));
+          FlowBetween(*film_.frames.luminance(last), *film_.frames.luminance(stretch[i]));
     });
     std::vector<FilmKey> keys;
     if (last_anchor_) keys.push_back(std::move(*last_anchor_));
@@ -195,7 +196,7 @@ class ShotColorer {
                  const Flow& flow,
                  const std::function<void(int frame, const CarriedColor& color)>& on_frame) const {
     if (way.empty()) return;
-    FilmFrames frames = frames_;
+    FilmFrames frames = film_.frames;
     frames.flow = flow;
     for (size_t i = 0; i < frames.shot.size(); ++i) frames.shot[i] = -1 - static_cast<int>(i);
     frames.shot[key.frame] = 0;
@@ -206,9 +207,9 @@ class ShotColorer {
                    {.correct_after = 1.0},
                    one,
                    context_.cancel(),
-                   [&](int frame, const CarriedColor& color) {
+                   {[&](int frame, const CarriedColor& color) {
                      if (frame != key.frame) on_frame(frame, color);
-                   });
+                   }});
   }
 
   std::vector<Gap> GapsOf(const std::vector<int>& stretch) const {
@@ -261,16 +262,16 @@ class ShotColorer {
   }
 
   CarriedColor PropagatedColor(int frame) const {
-    const int view = view_of_frame_[frame];
-    const Camera camera = images_.WorkingCamera(view);
-    return ReadCarried(context_, scene_.views[view], camera.width, camera.height);
+    const int view = film_.view_of_frame[frame];
+    const Camera camera = film_.images.WorkingCamera(view);
+    return ReadCarried(context_, film_.scene.views[view], camera.width, camera.height);
   }
 
   // `of_anchors`: null for anchors. Nothing is guessed between two anchors without guessed colours.
   FusedColor ColorOf(int frame, const CarriedColor* of_anchors) const {
     context_.ThrowIfCancelled();
-    const int view = view_of_frame_[frame];
-    const auto luminance = frames_.luminance(frame);
+    const int view = film_.view_of_frame[frame];
+    const auto luminance = film_.frames.luminance(frame);
     const CarriedColor carried = PropagatedColor(frame);
     ColorSources sources = coloring_.sources(view);
     if (of_anchors != nullptr) {
@@ -285,11 +286,8 @@ class ShotColorer {
   }
 
   const ShotToColor& shot_;
-  const FilmFrames& frames_;
-  const std::vector<int>& view_of_frame_;
   const FrameColoring& coloring_;
-  const Scene& scene_;
-  const ViewImages& images_;
+  const FilmToColor& film_;
   StageContext& context_;
   std::set<int> guessed_;               // anchors with guessed colours
   int last_ = -1;                       // frame of the last stretch
@@ -303,23 +301,22 @@ void ColorFrames(const Scene& scene,
                  const ViewImages& images,
                  const FrameColoring& coloring,
                  StageContext& context) {
-  const std::vector<int> order = scene.ViewsInOrderOfTime();
-  const FilmFrames frames = FramesOfViews(scene, order, images);
+  FilmToColor film{scene, images, scene.ViewsInOrderOfTime()};
+  const std::vector<int>& order = film.view_of_frame;
+  film.frames = FramesOfViews(scene, order, images);
   std::map<int, ShotToColor> shots;
   for (size_t i = 0; i < order.size(); ++i) {
-    shots[frames.shot[i]].frames.push_back(static_cast<int>(i));
+    shots[film.frames.shot[i]].frames.push_back(static_cast<int>(i));
   }
-  for (const int anchor : AnchorFrames(frames, {}, context.pool(), context.cancel())) {
-    shots[frames.shot[anchor]].anchors.push_back(anchor);
+  for (const int anchor : AnchorFrames(film.frames, {}, context.pool(), context.cancel())) {
+    shots[film.frames.shot[anchor]].anchors.push_back(anchor);
   }
   std::vector<int> key_frames;
   for (const int view : coloring.key_views) {
     key_frames.push_back(static_cast<int>(std::ranges::find(order, view) - order.begin()));
   }
-  const std::vector<NearKeyFrames> near = NearestKeyFrames(frames, key_frames);
-  for (const auto& [number, shot] : shots) {
-    ShotColorer(shot, frames, order, coloring, scene, images, near, context).Run();
-  }
+  film.near = NearestKeyFrames(film.frames, key_frames);
+  for (const auto& [number, shot] : shots) ShotColorer(shot, film, coloring, context).Run();
 }
 
 }  // namespace color3d

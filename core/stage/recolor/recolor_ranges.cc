@@ -179,12 +179,10 @@ class RangeColorer {
                    {},
                    film_.context.pool(),
                    film_.context.cancel(),
-                   keep,
-                   {},
-                   [&](int frame, const CarriedColor& second) {
-                     CarriedColor color = PropagatedColor(frame);
-                     if (FillUncertain(second, &color) > 0) keep(frame, color);
-                   });
+                   {keep, [&](int frame, const CarriedColor& second) {
+                      CarriedColor color = PropagatedColor(frame);
+                      if (FillUncertain(second, &color) > 0) keep(frame, color);
+                    }});
     return NearestKeyFrames(frames, key_frames);
   }
 
