@@ -80,7 +80,7 @@ TEST_F(MaskFilesTest, NamesFilesThatAreNoMasks) {
   Write(masks() / "a.png", "no picture");
   EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("a.png"), HasSubstr("not an image")));
   Write(masks() / "a.png", EncodeJpeg(Image(24, 16, 1, 1.0f)));
-  EXPECT_THAT(ErrorOf(), HasSubstr("no PNG"));
+  EXPECT_THAT(ErrorOf(), HasSubstr("not a PNG"));
   WriteMask("a.png");
   WriteMask("a.jpg.png");
   EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("two masks"), HasSubstr("a.jpg")));
