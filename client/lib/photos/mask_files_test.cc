@@ -65,7 +65,7 @@ TEST_F(MaskFilesTest, LeavesOutMasksOfDeletedPhotosWithNote) {
   AddMasks(masks(), &folder);
   ASSERT_EQ(folder.mask_files.size(), 1u);
   EXPECT_EQ(folder.mask_files[0].path, "masks/A.PNG");
-  EXPECT_THAT(folder.notes, ::testing::Contains(HasSubstr("1 of 2 masks are of no photo")));
+  EXPECT_THAT(folder.notes, ::testing::Contains(HasSubstr("1 of 2 masks match no photo")));
 }
 
 TEST_F(MaskFilesTest, NamesFilesThatAreNoMasks) {
@@ -73,7 +73,7 @@ TEST_F(MaskFilesTest, NamesFilesThatAreNoMasks) {
   fs::create_directories(masks());
   EXPECT_THAT(ErrorOf(), HasSubstr("no mask in it"));
   WriteMask("d.png");
-  EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("d.png"), HasSubstr("of no photo")));
+  EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("d.png"), HasSubstr("matches no photo")));
   fs::remove(masks() / "d.png");
   WriteMask("a.png", 16, 24);
   EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("16 x 24 px"), HasSubstr("24 x 16 px")));
