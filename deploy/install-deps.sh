@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the packages to build and run Color3D on Debian 12 (or a later Debian or Ubuntu that has the
-# same packages). Run as root or as a user with sudo; does nothing when all is there.
+# same packages). Run as root or as a user with sudo; does nothing if all are installed.
 #   deploy/install-deps.sh           packages of deploy/demo.sh
 #   deploy/install-deps.sh --tests   and those of tests/run.sh
 #   deploy/install-deps.sh --fuzz    and those of tests/run.sh -L fuzz
@@ -30,7 +30,7 @@ if ! command -v apt-get >/dev/null 2>&1; then
   exit 1
 fi
 
-# Wished for only: without npm the build leaves out the page to look at scenes in a browser, without
+# Optional: without npm the build omits the page for viewing scenes in a browser, without
 # libheif HEIC photos are refused.
 wished=()
 command -v npm >/dev/null 2>&1 || wished=(npm)

@@ -36,6 +36,7 @@ const std::vector<std::string> kServiceFiles = {"color3d/v1/scene.proto",
                                                 "color3d/v1/job.proto",
                                                 "color3d/v1/colorizer.proto",
                                                 "color3d/v1/server.proto",
+                                                "color3d/v1/admin.proto",
                                                 "color3d/backend/v1/backend.proto"};
 const std::vector<std::string> kOptionFiles = {
     "color3d/v1/colorize_scene.proto", "color3d/v1/key_view.proto", "color3d/v1/stage.proto"};

@@ -1,5 +1,5 @@
 // color3d-server: `serve` answers RPCs and supervises workers; `token`, `backup`, `restore` and
-// `fsck` are for who runs it; `worker` becomes color3d-worker, the program beside this one that
+// `fsck` are for operators; `worker` executes color3d-worker, the program beside this one that
 // links the method library.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -24,79 +24,93 @@
 namespace color3d {
 namespace {
 
-// Flags of the group "" are hidden: they are for tests.
+// Flags of the group "" are hidden, for tests.
 void AddServe(CLI::App* serve, ServeOptions* options) {
-  serve->add_option("--listen", options->listen, "HOST:PORT (port 0: any free one) or unix:PATH")
+  serve
+      ->add_option(
+          "--listen", options->listen, "Address: HOST:PORT (port 0: any free port) or unix:PATH")
       ->capture_default_str();
-  serve->add_option("--data-dir", options->data_folder, "Where jobs and files are kept")
+  serve->add_option("--data-dir", options->data_folder, "Data folder with jobs and files")
       ->required();
-  serve->add_option("--workers", options->workers, "Worker processes; each runs one job at a time")
+  serve
+      ->add_option(
+          "--workers", options->workers, "Number of worker processes; each runs one job at a time")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
-  serve->add_option("--threads", options->threads, "Threads of each worker; 0: share the machine's")
+  serve
+      ->add_option(
+          "--threads", options->threads, "Threads per worker; 0: the cores divided by the workers")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  serve
+      ->add_option("--live-threads",
+                   options->live_threads,
+                   "Threads of the inference worker, which answers ColorizeImages; 0: all cores")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   serve
       ->add_option(
-          "--live-threads",
-          options->live_threads,
-          "Threads of the inference worker, which answers ColorizeImages; 0: the machine's")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  serve
-      ->add_option("--worker-memory-mib",
-                   options->worker_memory_mib,
-                   "Memory that each worker may take, and COLMAP beside it, MiB; what needs more "
-                   "fails. 0: three quarters of the machine's or the container's, shared among the "
-                   "workers, and half of it for the inference worker")
+          "--worker-memory-mib",
+          options->worker_memory_mib,
+          "Memory limit of each worker, and of COLMAP beside it, MiB; jobs that need more fail. "
+          "0: three quarters of the memory of the machine or container, divided by the "
+          "workers, and half of it for the inference worker")
       ->check(CLI::Range(int64_t{0}, int64_t{1} << 30))
       ->capture_default_str();
-  serve->add_option("--port-file", options->port_file, "Write the address here once it is bound");
+  serve->add_option("--port-file", options->port_file, "File to write the bound address to");
   serve
       ->add_option("--log-level", options->worker.log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
-  serve->add_option("--log-format", options->worker.log_format, "text, or json: one object a line")
+  serve
+      ->add_option(
+          "--log-format", options->worker.log_format, "text, or json with one object per line")
       ->check(CLI::IsMember({"text", "json"}))
       ->capture_default_str();
-  serve->add_option(
-      "--metrics-listen", options->metrics_listen, "HOST:PORT that Prometheus may read (/metrics)");
-  serve->add_flag(
-      "!--no-sandbox", options->worker.sandbox, "Do not lock workers, COLMAP and scripts in");
+  serve->add_option("--metrics-listen",
+                    options->metrics_listen,
+                    "HOST:PORT of the metrics for Prometheus (/metrics)");
+  serve->add_flag("!--no-sandbox",
+                  options->worker.sandbox,
+                  "Run workers, COLMAP and scripts without a sandbox");
   serve->add_flag("--insecure-any-address",
                   options->insecure_any_address,
-                  "Allow --listen on other than loopback addresses without TLS and tokens");
-  serve->add_option("--tls-cert", options->tls_certificate, "PEM file: the server's certificate");
-  serve->add_option("--tls-key", options->tls_key, "PEM file: its key");
-  serve->add_option("--tls-client-ca",
-                    options->tls_client_ca,
-                    "PEM file: clients must show a certificate that one of these signed");
-  serve->add_option("--certificate-roles",
-                    options->certificate_roles,
-                    "File of what clients may do by their certificate: lines NAME ROLE [PROJECT], "
-                    "'*' for any name; read again when it changes");
+                  "Allow --listen on addresses beyond loopback without TLS and tokens");
+  serve->add_option(
+      "--tls-cert", options->tls_certificate, "PEM file with the certificate of the server");
+  serve->add_option("--tls-key", options->tls_key, "PEM file with the key of the certificate");
+  serve->add_option(
+      "--tls-client-ca",
+      options->tls_client_ca,
+      "PEM file of authorities; clients must present a certificate signed by one of them");
+  serve->add_option(
+      "--certificate-roles",
+      options->certificate_roles,
+      "File with the roles of client certificates: lines NAME ROLE [PROJECT], '*' for any "
+      "name; reloaded after changes");
   serve
       ->add_option("--max-connections",
                    options->max_connections,
-                   "Connections that may be open; fewer where the limit of open files is lower")
+                   "Maximum number of connections; fewer if the limit of open files is lower")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   serve->add_option(
       "--tokens",
       options->tokens,
-      "File of those who may call, written by `color3d-server token`; read again when "
-      "it changes");
+      "File with the tokens of callers, written by `color3d-server token`; reloaded after "
+      "changes");
   serve
-      ->add_option("--model",
-                   options->models,
-                   "NAME=FILE: weights that jobs may name (DDColor, ConvNeXt, CLIP, TorchScript); "
-                   "repeatable. Also COLOR3D_MODELS, separated by ';'")
+      ->add_option(
+          "--model",
+          options->models,
+          "NAME=FILE: weights for jobs (DDColor, ConvNeXt, CLIP, TorchScript); repeatable. "
+          "Default: COLOR3D_MODELS, separated by ';'")
       ->allow_extra_args(false);
   serve
       ->add_option(
           "--backend",
           options->backends,
           "NAME=ADDRESS: a ColorBackend server: HOST:PORT or unix:PATH on this machine, "
-          "https://HOST:PORT, or http://HOST:PORT in a network you trust; repeatable. Also "
+          "https://HOST:PORT, or http://HOST:PORT in a trusted network; repeatable. Default: "
           "COLOR3D_BACKENDS, separated by ';'")
       ->allow_extra_args(false);
   serve->add_option("--reserve-mib", options->worker.reserve_mib, "Disk space to keep free, MiB")
@@ -105,61 +119,65 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve
       ->add_option("--max-unfinished-jobs",
                    options->max_unfinished_jobs,
-                   "Jobs that may wait or run at one time")
+                   "Maximum number of unfinished jobs")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   serve
       ->add_option("--low-space-mib",
                    options->low_space_mib,
-                   "Free space below which no job is begun or accepted, MiB")
+                   "Free disk space below which no job is accepted or started, MiB")
       ->check(CLI::Range(0, 1 << 30))
       ->capture_default_str();
   serve
       ->add_option("--project-jobs",
                    options->project_jobs,
-                   "Jobs of one project that may wait or run; 0: no limit of its own")
+                   "Maximum number of unfinished jobs per project; 0: no limit")
       ->check(CLI::Range(0, 1'000'000))
       ->capture_default_str();
   serve
       ->add_option("--project-gib",
                    options->project_gib,
-                   "What one project may have stored, files and rows, GiB; 0: no limit of its own")
+                   "Maximum storage per project, files and database rows, GiB; 0: no limit")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  serve->add_option("--project-scenes", options->project_scenes, "Scenes that one project may have")
+  serve
+      ->add_option(
+          "--project-scenes", options->project_scenes, "Maximum number of scenes per project")
       ->check(CLI::Range(1, 10'000'000))
       ->capture_default_str();
   serve
       ->add_option("--keep-uncommitted-days",
                    options->keep_uncommitted_days,
-                   "Delete scenes that were never committed so long after they were made; 0: never")
+                   "Delete uncommitted scenes after this time; 0: never")
       ->check(CLI::Range(0, 36'500))
       ->capture_default_str();
   serve
       ->add_option(
           "--project-streams",
           options->project_streams,
-          "Watches, uploads, downloads and live streams of one project, each; 0: no limit of its "
-          "own")
+          "Maximum number per project of watches, of uploads, of downloads and of live streams; 0: "
+          "no limit")
       ->check(CLI::Range(0, 10'000))
       ->capture_default_str();
   serve
-      ->add_option("--keep-days",
-                   options->keep_days,
-                   "Delete jobs this long after their end, with scenes that have none left, unless "
-                   "they are pinned; 0: never")
+      ->add_option(
+          "--keep-days",
+          options->keep_days,
+          "Delete jobs this long after their end, unless pinned, and scenes without jobs; 0: "
+          "never")
       ->check(CLI::Range(0, 36'500))
       ->capture_default_str();
   serve
-      ->add_option("--notify-allow",
-                   options->notify_allow,
-                   "http[s]://HOST[:PORT][/PATH]: where jobs may ask to be told of their end; "
-                   "repeatable")
+      ->add_option(
+          "--notify-allow",
+          options->notify_allow,
+          "http[s]://HOST[:PORT][/PATH]: allowed address for notifications of finished jobs; "
+          "repeatable")
       ->allow_extra_args(false);
   serve->add_option("--notify-secret",
                     options->notify_secret,
-                    "File with the key that signs such word: base64 of 24 to 64 bytes");
-  serve->add_option("--drain-seconds", options->drain_seconds, "Longest time to stop after SIGTERM")
+                    "File with the key that signs notifications: base64 of 24 to 64 bytes");
+  serve->add_option("--drain-seconds", options->drain_seconds, "Maximum time to stop after SIGTERM")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
   serve->add_option("--worker-program", options->worker_program)->group("");
@@ -171,7 +189,7 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--probe-seconds", options->probe_seconds)->group("");
 }
 
-// Flags win over the environment.
+// Flags override the environment.
 void TakeFromEnvironment(const char* variable, std::vector<std::string>* values) {
   const char* text = std::getenv(variable);
   if (text == nullptr || !values->empty()) return;
@@ -184,28 +202,28 @@ void TakeFromEnvironment(const char* variable, std::vector<std::string>* values)
 struct KeepingArguments {
   std::filesystem::path data_folder, copy;
   bool repair = false;
-  std::function<int()> run;  // empty: another command was given
+  std::function<int()> run;  // empty: another command
 };
 
-// Exit status 1: the copy lacks blobs, which are listed.
+// Returns exit status 1 if the copy lacks blobs, which are listed.
 int ReportMissingBlobs(const CopiedBlobs& copied, const std::filesystem::path& from) {
   for (const std::string& sha256 : copied.missing) std::cout << "missing: " << sha256 << "\n";
   for (const std::string& sha256 : copied.damaged) std::cout << "damaged: " << sha256 << "\n";
   for (const std::string& what : copied.unreadable) std::cout << "unreadable: " << what << "\n";
   if (copied.awaited > 0) {
-    std::cout << fmt::format("{} files of scenes that are not committed were not uploaded yet\n",
+    std::cout << fmt::format("{} files of uncommitted scenes were not uploaded yet\n",
                              copied.awaited);
   }
   if (copied.IsWhole()) return 0;
   if (!copied.unreadable.empty()) {
     std::cout
-        << "change the owner or rights of what is unreadable, or look after the disk, and copy "
+        << "change the owner or permissions of the unreadable files, or check the disk, and copy "
            "again\n";
   }
   if (copied.missing.empty() && copied.damaged.empty()) return 1;
   std::cout << fmt::format(
-      "{} blobs of {} are missing and {} damaged, the copy is without them: upload their scenes' "
-      "files again, or run their jobs anew with skip_cache\n",
+      "{} blobs of {} are missing and {} damaged, and left out of the copy: upload the files of "
+      "their scenes again, or run their jobs again with skip_cache\n",
       copied.missing.size(),
       from.string(),
       copied.damaged.size());
@@ -215,20 +233,18 @@ int ReportMissingBlobs(const CopiedBlobs& copied, const std::filesystem::path& f
 int RunBackUp(const KeepingArguments& arguments) {
   const CopiedBlobs copied = BackUp(arguments.data_folder, arguments.copy);
   std::cout << fmt::format(
-      "{}: {} blobs copied ({} MiB), {} were there and are good{}\n",
+      "{}: {} blobs copied ({} MiB), {} kept{}\n",
       arguments.copy.string(),
       copied.copied,
       copied.bytes >> 20,
       copied.kept,
-      copied.mended > 0
-          ? fmt::format("; {} that were damaged there are copied again", copied.mended)
-          : "");
+      copied.mended > 0 ? fmt::format("; {} damaged ones replaced", copied.mended) : "");
   return ReportMissingBlobs(copied, arguments.data_folder);
 }
 
 int RunRestore(const KeepingArguments& arguments) {
   const CopiedBlobs copied = Restore(arguments.copy, arguments.data_folder);
-  std::cout << fmt::format("{}: {} blobs, read and whole; start color3d-server serve on it\n",
+  std::cout << fmt::format("{}: {} blobs restored and verified; start color3d-server serve on it\n",
                            arguments.data_folder.string(),
                            copied.copied);
   return ReportMissingBlobs(copied, arguments.copy);
@@ -246,8 +262,8 @@ int RunFsck(const KeepingArguments& arguments) {
   for (const std::string& sha256 : result.damaged) std::cout << "damaged: " << sha256 << "\n";
   for (const std::string& what : result.unreadable) std::cout << "unreadable: " << what << "\n";
   std::cout << fmt::format(
-      "{} blobs ({} MiB), {} named by nothing; {} missing, {} damaged, {} damaged and named by "
-      "nothing, {} unreadable; {} not uploaded yet, for scenes that are not committed\n",
+      "{} blobs ({} MiB), {} unreferenced; {} missing, {} damaged, {} damaged and unreferenced, "
+      "{} unreadable; {} of uncommitted scenes not uploaded yet\n",
       result.blobs,
       result.bytes >> 20,
       result.unnamed,
@@ -259,11 +275,11 @@ int RunFsck(const KeepingArguments& arguments) {
   if (!result.store_problems.empty()) {
     std::cout << "restore jobs.db from a backup (color3d-server restore)\n";
   } else if (result.missing.empty() && result.damaged.empty() && !result.unreadable.empty()) {
-    std::cout << "change the owner or rights of what is unreadable, or look after the disk\n";
+    std::cout << "change the owner or permissions of the unreadable files, or check the disk\n";
   } else if (!result.IsGood()) {
-    std::cout << (arguments.repair ? "what was damaged is set aside: "
-                                   : "say --repair to set aside what is damaged, then ")
-              << "upload the scene's files again, or run the jobs anew with skip_cache\n";
+    std::cout << (arguments.repair ? "damaged blobs are set aside: "
+                                   : "use --repair to set damaged blobs aside, then ")
+              << "upload the files of the scene again, or run the jobs again with skip_cache\n";
   }
   return result.IsGood() ? 0 : 1;
 }
@@ -271,22 +287,22 @@ int RunFsck(const KeepingArguments& arguments) {
 void AddKeeping(CLI::App* app, KeepingArguments* arguments) {
   const auto add = [&](const char* name, const char* what, int (*run)(const KeepingArguments&)) {
     CLI::App* command = app->add_subcommand(name, what);
-    command->add_option("--data-dir", arguments->data_folder, "The server's data directory")
+    command->add_option("--data-dir", arguments->data_folder, "Data folder of the server")
         ->required();
     command->callback([arguments, run] { arguments->run = [=] { return run(*arguments); }; });
     return command;
   };
-  add("backup", "Copy all that jobs and scenes name; a server may run meanwhile", RunBackUp)
-      ->add_option("FOLDER", arguments->copy, "An empty folder, or an earlier backup")
+  add("backup", "Back up the store and all referenced files; the server may run", RunBackUp)
+      ->add_option("FOLDER", arguments->copy, "Empty folder, or an earlier backup")
       ->required();
-  add("restore", "Make a fresh data directory of a backup", RunRestore)
-      ->add_option("FOLDER", arguments->copy, "The backup")
+  add("restore", "Restore a backup to a new data folder", RunRestore)
+      ->add_option("FOLDER", arguments->copy, "Folder of the backup")
       ->required();
-  add("fsck", "Read a data directory and say whether it is whole; no server may use it", RunFsck)
+  add("fsck", "Check a data folder; no server may use it", RunFsck)
       ->add_flag("--repair", arguments->repair, "Set damaged blobs aside");
 }
 
-// Replaces this process by color3d-worker with the arguments after "worker".
+// Replaces this process with color3d-worker and the arguments after "worker".
 int ExecWorker(char** argv) {
   const std::string program = (ProgramFolder() / "color3d-worker").string();
   argv[1] = const_cast<char*>(program.c_str());
@@ -297,25 +313,25 @@ int ExecWorker(char** argv) {
 }
 
 int Main(int argc, char** argv) {
-  // Workers inherit this. Threads that wait by spinning make a busy machine many times slower.
+  // Inherited by workers. Threads that spin while waiting slow down a busy machine.
   ::setenv("OMP_WAIT_POLICY", "PASSIVE", /*overwrite=*/0);
   if (argc > 1 && std::string(argv[1]) == "worker") return ExecWorker(argv);
   ServeOptions options;
   CLI::App app("Color3D server: colours 3D scenes from monochrome photographs.");
   app.set_version_flag("--version", COLOR3D_VERSION);
   CLI::App* serve = app.add_subcommand("serve", "Answer RPCs and run jobs");
-  app.add_subcommand("worker", "Run jobs of a server's data directory (see worker --help)");
+  app.add_subcommand("worker", "Run jobs of a data folder (see worker --help)");
   std::string token_name, token_role = "submit";
   std::string token_project;
   std::filesystem::path token_file;
-  CLI::App* token = app.add_subcommand("token", "Let somebody in: print a fresh token, once");
-  token->add_option("NAME", token_name, "Who will have it, for logs")->required();
-  token
-      ->add_option("--role", token_role, "read, submit or admin; each may do what those before may")
+  CLI::App* token = app.add_subcommand("token", "Create a token for a caller and print it once");
+  token->add_option("NAME", token_name, "Name of the caller, for logs")->required();
+  token->add_option("--role", token_role, "read, submit or admin; each includes the ones before")
       ->capture_default_str();
-  token->add_option(
-      "--project", token_project, "What it sees: scenes, jobs and files of this project alone");
-  token->add_option("--tokens", token_file, "The file that serve --tokens reads")->required();
+  token->add_option("--project",
+                    token_project,
+                    "Project; the token gives access to its scenes, jobs and files only");
+  token->add_option("--tokens", token_file, "File of serve --tokens")->required();
   KeepingArguments keeping;
   AddKeeping(&app, &keeping);
   app.require_subcommand(1);
@@ -323,7 +339,7 @@ int Main(int argc, char** argv) {
   CLI11_PARSE(app, argc, argv);
   TakeFromEnvironment("COLOR3D_MODELS", &options.models);
   TakeFromEnvironment("COLOR3D_BACKENDS", &options.backends);
-  // Our own checks say more than gRPC's log does.
+  // The server's own messages are clearer than the log of gRPC.
   ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
   try {
     if (keeping.run) return keeping.run();
@@ -342,7 +358,7 @@ int Main(int argc, char** argv) {
     return 0;
   } catch (const Error& e) {
     std::cerr << "color3d-server: " << e.what() << "\n";
-    return e.code() == ErrorCode::kUnavailable ? 1 : 2;  // 1: another try may help
+    return e.code() == ErrorCode::kUnavailable ? 1 : 2;  // 1: a retry may succeed
   } catch (const std::exception& e) {
     std::cerr << "color3d-server: unexpected: " << e.what() << "\n";
     return 1;

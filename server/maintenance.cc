@@ -26,13 +26,13 @@ void ExpireDeadWorkers(ChoreStore& store) {
   for (const WorkerRecord& worker : store.ListWorkers()) {
     if (IsRunning(static_cast<pid_t>(worker.pid))) continue;
     try {
-      for (const std::string& job : store.ExpireLeasesOf(worker.worker_id)) {
+      for (const std::string& job : store.ExpireLeases(worker.worker_id)) {
         spdlog::info("[job={}] its worker {} is gone", job, worker.worker_id);
       }
       store.RemoveWorker(worker.worker_id);
     } catch (const Error& e) {
       if (e.code() != ErrorCode::kResourceExhausted) throw;
-      spdlog::error("{} is gone, its leases run out by themselves: {}", worker.worker_id, e.what());
+      spdlog::error("{} has ended, its leases will expire: {}", worker.worker_id, e.what());
     }
   }
 }
@@ -51,7 +51,7 @@ Scrubber::Result Scrubber::Scrub(std::vector<StoredBlob> blobs,
     try {
       if (!IsIntact(blobs_, blob.digest) && blobs_.SetAside(last_)) result.damaged.push_back(last_);
     } catch (const Error& e) {
-      if (e.code() == ErrorCode::kNotFound) continue;  // removed since
+      if (e.code() == ErrorCode::kNotFound) continue;  // removed meanwhile
       result.unreadable.push_back(last_ + ": " + e.what());
     }
   }
@@ -103,25 +103,25 @@ void Maintenance::Repeat(const std::function<std::chrono::milliseconds()>& chore
 
 std::chrono::milliseconds Maintenance::Reap() {
   try {
-    // What can be read can be answered, though the disk may be full.
+    // The server can answer reads even on a full disk.
     store_.NewestRevision();
     if (timing_.on_life) timing_.on_life();
     const int reaped = store_.ReapExpired();
     counts_.attempts_lost += reaped;
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
     PauseWhenSpaceIsLow();
-    GiveBackSpace();
+    ReturnFreeSpace();
   } catch (const std::exception& e) {
-    spdlog::error("cannot look after leases: {}", e.what());
+    spdlog::error("cannot check leases: {}", e.what());
   }
   return timing_.reap;
 }
 
-void Maintenance::GiveBackSpace() {
+void Maintenance::ReturnFreeSpace() {
   try {
-    store_.GiveBackSpace(timing_.keep_free_rows_bytes);
+    store_.ReturnFreeSpace(timing_.keep_free_rows_bytes);
   } catch (const Error& e) {
-    // On a full disk, or beside somebody who writes for long: later.
+    // Tried again later if the disk is full or another process blocks writes.
     if (!IsRetryableLater(e)) throw;
   }
   Ballast* const ballast = timing_.ballast;
@@ -174,7 +174,7 @@ std::chrono::milliseconds Maintenance::Sweep() {
   return timing_.sweep_again;
 }
 
-// As often as the sweep is due, not as often as a failed one is tried again.
+// Once per regular sweep, not per retry of a failed one.
 void Maintenance::Scrub(const std::vector<StoredBlob>& blobs,
                         std::vector<std::string>* unreadable) {
   const auto now = std::chrono::steady_clock::now();
@@ -202,7 +202,7 @@ void Maintenance::CollectBlobs(const std::vector<StoredBlob>& blobs) {
   }
 }
 
-// In two phases, too: a clock that jumps makes nothing old.
+// In two phases, so that a clock jump expires nothing.
 void Maintenance::ExpireJobs() {
   constexpr int64_t kNever = INT64_MIN;
   const auto before = [this](std::chrono::milliseconds age) {
@@ -217,7 +217,7 @@ void Maintenance::ExpireJobs() {
     try {
       RetryAfterMakingRoom(make_room, body);
     } catch (const Error& e) {
-      // Used, retried, read or deleted meanwhile.
+      // The job was used, retried or deleted meanwhile.
       if (e.code() != ErrorCode::kFailedPrecondition && e.code() != ErrorCode::kNotFound) throw;
     }
   };
@@ -257,7 +257,7 @@ void Maintenance::SweepJobLogs(std::vector<std::string>* unreadable) {
   unreadable->insert(unreadable->end(), problems.begin(), problems.end());
 }
 
-// Folders "<job id>-<epoch>" of attempts that no longer run.
+// Removes folders "<job id>-<epoch>" of attempts that no longer run.
 void Maintenance::SweepScratch(std::vector<std::string>* unreadable) {
   std::vector<std::string> unremoved;
   const auto problems =

@@ -1,5 +1,5 @@
-// The server's chores. Leases are looked after on a thread of their own, so that nothing that takes
-// long or waits can keep a lost job from going on.
+// Periodic chores of the server. Leases are checked on a thread of their own, so that slow chores
+// do not delay lost jobs.
 #pragma once
 
 #include <atomic>
@@ -21,24 +21,24 @@ namespace color3d {
 struct MaintenanceTiming {
   std::chrono::milliseconds reap{5'000};
   std::chrono::milliseconds sweep{3600 * 1000};
-  std::chrono::milliseconds sweep_again{60'000};  // after one that failed
-  std::chrono::seconds grace{24 * 3600};          // of unreferenced blobs and dead uploads
+  std::chrono::milliseconds sweep_again{60'000};  // after a failed sweep
+  std::chrono::seconds grace{24 * 3600};          // for unreferenced blobs and dead uploads
   std::chrono::hours keep_events{30 * 24};        // after the job's end
   std::chrono::hours keep_request_ids{7 * 24};
-  std::chrono::hours keep_jobs{0};              // after their end, unless pinned; 0: for ever
-  std::chrono::hours keep_uncommitted{7 * 24};  // scenes, after they were made; 0: for ever
-  int64_t low_space_bytes = 0;  // free; below it no job is begun, until there is a tenth more
-  int64_t scrub_bytes = int64_t{2} << 30;  // read and compared with their digests at each sweep
-  int64_t keep_free_rows_bytes = int64_t{4} << 20;  // in the database; more is given back
-  std::function<void()> on_life = {};  // called at each `reap` when the store could be read
-  // Made while there is room beyond `reserve_bytes`, given up where a chore's deletion needs it.
+  std::chrono::hours keep_jobs{0};              // after their end, unless pinned; 0: forever
+  std::chrono::hours keep_uncommitted{7 * 24};  // scenes, after their creation; 0: forever
+  int64_t low_space_bytes = 0;  // no job starts below this free space, until a tenth more is free
+  int64_t scrub_bytes = int64_t{2} << 30;  // verified in each sweep
+  int64_t keep_free_rows_bytes =
+      int64_t{4} << 20;  // free space in the database; more is returned to the file system
+  std::function<void()> on_life = {};  // called at each `reap` if the store is readable
+  // Created while more than `reserve_bytes` are free, released if a deletion needs the space.
   Ballast* ballast = nullptr;
   int64_t reserve_bytes = 0;
 };
 
-// Blobs whose bytes are no longer those of their digest are set aside, so that an upload or another
-// run puts good ones in their place. Goes round all blobs in the order of their digests. Not
-// thread-safe.
+// Sets damaged blobs aside, so that an upload or another run replaces them. Cycles through all
+// blobs in the order of their digests. Not thread-safe.
 class Scrubber {
  public:
   explicit Scrubber(BlobStore& blobs) : blobs_(blobs) {}
@@ -47,8 +47,8 @@ class Scrubber {
     std::vector<std::string> damaged;
     std::vector<std::string> unreadable;  // "DIGEST: REASON"
   };
-  // Goes on in `blobs`, which are all that there are, where the last call ended, for about so many
-  // bytes; `stop` is asked between blobs.
+  // Continues after the last blob of the previous call, for about `bytes` bytes or until `stop`
+  // returns true. Requires: `blobs` has all blobs.
   Result Scrub(std::vector<StoredBlob> blobs, int64_t bytes, const std::function<bool()>& stop);
 
  private:
@@ -56,7 +56,7 @@ class Scrubber {
   std::string last_;
 };
 
-// Since the start.
+// Counts since the start.
 struct ChoreCounts {
   std::atomic<int64_t> attempts_lost{0};
   std::atomic<int64_t> blobs_removed{0};
@@ -68,7 +68,7 @@ class Maintenance {
  public:
   const ChoreCounts& counts() const { return counts_; }
 
-  // Sweeps once at once, then every `sweep`. What is given must outlive this object.
+  // Sweeps at once, then every `sweep`. The arguments must outlive this object.
   Maintenance(JobStore& store,
               BlobStore& blobs,
               UploadStore& uploads,
@@ -80,12 +80,12 @@ class Maintenance {
   Maintenance& operator=(const Maintenance&) = delete;
 
  private:
-  // Does the chore and waits for the returned time, until the destructor.
+  // Repeats the chore, waiting for the time that it returns, until the destructor.
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
   void PauseWhenSpaceIsLow();
-  void GiveBackSpace();
+  void ReturnFreeSpace();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void ExpireJobs();
   // Adds the paths that could not be read to `unreadable`.
@@ -109,7 +109,7 @@ class Maintenance {
   std::thread reaper_, sweeper_;
 };
 
-// Ends the leases of worker processes that no longer exist (the machine or the server was killed).
+// Ends the leases of worker processes that no longer exist, after a kill of the machine or server.
 void ExpireDeadWorkers(ChoreStore& store);
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// Chores, at a pace that a test can wait for, under clocks that it sets.
+// Chores with short periods and controlled clocks.
 #include "server/maintenance.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ class MaintenanceTest : public JobStoreTest {
     timing.reap = timing.sweep = timing.sweep_again = milliseconds(5);
     return timing;
   }
-  // Chores run until `done` says so.
+  // Runs chores until `done` returns true.
   void RunUntil(const std::function<bool()>& done, const MaintenanceTiming& timing = Quick()) {
     Maintenance chores(
         *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, timing);
@@ -63,7 +63,7 @@ TEST_F(MaintenanceTest, RemovesUnreferencedBlobsByTheSteadyClock) {
   EXPECT_TRUE(fs::exists(blobs_.Fetch(named.sha256)));
 }
 
-// The disk does not list its blobs when it is asked first.
+// The first listing of blobs fails.
 class BusyDiskBlobs : public FileBlobStore {
  public:
   explicit BusyDiskBlobs(const fs::path& folder) : FileBlobStore(folder, {0}) {}
@@ -125,7 +125,7 @@ TEST_F(MaintenanceTest, RebootAddsNoAge) {
   EXPECT_TRUE(fs::exists(blobs_.Fetch(orphan.sha256)));
 }
 
-TEST_F(MaintenanceTest, OldJobsGoWithTheirScenesAndLogs) {
+TEST_F(MaintenanceTest, DeletesOldJobsWithScenesAndLogs) {
   const JobRecord old = (CreateSingle(), ClaimOne());
   Succeed(old);
   std::ofstream(paths_.JobLogs() / (old.name.substr(5) + ".log")) << "it began\n";
@@ -133,7 +133,7 @@ TEST_F(MaintenanceTest, OldJobsGoWithTheirScenesAndLogs) {
   timing.keep_jobs = std::chrono::hours(24 * 30);
   wall_ += int64_t{31} * 24 * 3600 * 1000;
   store_->Pin(old.name, true);
-  const auto a_day = [&] {  // of sweeps, as the steady clock sees it
+  const auto a_day = [&] {  // a day of sweeps by the steady clock
     Maintenance chores(
         *store_, blobs_, uploads_, paths_, [this] { return wall_.load(); }, timing);
     for (int i = 0; i < 25; ++i) {
@@ -144,7 +144,7 @@ TEST_F(MaintenanceTest, OldJobsGoWithTheirScenesAndLogs) {
   a_day();
   EXPECT_EQ(StateOf(old.name), JobState::kSucceeded) << "pinned";
   store_->Pin(old.name, false);
-  RunBriefly();  // one more sweep begins where the last one ended
+  RunBriefly();  // another sweep continues after the last one
   const auto gone = [&] { return ReasonThrown([&] { store_->GetJob(old.name); }); };
   EXPECT_EQ(gone(), "nothing");
   a_day();
@@ -194,7 +194,7 @@ TEST_F(UnreadableMaintenanceTest, ReportsUnreadableFolders) {
   EXPECT_TRUE(blobs_.Look(hidden.sha256).has_value());
 }
 
-TEST_F(MaintenanceTest, BallastIsMadeWhileThereIsRoom) {
+TEST_F(MaintenanceTest, CreatesBallastWhileThereIsRoom) {
   Ballast ballast(paths_.BallastFile(), 1 << 20);
   MaintenanceTiming timing = Quick();
   timing.ballast = &ballast;
@@ -207,7 +207,7 @@ TEST_F(MaintenanceTest, BallastIsMadeWhileThereIsRoom) {
   EXPECT_FALSE(ballast.IsThere()) << "there is no room beyond the reserve";
 }
 
-TEST_F(MaintenanceTest, NoJobIsBegunWhileSpaceIsLow) {
+TEST_F(MaintenanceTest, StartsNoJobWhileSpaceIsLow) {
   CreateSingle();
   MaintenanceTiming timing = Quick();
   timing.low_space_bytes = int64_t{1} << 60;
@@ -218,7 +218,7 @@ TEST_F(MaintenanceTest, NoJobIsBegunWhileSpaceIsLow) {
   EXPECT_TRUE(store_->Claim("w", kLease).has_value());
 }
 
-TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
+TEST_F(MaintenanceTest, SetsDamagedBlobsAside) {
   std::vector<FileDigest> all;
   for (int i = 0; i < 20; ++i) all.push_back(blobs_.PutBytes("blob " + std::to_string(i)));
   const fs::path damaged = blobs_.Fetch(all[7].sha256);
@@ -228,7 +228,7 @@ TEST_F(MaintenanceTest, DamagedBlobsAreSetAside) {
   const auto go_on = [] { return false; };
   std::vector<std::string> found;
   int64_t bytes = 0;
-  for (int round = 0; round < 10; ++round) {  // a few blobs each
+  for (int round = 0; round < 10; ++round) {  // a few blobs per round
     const Scrubber::Result result = scrubber.Scrub(ListBlobs(blobs_, go_on).blobs, 14, go_on);
     EXPECT_LE(result.bytes, 14 + 7);
     bytes += result.bytes;
@@ -244,18 +244,18 @@ class FullStore : public SqliteJobStore {
  public:
   using SqliteJobStore::SqliteJobStore;
   int ReapExpired() override { throw Full(); }
-  std::vector<std::string> ExpireLeasesOf(const std::string&) override { throw Full(); }
+  std::vector<std::string> ExpireLeases(const std::string&) override { throw Full(); }
 
  private:
   static Error Full() { return ServiceError(ErrorReason::kStorageFull, "full"); }
 };
 
-TEST_F(MaintenanceTest, AServerOnAFullDiskLivesAndStarts) {
+TEST_F(MaintenanceTest, ServerRunsAndStartsOnFullDisk) {
   store_->UpdateWorker({"gone", std::numeric_limits<int32_t>::max(), "", 0, 0});
   StoreOptions options;
   options.boot_id = boot_id_;
   FullStore full(File(), StoreRole::kServer, TestClocks(), options);
-  EXPECT_NO_THROW(ExpireDeadWorkers(full)) << "leases run out by themselves";
+  EXPECT_NO_THROW(ExpireDeadWorkers(full)) << "leases expire by themselves";
   std::atomic<int> lives{0};
   MaintenanceTiming timing = Quick();
   timing.on_life = [&] { ++lives; };
@@ -265,8 +265,8 @@ TEST_F(MaintenanceTest, AServerOnAFullDiskLivesAndStarts) {
   EXPECT_GE(lives, 3) << "systemd's watchdog would have ended a server that answers";
 }
 
-// A sweep that hangs keeps no lost job from going on.
-TEST_F(MaintenanceTest, ReapsLeasesDuringASweep) {
+// A hanging sweep does not delay lost jobs.
+TEST_F(MaintenanceTest, ReapsLeasesDuringSweep) {
   class HangingBlobs : public FileBlobStore {
    public:
     using FileBlobStore::FileBlobStore;

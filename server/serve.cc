@@ -47,17 +47,17 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int64_t kFewDescriptors = 4096;
-// Beyond the time in which a worker drains.
+// Added to the time in which a worker drains.
 constexpr double kOrphanSeconds = 10.0;
-// Less is taken by the libraries alone, or by the first photo.
+// The libraries or the first photo alone need this much.
 constexpr int64_t kLeastWorkerMemoryMib = 1024;
 
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000.0));
 }
 
-// MiB that a worker may take: what the options say, else this share of the machine's memory. 0: no
-// limit, where the machine does not tell.
+// Memory limit of a worker, MiB: that of the options, else this share of the machine's memory; 0
+// (no limit) if that is unknown.
 int64_t WorkerMemoryMib(const ServeOptions& options, double share) {
   if (options.worker_memory_mib > 0) return options.worker_memory_mib;
   const int64_t machine = MachineMemoryBytes();
@@ -77,26 +77,26 @@ void CheckOptions(const ServeOptions& options) {
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   for (const std::string& target : options.notify_allow) CheckNotifyTarget(target);
   if (options.notify_allow.empty() == !options.notify_secret.empty()) {
-    throw InvalidArgument("--notify-allow and --notify-secret need each other");
+    throw InvalidArgument("--notify-allow and --notify-secret require each other");
   }
   if (!options.metrics_listen.empty() && !IsLoopback(options.metrics_listen) &&
       !options.insecure_any_address) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "refusing to show metrics on {} to everybody who reaches the port; say "
-                "--metrics-listen 127.0.0.1:PORT, or --insecure-any-address in a network you trust",
+                "refusing to serve metrics on {} without authentication; use --metrics-listen "
+                "127.0.0.1:PORT, or --insecure-any-address in a trusted network",
                 options.metrics_listen);
   }
   if (!options.certificate_roles.empty() && options.tls_client_ca.empty()) {
     throw InvalidArgument(
-        "--certificate-roles needs --tls-client-ca: no client shows a certificate");
+        "--certificate-roles requires --tls-client-ca: clients present no certificates without it");
   }
   if (!options.tls_client_ca.empty() && options.certificate_roles.empty() &&
       options.tokens.empty()) {
     throw Error(
         ErrorCode::kFailedPrecondition,
-        "refusing to let every certificate of {} drain the server and see all projects; say "
-        "who may what with --certificate-roles FILE (lines NAME ROLE [PROJECT]; '* submit' "
-        "for all others), or give --tokens",
+        "refusing to let every certificate of {} drain the server and see all projects; set roles "
+        "with --certificate-roles FILE (lines NAME ROLE [PROJECT]; '* submit' for all others), or "
+        "use --tokens",
         options.tls_client_ca.string());
   }
   const bool is_safe = !options.tls_certificate.empty() &&
@@ -104,10 +104,9 @@ void CheckOptions(const ServeOptions& options) {
   if (!IsLoopback(options.listen) && !is_safe && !options.insecure_any_address) {
     throw Error(
         ErrorCode::kFailedPrecondition,
-        "refusing to listen on {}: anybody who reaches the port could use it, or read along; "
-        "give --tls-cert, --tls-key and --tokens (or --tls-client-ca and --certificate-roles), "
-        "listen on 127.0.0.1, "
-        "or say --insecure-any-address in a network you trust",
+        "refusing to listen on {} without encryption and authentication; use --tls-cert, --tls-key "
+        "and --tokens (or --tls-client-ca and --certificate-roles), listen on 127.0.0.1, or use "
+        "--insecure-any-address in a trusted network",
         options.listen);
   }
 }
@@ -119,7 +118,7 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   if (options.workers > 0 && ::access(setup.program.c_str(), X_OK) != 0) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot find the worker program {}; install color3d-worker beside color3d-server, "
-                "or say --workers 0",
+                "or use --workers 0",
                 setup.program.string());
   }
   setup.workers = options.workers;
@@ -156,14 +155,14 @@ std::map<std::string, BackendState> ProbeForInfo(BackendProber& prober) {
   return states;
 }
 
-// Started at the first ColorizeImages; without its program there is none.
+// Started by the first ColorizeImages call, if its program is installed.
 InferenceLink InferenceSetup(const ServeOptions& options,
                              const UserModels& models,
                              const SocketFolder& sockets,
                              SupervisorOptions* setup) {
   if (::access(setup->program.c_str(), X_OK) != 0) return {};
   sockets.RemoveAll();
-  // A name of its own: a worker that has outlived its server removes its socket when it ends.
+  // Unique, because a worker that has outlived its server removes its socket at its end.
   const std::string socket = "inference-" + fmt::to_string(::getpid());
   const int machine = std::max(1u, std::thread::hardware_concurrency());
   WorkerSettings settings = options.worker;
@@ -218,7 +217,7 @@ ServerSample SampleOf(const ServeOptions& options,
   return sample;
 }
 
-// As a client would find us. While there is no room for it the gate has spoken for itself.
+// Probes like a client. While the gate has no room, it has reported that itself.
 std::string ProbeOwnServer(const RpcServer& server,
                            const TlsFiles& tls,
                            std::chrono::milliseconds limit) {
@@ -294,14 +293,14 @@ void Serve(const ServeOptions& options) {
   };
   RpcServer server(rpc, store, blobs, uploads, clock);
   std::atomic<bool> draining{false};
-  std::string deaf;  // why, once the server does not answer any more
+  std::string deaf;  // reason, once the server does not answer
   SelfProbeTiming probe_timing;
   probe_timing.pause = Milliseconds(options.probe_seconds);
   const auto probe = std::make_unique<SelfProbe>(
       probe_timing,
       [&](std::chrono::milliseconds limit) {
         const std::string why = ProbeOwnServer(server, tls, limit);
-        return draining ? "" : why;  // who drains closes his port, too
+        return draining ? "" : why;  // a draining server closes its port
       },
       [&](const std::string& why) {
         if (draining) return;
@@ -313,8 +312,8 @@ void Serve(const ServeOptions& options) {
   chores.reap = std::clamp(Milliseconds(options.worker.lease_seconds / 10.0),
                            std::chrono::milliseconds(100),
                            std::chrono::milliseconds(5'000));
-  // No sign of life while the store cannot be read, or nobody would be answered: systemd's watchdog
-  // then starts us anew.
+  // No sign of life while the store is unreadable or calls are not answered: the watchdog of
+  // systemd then restarts the server.
   chores.keep_jobs = std::chrono::hours(24) * options.keep_days;
   chores.keep_uncommitted = std::chrono::hours(24) * options.keep_uncommitted_days;
   chores.low_space_bytes = options.low_space_mib << 20;

@@ -1,5 +1,5 @@
-// The real server beside those who open connections and do not use them: it goes on to answer
-// others, and when it cannot, it says so and ends.
+// The real server with clients that open connections without using them: it still answers others,
+// and reports and ends if it cannot.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -25,10 +25,10 @@ using std::chrono::steady_clock;
 
 constexpr int kIdle = 1'100;
 constexpr rlim_t kFewDescriptors = 1'024;
-// HTTP/2: the client's preface and empty settings.
+// HTTP/2 client preface and empty settings.
 constexpr std::string_view kPreface("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0", 33);
 
-// Connections that say so much and then nothing.
+// Connections that send this and then nothing.
 class IdleConnections {
  public:
   IdleConnections(const std::string& server, int count, std::string_view words) {
@@ -54,7 +54,7 @@ class IdleConnections {
       EXPECT_GE(fd, 0) << "this process needs more descriptors: ulimit -n";
       EXPECT_EQ(::connect(fd, reinterpret_cast<sockaddr*>(&address), size), 0)
           << std::strerror(errno);
-      // Some are closed by then.
+      // Some are already closed.
       [[maybe_unused]] const ssize_t sent =
           ::send(fd, words.data(), words.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
       sockets_.push_back(fd);
@@ -76,7 +76,7 @@ std::shared_ptr<grpc::Channel> OwnConnection(const std::string& address) {
   return grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
 }
 
-// How long somebody who comes now waits for an answer.
+// Returns the time until a new client is answered.
 milliseconds NewClientLatency(const std::string& address) {
   const auto start = steady_clock::now();
   TestClient client(OwnConnection(address));
@@ -102,22 +102,22 @@ class ConnectionsTest : public ::testing::Test {
   const ScratchFolder scratch_;
 };
 
-TEST_F(ConnectionsTest, ThoseThatSendNothing) {
+TEST_F(ConnectionsTest, ServesOthersBesideSilentOnes) {
   ServerProcess few(scratch_.path(), {}, 1, kFewDescriptors);
   Attack(few, "");
 }
 
-TEST_F(ConnectionsTest, ThoseThatSendNothingToAServerWithManyDescriptors) {
+TEST_F(ConnectionsTest, ServesOthersBesideSilentOnesWithManyDescriptors) {
   ServerProcess server(scratch_.path(), {});
   Attack(server, "");
 }
 
-TEST_F(ConnectionsTest, ThoseThatSendOneByte) {
+TEST_F(ConnectionsTest, ServesOthersBesideThoseThatSentOneByte) {
   ServerProcess few(scratch_.path(), {}, 1, kFewDescriptors);
   Attack(few, "P");
 }
 
-TEST_F(ConnectionsTest, ThoseThatSendNothingToAUnixSocket) {
+TEST_F(ConnectionsTest, ServesOthersBesideSilentOnesOnUnixSocket) {
   ServerProcess few(scratch_.path(),
                     {"--listen", "unix:" + (scratch_.path() / "s").string()},
                     1,
@@ -125,8 +125,8 @@ TEST_F(ConnectionsTest, ThoseThatSendNothingToAUnixSocket) {
   Attack(few, "");
 }
 
-// They are clients by all appearances; the one with a call stays.
-TEST_F(ConnectionsTest, ThoseThatSpeakHttpAndMakeNoCall) {
+// These look like clients; the one with a call stays open.
+TEST_F(ConnectionsTest, ServesOthersBesideHttpConnectionsWithoutCalls) {
   ServerProcess few(scratch_.path(), {}, 1, kFewDescriptors);
   TestClient watcher(OwnConnection(few.address()));
   const std::string job =
@@ -147,7 +147,7 @@ TEST_F(ConnectionsTest, ThoseThatSpeakHttpAndMakeNoCall) {
   EXPECT_EQ(last, v1::Job::STATE_SUCCEEDED);
 }
 
-TEST_F(ConnectionsTest, AServerThatNobodyReachesSaysSoAndEnds) {
+TEST_F(ConnectionsTest, UnreachableServerReportsAndEnds) {
   const fs::path socket = scratch_.path() / "s";
   ::testing::internal::CaptureStderr();
   ServerProcess server(scratch_.path(),
@@ -161,7 +161,7 @@ TEST_F(ConnectionsTest, AServerThatNobodyReachesSaysSoAndEnds) {
   EXPECT_THAT(said, ::testing::HasSubstr("nobody was answered on unix:" + socket.string()));
 }
 
-TEST_F(ConnectionsTest, ASecondServerDoesNotTakeTheSocketOver) {
+TEST_F(ConnectionsTest, SecondServerDoesNotTakeOverSocket) {
   const std::string address = "unix:" + (scratch_.path() / "s").string();
   const fs::path other = scratch_.path() / "other";
   fs::create_directory(other);
@@ -172,7 +172,7 @@ TEST_F(ConnectionsTest, ASecondServerDoesNotTakeTheSocketOver) {
   EXPECT_THAT(::testing::internal::GetCapturedStderr(),
               ::testing::HasSubstr("another server listens there"));
   EXPECT_LT(NewClientLatency(address), milliseconds(1'000));
-  // One that was killed leaves its socket, which the next one replaces.
+  // A killed server leaves its socket, which the next one replaces.
   first.Signal(SIGKILL);
   first.Wait();
   ServerProcess third(other, {"--listen", address}, 0);

@@ -1,5 +1,5 @@
-// A server that is told to end in the middle of everything, and the next one on its folder: clients
-// of the library notice nothing but a pause.
+// A server is drained under load and another one starts on its folder: clients of the library
+// notice only a pause.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -28,9 +28,9 @@ using testing::TestClient;
 
 constexpr int kWatchers = 50;
 constexpr int kSteps = 60;
-constexpr size_t kUploadBytes = 4 << 20;  // eight pieces
+constexpr size_t kUploadBytes = 4 << 20;  // eight chunks
 
-// Blocks an upload after its first piece until it is let go on.
+// Blocks an upload after its first chunk until it is released.
 class Gate {
  public:
   void Arrive() {
@@ -103,7 +103,7 @@ class DrainTest : public ::testing::Test {
   std::vector<std::thread> threads_;
 };
 
-TEST_F(DrainTest, WatchersUploadsAndJobsGoOnWithTheNextServer) {
+TEST_F(DrainTest, WatchesUploadsAndJobsContinueWithNextServer) {
   auto server = Start();
   Connection watching({.address = listen_}, never_), uploading({.address = listen_}, never_);
   const std::string script = "ms=50,steps=" + std::to_string(kSteps);

@@ -42,7 +42,7 @@ struct LiveStream {
     EXPECT_TRUE(stream->Read(&response)) << "the stream ended";
     return response;
   }
-  // Until `count` answers are here.
+  // Reads until `count` answers have arrived.
   std::map<std::string, Response> ReadAll(int count) {
     std::map<std::string, Response> answers;
     for (int i = 0; i < count; ++i) {
@@ -79,7 +79,7 @@ class LiveProcessTest : public ::testing::Test {
     *request.mutable_example() = client().Upload("example");
     return request;
   }
-  // A scene that has been personalized; the blob's digest is what its scripted answers begin with.
+  // A personalized scene; its scripted answers begin with the digest of the blob.
   v1::Colorizer MakeColorizer() {
     v1::JobSpec spec;
     spec.set_scene(client().MakeScene().name());
@@ -105,7 +105,7 @@ class LiveProcessTest : public ::testing::Test {
   std::unique_ptr<ServerProcess> server_;
 };
 
-TEST_F(LiveProcessTest, MixedScenesInOneStreamGetTheirOwnColors) {
+TEST_F(LiveProcessTest, ScenesInOneStreamGetTheirOwnColors) {
   Start();
   const v1::Colorizer first = MakeColorizer(), second = MakeColorizer();
   ASSERT_NE(first.scene(), second.scene());
@@ -134,7 +134,7 @@ TEST_F(LiveProcessTest, MixedScenesInOneStreamGetTheirOwnColors) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, WhatIsWrongWithOnePictureIsToldAndTheStreamGoesOn) {
+TEST_F(LiveProcessTest, BadPictureGetsErrorAndStreamContinues) {
   Start();
   const std::string bare = client().MakeScene().name();
   const v1::Colorizer made = MakeColorizer();
@@ -184,7 +184,7 @@ TEST_F(LiveProcessTest, WhatIsWrongWithOnePictureIsToldAndTheStreamGoesOn) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, PicturesOfAKilledWorkerFailAtOnceAndTheNextIsColored) {
+TEST_F(LiveProcessTest, PicturesOfKilledWorkerFailAndNextIsColored) {
   Start();
   LiveStream live(client());
   const Request example = Example();
@@ -211,7 +211,7 @@ TEST_F(LiveProcessTest, PicturesOfAKilledWorkerFailAtOnceAndTheNextIsColored) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, APictureThatKillsTheWorkerIsNotSentToTheNextOne) {
+TEST_F(LiveProcessTest, PictureThatKilledWorkerIsNotSentAgain) {
   Start();
   LiveStream live(client());
   live.Send(Example(), "poison", "crash");
@@ -223,8 +223,8 @@ TEST_F(LiveProcessTest, APictureThatKillsTheWorkerIsNotSentToTheNextOne) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-// A client that sends what was lost again, as it is told to.
-TEST_F(LiveProcessTest, APictureThatKillsWorkersIsFoundAndTakesNoOtherWithItAgain) {
+// A client that resends lost pictures as requested.
+TEST_F(LiveProcessTest, PictureThatKillsWorkersIsIsolated) {
   Start();
   LiveStream live(client());
   const Request example = Example();
@@ -253,9 +253,9 @@ TEST_F(LiveProcessTest, APictureThatKillsWorkersIsFoundAndTakesNoOtherWithItAgai
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, ASlowReaderHoldsBoundedMemoryAndLosesNothing) {
+TEST_F(LiveProcessTest, SlowReaderUsesBoundedMemoryAndLosesNothing) {
   Start();
-  constexpr int kPictures = 150;  // of 1 MiB each when coloured
+  constexpr int kPictures = 150;  // coloured, 1 MiB each
   LiveStream live(client());
   const Request example = Example();
   live.Send(example, "warm", "x");
@@ -283,7 +283,7 @@ TEST_F(LiveProcessTest, ASlowReaderHoldsBoundedMemoryAndLosesNothing) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, CancelledAndLateStreamsLeaveRoomForOthers) {
+TEST_F(LiveProcessTest, CancelledAndLateStreamsReleaseTheirPlaces) {
   Start();
   const Request example = Example();
   LiveStream late(client(), std::chrono::milliseconds(700));
@@ -302,7 +302,7 @@ TEST_F(LiveProcessTest, CancelledAndLateStreamsLeaveRoomForOthers) {
   EXPECT_TRUE(live.Close().ok());
 }
 
-TEST_F(LiveProcessTest, DrainAnswersWhatIsUnderWayAndLeavesNoProcess) {
+TEST_F(LiveProcessTest, DrainAnswersPendingPicturesAndEndsWorker) {
   Start();
   LiveStream live(client()), quiet(client());
   const Request example = Example();
@@ -328,7 +328,7 @@ TEST_F(LiveProcessTest, DrainAnswersWhatIsUnderWayAndLeavesNoProcess) {
   EXPECT_FALSE(IsAlive(worker));
 }
 
-TEST_F(LiveProcessTest, TheWorkerEndsWithAKilledServerAndTheNextServerHasItsOwn) {
+TEST_F(LiveProcessTest, WorkerEndsWithKilledServer) {
   Start();
   {
     LiveStream live(client());
@@ -347,8 +347,8 @@ TEST_F(LiveProcessTest, TheWorkerEndsWithAKilledServerAndTheNextServerHasItsOwn)
   EXPECT_FALSE(live.Read().image().empty()) << "the old worker took the new one's socket away";
 }
 
-// A Unix socket's path has at most 107 bytes.
-TEST_F(LiveProcessTest, ALongPathOfTheDataFolderIsNoHindrance) {
+// The path of a Unix socket has at most 107 bytes.
+TEST_F(LiveProcessTest, AcceptsLongPathOfDataFolder) {
   Start({}, std::string(120, 'd') + "/" + std::string(120, 'e'));
   LiveStream live(client());
   live.Send(Example(), "x", "x");
@@ -357,7 +357,7 @@ TEST_F(LiveProcessTest, ALongPathOfTheDataFolderIsNoHindrance) {
   EXPECT_EQ(fs::status(folder / "data" / "sockets").permissions(), fs::perms::owner_all);
 }
 
-TEST_F(LiveProcessTest, NoWorkerIsStartedUntilSomebodyAsks) {
+TEST_F(LiveProcessTest, StartsWorkerAtFirstRequest) {
   Start();
   SleepMs(500);
   EXPECT_TRUE(server_->Workers(/*inference=*/true).empty());

@@ -1,5 +1,5 @@
-// What a server, its workers and its metrics write down at the most talkative level holds neither
-// tokens nor keys, whatever calls bring.
+// Output of a server, its workers and its metrics at the most verbose level contains neither tokens
+// nor keys, for any calls.
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ using testing::ServerProcess;
 constexpr char kKey[] = "c2VjcmV0IGtleSBvZiB0aGUgd2ViaG9va3MgaGVyZQ==";
 constexpr char kWrongToken[] = "wrong-token-0123456789abcdef";
 
-// Of this process and of those that it starts, while it lives.
+// Standard error of this process and of started ones, during its lifetime.
 class StderrTo {
  public:
   explicit StderrTo(const fs::path& file) : before_(::dup(2)) {
@@ -60,7 +60,7 @@ class SecretsTest : public ::testing::Test {
   const ScratchFolder scratch_;
 };
 
-TEST_F(SecretsTest, NoLogHoldsATokenOrAKey) {
+TEST_F(SecretsTest, LogsContainNoTokensOrKeys) {
   const fs::path tokens = scratch_.path() / "tokens", key = scratch_.path() / "notify.key";
   const std::string token = AddToken(tokens, "anna", Role::kSubmit);
   const std::string reader = AddToken(tokens, "bert", Role::kRead);

@@ -1,5 +1,5 @@
-// The real server and its workers as processes: what signals do to them, what they inherit, and
-// what becomes of those that are left behind.
+// The real server and its workers as processes: signals, inherited environment, and orphaned
+// processes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -24,7 +24,7 @@ using ::testing::Not;
 
 class SignalsTest : public ::testing::Test {
  protected:
-  // A job that runs, of so many steps of 50 ms.
+  // Starts a job of this number of steps of 50 ms.
   static std::string Begin(TestClient& client, int steps) {
     const std::string job =
         client
@@ -36,8 +36,8 @@ class SignalsTest : public ::testing::Test {
   const ScratchFolder scratch_;
 };
 
-// Ctrl-\\, a container that is shut down, a limit of processor time: all of them drain.
-TEST_F(SignalsTest, WhateverEndsTheServerDrainsIt) {
+// Ctrl-\\, shutdown of a container, limit of CPU time: all drain.
+TEST_F(SignalsTest, DrainsOnEverySignalToEnd) {
   for (const int signal : {SIGQUIT, SIGPWR, SIGXCPU}) {
     SCOPED_TRACE(::strsignal(signal));
     const fs::path folder = scratch_.path() / std::to_string(signal);
@@ -56,7 +56,7 @@ TEST_F(SignalsTest, WhateverEndsTheServerDrainsIt) {
   }
 }
 
-TEST_F(SignalsTest, WhatIsMeantForOthersDoesNothing) {
+TEST_F(SignalsTest, IgnoresSignalsMeantForOthers) {
   ServerProcess server(scratch_.path(), {});
   const std::string job = Begin(server.client(), 10);
   const pid_t worker = server.Workers().at(0);
@@ -70,7 +70,7 @@ TEST_F(SignalsTest, WhatIsMeantForOthersDoesNothing) {
   EXPECT_FALSE(server.HasEnded());
 }
 
-TEST_F(SignalsTest, AWorkerThatIsHungUpSavesAndIsStartedAfresh) {
+TEST_F(SignalsTest, WorkerSavesAndRestartsOnHangUp) {
   ServerProcess server(scratch_.path(), {});
   const std::string job = Begin(server.client(), 60);
   for (const int signal : {SIGHUP, SIGQUIT}) {
@@ -89,7 +89,7 @@ TEST_F(SignalsTest, AWorkerThatIsHungUpSavesAndIsStartedAfresh) {
   EXPECT_EQ(server.client().Get(job).attempt(), 1) << "the attempt was counted as lost";
 }
 
-// They decode strangers' files.
+// Workers decode untrusted files.
 TEST_F(SignalsTest, WorkersInheritNoSecrets) {
   for (const char* name : {"COLOR3D_TOKEN", "AWS_SECRET_ACCESS_KEY", "DATABASE_URL"}) {
     ::setenv(name, "top-secret", 1);
@@ -109,8 +109,8 @@ TEST_F(SignalsTest, WorkersInheritNoSecrets) {
   EXPECT_THAT(seen, Not(HasSubstr("top-secret")));
 }
 
-// Nobody else would: what it is told waits until it moves.
-TEST_F(SignalsTest, AFrozenWorkerOfAServerThatWasKilledIsEndedByTheNext) {
+// Signals to a frozen worker wait until it is resumed.
+TEST_F(SignalsTest, NextServerEndsFrozenWorkerOfKilledOne) {
   pid_t frozen = 0;
   std::string job;
   {
@@ -127,7 +127,7 @@ TEST_F(SignalsTest, AFrozenWorkerOfAServerThatWasKilledIsEndedByTheNext) {
   EXPECT_EQ(next.client().WaitFinished(job).state(), v1::Job::STATE_SUCCEEDED);
 }
 
-// Living ones and those that nobody waited for.
+// Living processes and zombies.
 int ProcessesNamed(const std::string& name) {
   int count = 0;
   std::error_code error;
@@ -139,8 +139,8 @@ int ProcessesNamed(const std::string& name) {
   return count;
 }
 
-// As the first process of a container the server inherits whatever has lost its parent.
-TEST_F(SignalsTest, AsFirstProcessItReapsWhatIsLeftBehind) {
+// As the first process of a container, the server inherits orphaned processes.
+TEST_F(SignalsTest, ReapsOrphansAsFirstProcess) {
   const std::string name = "nap" + std::to_string(::getpid());
   const fs::path nap = scratch_.path() / name;
   fs::copy_file("/bin/sleep", nap);
@@ -168,7 +168,7 @@ TEST_F(SignalsTest, AsFirstProcessItReapsWhatIsLeftBehind) {
       << "nobody waited for it";
 }
 
-TEST_F(SignalsTest, CertificatesWithoutRolesAreRefusedAtTheStart) {
+TEST_F(SignalsTest, RefusesClientCaWithoutRolesAtStart) {
   TestAuthority ours(scratch_.path(), "ours");
   const CertificateFiles own = ours.Issue("server");
   const std::vector<std::string> tls = {

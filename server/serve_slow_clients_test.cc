@@ -1,5 +1,5 @@
-// Clients that open all that they may and read nothing, or send more than is worked on: the server
-// keeps a bounded amount for them in sum, and answers the others.
+// Clients that open all allowed streams and read nothing, or send more than is processed: the
+// server uses bounded memory for them in sum, and answers others.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -21,18 +21,18 @@ constexpr int kConnections = 8;
 
 class SlowClientsTest : public ::testing::Test {
  protected:
-  // Connections of their own, unlike channels that gRPC makes by itself.
+  // Separate connections, unlike default channels of gRPC.
   SlowClientsTest() {
     for (int i = 0; i < kConnections; ++i) {
       grpc::ChannelArguments arguments;
       arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
-      // What is not read stays with the server.
+      // Unread data stays with the server.
       arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
       arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, 64 << 10);
       connections_.emplace_back(grpc::CreateCustomChannel(
           server_.address(), grpc::InsecureChannelCredentials(), arguments));
     }
-    good_.MakeScene();  // once through everything
+    good_.MakeScene();  // uses each call once
     before_mib_ = PeakMib();
   }
   ~SlowClientsTest() override {
@@ -42,7 +42,7 @@ class SlowClientsTest : public ::testing::Test {
   double PeakMib() const { return SizesOf({server_.pid()}).peak_mib; }
   double GrowthMib() const { return PeakMib() - before_mib_; }
   TestClient& Connection(int i) { return connections_[static_cast<size_t>(i) % kConnections]; }
-  // Of a scene with so many files, which is as much of an answer, some 90 bytes a file.
+  // A scene with this number of files; its answer has about 90 bytes per file.
   v1::CreateSceneRequest BigScene(int files) {
     v1::CreateSceneRequest request;
     for (int i = 0; i < files; ++i) {
@@ -52,7 +52,7 @@ class SlowClientsTest : public ::testing::Test {
     }
     return request;
   }
-  // Once again after a connection that gRPC ended, as clients do.
+  // Retried after a connection that gRPC closed, like clients do.
   void Try(const std::string& content) {
     for (int tries = 0; tries < 3; ++tries) {
       try {
@@ -64,7 +64,7 @@ class SlowClientsTest : public ::testing::Test {
     }
     ADD_FAILURE() << "three times in vain";
   }
-  // How long the slowest of a few calls of a client that reads took.
+  // Returns the duration of the slowest of a few calls of a normal client.
   milliseconds SlowestOfOthers() {
     milliseconds slowest(0);
     for (int i = 0; i < 20; ++i) {
@@ -84,7 +84,7 @@ class SlowClientsTest : public ::testing::Test {
   double before_mib_ = 0.0;
 };
 
-TEST_F(SlowClientsTest, StreamsThatNobodyReads) {
+TEST_F(SlowClientsTest, BoundsMemoryOfUnreadStreams) {
   constexpr int kWatches = 900, kDownloads = 240;
   const v1::Digest blob = good_.Upload(std::string(2 << 20, 'b'));
   const std::string job = good_.Create(ScriptedSpec(good_.MakeScene().name(), "steps=1")).name();
@@ -107,8 +107,8 @@ TEST_F(SlowClientsTest, StreamsThatNobodyReads) {
   EXPECT_LT(GrowthMib(), 300.0);
 }
 
-// More uploads than may be open, each with the largest message that gRPC takes.
-TEST_F(SlowClientsTest, UploadsThatNobodyWants) {
+// More uploads than allowed, each with the largest message that gRPC accepts.
+TEST_F(SlowClientsTest, BoundsMemoryOfRefusedUploads) {
   constexpr int kThreads = 24, kUploads = 20;
   google::bytestream::WriteRequest request;
   request.set_resource_name("uploads/u/blobs/" + DigestOf("x").sha256() + "/100000000");
@@ -135,7 +135,7 @@ TEST_F(SlowClientsTest, UploadsThatNobodyWants) {
   EXPECT_LT(GrowthMib(), 800.0) << "of 7,200 that were sent";
 }
 
-TEST_F(SlowClientsTest, AnswersThatNobodyReads) {
+TEST_F(SlowClientsTest, BoundsMemoryOfUnreadAnswers) {
   constexpr int kCalls = 800, kFiles = 8'000;
   v1::Scene scene;
   grpc::ClientContext context;
@@ -151,7 +151,7 @@ TEST_F(SlowClientsTest, AnswersThatNobodyReads) {
     calls.push_back(
         Connection(i).scenes->PrepareAsyncGetScene(&contexts_.emplace_back(), request, &queue));
     calls.back()->StartCall();
-    calls.back()->ReadInitialMetadata(nullptr);  // asks, and never takes the answer
+    calls.back()->ReadInitialMetadata(nullptr);  // requests, but does not read the answer
   }
   void* tag = nullptr;
   bool ok = false;
@@ -163,10 +163,10 @@ TEST_F(SlowClientsTest, AnswersThatNobodyReads) {
   }
   EXPECT_LT(SlowestOfOthers(), milliseconds(2'000));
   EXPECT_LT(GrowthMib(), 700.0);
-  // Who reads may ask for the same.
+  // Clients that read may make the same calls.
   grpc::ClientContext other;
   EXPECT_TRUE(good_.scenes->GetScene(&other, request, &scene).ok());
-  // What was refused says so.
+  // Refused calls report it.
   int refused = 0;
   std::deque<grpc::Status> statuses(kCalls);
   std::deque<v1::Scene> answers(kCalls);
@@ -187,10 +187,10 @@ TEST_F(SlowClientsTest, AnswersThatNobodyReads) {
   }
 }
 
-TEST_F(SlowClientsTest, MoreRequestsThanAreWorkedOn) {
+TEST_F(SlowClientsTest, BoundsMemoryOfWaitingRequests) {
   constexpr int kCalls = 96;
   v1::CreateSceneRequest request = BigScene(10);
-  request.set_display_name(std::string(15 << 20, 'n'));  // refused, once it is read
+  request.set_display_name(std::string(15 << 20, 'n'));  // refused after it was read
   std::atomic<int> invalid{0}, others{0};
   std::vector<std::jthread> threads;
   for (int i = 0; i < kCalls; ++i) {

@@ -41,7 +41,7 @@ class ProcessTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(ProcessTest, WholeGraphThenTheSameFromTheCache) {
+TEST_F(ProcessTest, RunsWholeGraphThenAnswersFromCache) {
   ServerProcess server(scratch_.path(), {}, 2);
   TestClient& client = server.client();
   v1::JobSpec spec;
@@ -68,7 +68,7 @@ TEST_F(ProcessTest, WholeGraphThenTheSameFromTheCache) {
   EXPECT_TRUE(fs::is_empty(left_over));
 }
 
-TEST_F(ProcessTest, FailuresAreReportedWithTheirReason) {
+TEST_F(ProcessTest, ReportsFailuresWithReason) {
   ServerProcess server(scratch_.path(), {"--stuck-seconds", "1", "--stop-grace-seconds", "0.5"});
   TestClient& client = server.client();
   const std::string scene = client.MakeScene().name();
@@ -95,8 +95,8 @@ TEST_F(ProcessTest, FailuresAreReportedWithTheirReason) {
   EXPECT_EQ(run("steps=1").state(), v1::Job::STATE_SUCCEEDED) << "the service lives on";
 }
 
-// A name says nothing of what it stands for.
-TEST_F(ProcessTest, OtherWeightsUnderTheSameNameAreOtherWork) {
+// The name of a model does not identify its weights.
+TEST_F(ProcessTest, NewWeightsUnderSameNameMissTheCache) {
   const fs::path weights = scratch_.path() / "weights";
   WriteFileAtomic(weights, "first");
   ServerProcess server(scratch_.path(), {"--model", "mine=" + weights.string()});
@@ -118,10 +118,10 @@ TEST_F(ProcessTest, OtherWeightsUnderTheSameNameAreOtherWork) {
   fs::remove(weights);
   const v1::Job job = client.WaitFinished(client.Create(spec).name());
   EXPECT_EQ(job.state(), v1::Job::STATE_FAILED);
-  EXPECT_THAT(job.error().message(), HasSubstr("put it back"));
+  EXPECT_THAT(job.error().message(), HasSubstr("restore it"));
 }
 
-TEST_F(ProcessTest, WeightsReplacedUnderARunningJobAreNoticed) {
+TEST_F(ProcessTest, NoticesWeightsReplacedDuringJob) {
   const fs::path weights = scratch_.path() / "weights";
   WriteFileAtomic(weights, "first");
   ServerProcess server(scratch_.path(), {"--model", "mine=" + weights.string()});
@@ -136,7 +136,7 @@ TEST_F(ProcessTest, WeightsReplacedUnderARunningJobAreNoticed) {
   EXPECT_EQ(job.attempt(), 2) << "what was begun with the old weights was published";
 }
 
-TEST_F(ProcessTest, ModelsAreListedAndUnknownOnesRefused) {
+TEST_F(ProcessTest, ListsModelsAndRefusesUnknownOnes) {
   const fs::path weights = scratch_.path() / "weights";
   WriteFileAtomic(weights, "........{\"visual.conv1.weight\":");
   ServerProcess server(scratch_.path(),
@@ -162,7 +162,7 @@ TEST_F(ProcessTest, ModelsAreListedAndUnknownOnesRefused) {
   }
 }
 
-TEST_F(ProcessTest, RunningJobIsCancelledSoon) {
+TEST_F(ProcessTest, CancelsRunningJobSoon) {
   ServerProcess server(scratch_.path(), {});
   TestClient& client = server.client();
   const std::string name =
@@ -179,7 +179,7 @@ TEST_F(ProcessTest, RunningJobIsCancelledSoon) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(3));
 }
 
-TEST_F(ProcessTest, TerminationReleasesTheJobAndTheNextServerGoesOn) {
+TEST_F(ProcessTest, TerminatedServerReleasesJobToNextOne) {
   std::string name;
   int64_t steps_before = 0;
   {
@@ -195,8 +195,7 @@ TEST_F(ProcessTest, TerminationReleasesTheJobAndTheNextServerGoesOn) {
   }
   {
     SqliteDatabase db(scratch_.path() / "data" / "jobs.db", SqliteAccess::kWrite);
-    SqliteStatement job(db.handle(), "select state, attempt from job where name=?");
-    job.Bind(name);
+    SqliteStatement job(db, "select state, attempt from job where name=?", name);
     ASSERT_TRUE(job.Step());
     EXPECT_EQ(job.Text(0), "QUEUED");
     EXPECT_EQ(job.Int(1), 0) << "a drain does not count";
@@ -223,7 +222,7 @@ TEST_F(ProcessTest, SecondSignalEndsAtOnce) {
   EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(2));
 }
 
-TEST_F(ProcessTest, KilledServerTakesItsWorkersAlongAndLosesNothing) {
+TEST_F(ProcessTest, WorkersEndWithKilledServerAndNothingIsLost) {
   std::string name;
   std::vector<pid_t> workers;
   {
@@ -259,9 +258,9 @@ TEST_F(ProcessTest, IdleServerIsSmall) {
   EXPECT_GT(info.memory_bytes(), int64_t{1} << 20);
 }
 
-// Stops the process at a moment when it does not hold the store's write lock.
+// Stops the process while it does not hold the write lock of the store.
 void StopOutsideTransaction(TestClient& client, pid_t pid) {
-  v1::CancelJobRequest probe;  // begins a write, then finds no such job
+  v1::CancelJobRequest probe;  // starts a write, then finds no such job
   probe.set_name("jobs/none");
   for (int i = 0; i < 50; ++i) {
     ::kill(pid, SIGSTOP);
@@ -276,9 +275,9 @@ void StopOutsideTransaction(TestClient& client, pid_t pid) {
   FAIL() << "the worker always holds the lock";
 }
 
-// The sharpest case for the fence: the owner sleeps past its lease, an idle worker takes the job
-// over and is well ahead when the old owner wakes up in the middle of a step.
-TEST_F(ProcessTest, ZombieThatWakesUpChangesNothing) {
+// Hardest case of the fence: the owner sleeps past its lease, and resumes in the middle of a step
+// while another worker has taken the job over.
+TEST_F(ProcessTest, ThawedZombieChangesNothing) {
   const fs::path effects = scratch_.path() / "effects";
   ::setenv("COLOR3D_TEST_EFFECTS", effects.c_str(), 1);
   ServerProcess server(scratch_.path(), {}, 2);
@@ -309,7 +308,7 @@ TEST_F(ProcessTest, ZombieThatWakesUpChangesNothing) {
       << "negative control: what is not fenced does repeat";
 }
 
-// Found by the chaos test: a process that is stopped inside a transaction blocks the whole store.
+// Found by the chaos test: a process stopped inside a transaction blocks the whole store.
 TEST_F(ProcessTest, FrozenWorkerIsKilled) {
   ServerProcess server(scratch_.path(), {}, 1);
   TestClient& client = server.client();
@@ -320,8 +319,8 @@ TEST_F(ProcessTest, FrozenWorkerIsKilled) {
   EXPECT_EQ(client.WaitFinished(name).state(), v1::Job::STATE_SUCCEEDED);
 }
 
-// One worker that stops in the middle of a write must not cost the others their attempts.
-TEST_F(ProcessTest, WorkerThatFreezesInsideAWriteCostsNobodyElseAnAttempt) {
+// A worker that stops in the middle of a write must not cost others their attempts.
+TEST_F(ProcessTest, WorkerFrozenInWriteCostsOthersNoAttempt) {
   ServerProcess server(scratch_.path(), {"--lease-seconds", "6", "--heartbeat-seconds", "1"}, 2);
   TestClient& client = server.client();
   const std::string scene = client.MakeScene().name();
@@ -329,7 +328,7 @@ TEST_F(ProcessTest, WorkerThatFreezesInsideAWriteCostsNobodyElseAnAttempt) {
   WaitForStep(client, healthy, 2);
   const std::string freezing =
       client.Create(ScriptedSpec(scene, "freeze_writing,steps=2", 2)).name();
-  // Reads are answered all the while.
+  // Reads are still answered.
   for (int i = 0; i < 20; ++i) {
     const auto start = std::chrono::steady_clock::now();
     client.Get(healthy);
@@ -342,8 +341,8 @@ TEST_F(ProcessTest, WorkerThatFreezesInsideAWriteCostsNobodyElseAnAttempt) {
   EXPECT_EQ(client.WaitFinished(freezing).state(), v1::Job::STATE_SUCCEEDED);
 }
 
-// The service manager, the server and the kernel may each tell a worker to end.
-TEST_F(ProcessTest, WorkersDrainHoweverOftenTheyAreTold) {
+// The service manager, the server and the kernel may each terminate a worker.
+TEST_F(ProcessTest, WorkersDrainOnRepeatedSignals) {
   ServerProcess server(scratch_.path(), {});
   TestClient& client = server.client();
   const std::string name =

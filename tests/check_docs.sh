@@ -2,11 +2,11 @@
 # Checks that documents agree with the sources. Fails on
 #   - a relative link in a *.md to a file or heading that does not exist;
 #   - a `path/of/a.source`, a `CamelCase`, `snake_case` or `CAPITAL_CASE` name or a `--flag` in code quotes
-#     that the sources do not have (not in CHANGELOG.md, which tells of old names, too);
+#     that the sources do not have (except in CHANGELOG.md, which has old names);
 #   - a comment that cites a document, or a section of one, that does not exist: STILL.md "Stage 1a"
-#     means a heading that begins like that in the one STILL.md of the repository;
+#     means a heading that begins with these words in the STILL.md of the repository;
 #   - a README.md of more than 1200 words, or a tests/bench/RESULTS.md of more than 200 lines.
-# Names of other projects' things stand in the list below.
+# Flags and names of other projects are listed below.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -51,7 +51,7 @@ function normal(path,    parts, kept, n, i, out, depth) {
   for (i = 1; i <= depth; ++i) out = out (i > 1 ? "/" : "") kept[i]
   return out
 }
-# As GitHub makes anchors of headings.
+# The anchor that GitHub gives a heading.
 function anchor(heading) {
   heading = tolower(heading)
   gsub(/[^a-z0-9 _-]/, "", heading)
@@ -72,7 +72,7 @@ function check_link(target, line,    hash, path, name) {
   path = hash ? substr(target, 1, hash - 1) : target
   path = path == "" ? FILENAME : normal(folder(FILENAME) path)
   if (path != "" && !(path in exists)) {
-    complain(line, "the link " target " leads nowhere")
+    complain(line, "the target of the link " target " does not exist")
   } else if (name != "" && path ~ /\.md$/ && !((path, name) in anchors)) {
     complain(line, path " has no heading #" name)
   }
@@ -117,7 +117,7 @@ function check_text(text, line,    rest, target, at) {
     rest = substr(rest, RSTART + RLENGTH)
     check_link(target, line)
   }
-  # Code quotes may go on in the next line.
+  # Code quotes may continue in the next line.
   while ((at = index(text, "`")) > 0) {
     if (in_code) check_code(code substr(text, 1, at - 1), line)
     code = ""
@@ -127,7 +127,7 @@ function check_text(text, line,    rest, target, at) {
   if (in_code) code = code text " "
 }
 
-# The document that a comment in `source` means by `name`; empty: none.
+# The document that a comment in `source` cites as `name`; empty: none.
 function cited(name, source) {
   if (name in exists) return name
   if (normal(folder(source) name) in exists) return normal(folder(source) name)
@@ -146,7 +146,7 @@ function check_comment(source, line, text,    name, document, section, problem) 
     problem = ""
     if (name !~ /\.md$/) {
       gsub(/[^A-Z]/, "", name)
-      if (name != "README") problem = "cites " name ", which is no document of the repository"
+      if (name != "README") problem = "cites " name ", which is not a document of the repository"
       name = "README.md"
     }
     document = cited(name, source)
@@ -156,7 +156,7 @@ function check_comment(source, line, text,    name, document, section, problem) 
       text = substr(text, RSTART + RLENGTH)
       sub(/^[^"]*"/, "", section)
       sub(/"$/, "", section)
-      if (!has_section(document, section)) problem = "cites \"" section "\", which " document " has not"
+      if (!has_section(document, section)) problem = "cites \"" section "\", which is not a section of " document
     }
     if (problem == "") continue
     printf "check_docs: %s:%d: the comment %s\n", source, line, problem > "/dev/stderr"
@@ -216,7 +216,7 @@ pass == "comments" {
 END { end_comment(); exit bad }
 AWK
 
-# README.md is read in one go, RESULTS.md is a table: longer texts belong elsewhere.
+# README.md and RESULTS.md stay short: longer texts belong elsewhere.
 words=$(wc -w <README.md)
 lines=$(wc -l <tests/bench/RESULTS.md)
 if [ "$words" -gt 1200 ] || [ "$lines" -gt 200 ]; then

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Every C++ source has the shape that clang-format gives it (.clang-format; version 14, as in Debian 12).
+# Checks that clang-format (version 14, as in Debian 12; .clang-format) would change no C++ source.
 #   tests/check_format.sh [--fix]
 set -euo pipefail
 cd "$(dirname "$0")/.."

@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
-# Compiles sources that a unity build joins, each on its own, without code (-fsyntax-only): a missing
-# include fails.
-#   tests/check_includes.sh BUILD_DIR        those that the last 5 commits or you have changed
-#   tests/check_includes.sh BUILD_DIR all    all of them (LibTorch's headers are read anew for each)
-# BUILD_DIR is configured, and the protos are built.
+# Compiles each source of a unity build on its own (-fsyntax-only), and fails on missing includes.
+#   tests/check_includes.sh BUILD_DIR        sources changed since 5 commits ago
+#   tests/check_includes.sh BUILD_DIR all    all sources (slow: each reads LibTorch's headers)
+# Requires: BUILD_DIR is configured, and the protos are built.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=${1:?usage: tests/check_includes.sh BUILD_DIR [all]}
@@ -11,7 +10,7 @@ build=${1:?usage: tests/check_includes.sh BUILD_DIR [all]}
 joined=$(find "$build" -path '*/Unity/*.cxx' -exec sed -nE "s|^#include \"$PWD/([^\"]+)\".*|\1|p" {} + | sort -u)
 if [ "${2:-}" != all ]; then
   since=$(git rev-parse -q --verify HEAD~5 || git rev-list --max-parents=0 HEAD | tail -n 1)
-  # A changed header is seen through the source of its name, which includes it.
+  # A changed header is checked through the source of the same name, which includes it.
   changed=$({ git diff --name-only "$since"; git ls-files --others --exclude-standard; } | sed 's/\.h$/.cc/' | sort -u)
   joined=$(comm -12 <(echo "$joined") <(echo "$changed"))
 fi

@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
-#   core:   base <- {catalogue, simd, grid, color, image, weights} <- {scene, encoder}
+#   core:   base <- {catalogue, simd, grid, color, image, zip <- weights} <- {scene, encoder}
 #           <- {keyview, augment, carry <- film, splat, metrics, report, video, view, matching <- {keycolor, colorizer}}
 #           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- {recolor, report} <- stages
 #   colorizer: colorizer <- model <- neighbors <- training <- personal
 #   scene:  scene <- {masks, formats} <- sfm <- import
 #   server: base <- store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
-# LibTorch is seen only where networks live, protocol buffers never below the server, SQL there only for
-# COLMAP's database (core/scene/sfm/sfm_database.cc). What tests
-# (*_test.cc) set up is not held against their folder; the product never includes tests/.
+# LibTorch is included only by folders with networks, protocol buffers only by the server and above. Below
+# the server SQL is used only for COLMAP's database (core/scene/sfm/sfm_database.cc). Tests (*_test.cc) are
+# exempt; the product never includes tests/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 failed=0
@@ -19,8 +19,8 @@ complain() {
   failed=1
 }
 
-# allow FOLDER REGEX: every include of our own by FOLDER's sources matches REGEX (or is core/base's).
-# Its tests are exempt.
+# allow FOLDER REGEX: all project includes of FOLDER's sources match REGEX or are from core/base.
+# Tests are exempt.
 allow() {
   local bad
   bad=$(grep -rnE '#include "(core|server|client|tests)/' "$1" --include='*.h' --include='*.cc' |
@@ -28,7 +28,7 @@ allow() {
     grep -v '^[^:]*_test\.cc:' || true)
   [ -z "$bad" ] || complain "$1 may not include:" "$bad"
 }
-# allow_own FOLDER REGEX: the same for the files that lie in FOLDER itself.
+# allow_own FOLDER REGEX: the same, without subfolders.
 allow_own() {
   local bad
   bad=$(grep -nE '#include "(core|server|client|tests)/' "$1"/*.h "$1"/*.cc |
@@ -36,7 +36,7 @@ allow_own() {
     grep -v '^[^:]*_test\.cc:' || true)
   [ -z "$bad" ] || complain "$1 may not include:" "$bad"
 }
-# forbid REGEX FOLDER...: no source there has an include that matches REGEX.
+# forbid REGEX FOLDER...: no include of these folders matches REGEX.
 forbid() {
   local pattern=$1 bad
   shift
@@ -51,7 +51,8 @@ allow core/color 'core/(base|color)'
 allow core/image 'core/(base|image(/(probe|decode))?)'
 allow core/image/decode 'core/(base|image/(probe|decode))'
 allow core/image/probe 'core/(base|image/probe)'
-allow core/weights 'core/(base|weights)'
+allow core/zip 'core/(base|zip)'
+allow core/weights 'core/(base|zip|weights)'
 allow core/scene 'core/(base|catalogue|color|image(/probe)?|scene(/[a-z]+)?)'
 scene='base|catalogue|color|image(/probe)?'
 allow_own core/scene "core/($scene|scene)"
@@ -81,15 +82,15 @@ done
 lower=
 for part in model motion raster training geometry chroma export import; do
   lower="$lower${lower:+|}$part"
-  allow "core/splat/$part" "core/(base|simd|color|image|scene|splat/($lower))"
+  allow "core/splat/$part" "core/(base|zip|simd|color|image|scene|splat/($lower))"
 done
 allow core/report 'core/(base|catalogue|image|report)'
 allow core/video 'core/(base|video)'
 allow core/film 'core/(base|image|carry|film)'
-allow core/view 'core/(base|scene|view(/path)?)'
+allow core/view 'core/(base|zip|scene|view(/path)?)'
 allow core/view/path 'core/(base|scene|view(/path)?)'
-# Below the stages: what they are given, their options, the formats of artifacts; then what several
-# stages share. Other folders of core know nothing of stages.
+# Below the stages: their context and options, the formats of artifacts, then code that several stages
+# share. Other folders of core do not depend on stages.
 below='core/([a-rt-z][a-z]*|scene|simd|splat)(/[a-z]+)?'
 parts=
 for part in context options formats sources movie film_import film recolor report; do
@@ -123,17 +124,17 @@ allow server/worker/live \
   'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/live)'
 allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
-forbid 'torch/|ATen/|c10/' core/base core/simd core/grid core/color core/image core/weights \
+forbid 'torch/|ATen/|c10/' core/base core/zip core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \
   core/keycolor/hints core/keycolor/words
 forbid 'grpc|google/protobuf|color3d/v1|spdlog' core
 forbid 'sqlite3' $(find core -name '*.h' -o -name '*.cc' | grep -v '^core/scene/sfm/sfm_database')
 forbid 'libav|libsw' $(ls -d core/*/ | grep -v '^core/video/') server client
 forbid 'sqlite3' server/rpc server/worker client
-forbid 'opencv2' server client core/splat core/base core/simd core/grid
+forbid 'opencv2' server client core/splat core/base core/zip core/simd core/grid
 
-# public FOLDER HEADER...: what the product outside of FOLDER may include of it; the rest is its own.
-# (Tests and benchmarks look inside.)
+# public FOLDER HEADER...: the headers of FOLDER that the product may include from outside. (Tests and
+# benchmarks may include all.)
 public() {
   local folder=$1 known bad
   shift
@@ -141,7 +142,7 @@ public() {
   bad=$(grep -rnE "#include \"$folder/" core server client deploy --include='*.h' --include='*.cc' |
     grep -vE "^($folder/|[^:]*_test\.cc:)" |
     grep -vE "#include \"$folder/(${known%|})\.h\"" || true)
-  [ -z "$bad" ] || complain "these headers are $folder's own:" "$bad"
+  [ -z "$bad" ] || complain "headers private to $folder:" "$bad"
 }
 
 public core/augment augment outpaint surrogates
@@ -168,7 +169,7 @@ public core/splat model/gaussian_cap model/gaussian_model model/memory_plan moti
 public core/stage idle_stages run_stages film_import/import_film formats/artifact_io options/[a-z_]+
 public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path
-public core/weights byte_source safetensors weight_file weight_map weight_reader
+public core/weights safetensors weight_file weight_map weight_reader
 public server/access certificate_roles notify_targets tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck

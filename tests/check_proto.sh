@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Lint, format and compatibility of the public API with buf (from npm). Says so when it cannot run.
+# Checks lint, format and compatibility of the public API with buf (from npm). Prints SKIPPED if it cannot run.
 #   tests/check_proto.sh BUILD_DIR
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -21,8 +21,8 @@ fi
 
 (cd proto && "$buf" lint && "$buf" format --diff --exit-code)
 
-# On the wire the API may only grow (before 1.0 names may change, field numbers never): compare with
-# the newest release, or with the commit before this one.
+# On the wire the API may only grow (before 1.0 names may change, field numbers never). Compares with
+# the newest release, or with the previous commit.
 base=$(git describe --tags --abbrev=0 --match 'v*' 2>/dev/null || git rev-parse -q --verify HEAD~1 || true)
 if [ -z "$base" ] || [ -z "$(git ls-tree "$base" proto 2>/dev/null)" ]; then
   echo "check_proto: SKIPPED the compatibility check: there is no earlier API to compare with" >&2
@@ -32,4 +32,4 @@ before=$(mktemp -d)
 trap 'rm -rf "$before"' EXIT
 git archive "$base" proto | tar -x -C "$before"
 (cd proto && "$buf" breaking --against "$before/proto")
-echo "check_proto: the API is clean and understands $base on the wire"
+echo "check_proto: the API is clean and compatible with $base on the wire"

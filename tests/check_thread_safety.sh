@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Clang's thread-safety analysis of all sources with a Mutex (core/base/mutex.h): members that are
-# guarded are only used with their mutex held. A finding fails.
+# Checks with Clang that guarded members are used only with their mutex held, in all sources with a
+# Mutex (core/base/mutex.h). Takes about a minute on two cores.
 #   tests/check_thread_safety.sh BUILD_DIR
-# BUILD_DIR is configured, and the protos are built. About a minute on two cores.
+# Requires: BUILD_DIR is configured, and the protos are built.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 build=${1:?usage: tests/check_thread_safety.sh BUILD_DIR}
@@ -11,7 +11,7 @@ if ! command -v clang++ >/dev/null 2>&1; then
   exit 0
 fi
 
-# A header is checked with the source of its name, or alone if there is none.
+# A header is checked through the source of the same name, or alone if there is none.
 sources=$(git grep -l --untracked '#include "core/base/mutex.h"' -- '*.h' '*.cc' | while read -r file; do
   source=${file%.h}.cc
   if [ -f "$source" ]; then echo "$source"; else echo "$file"; fi

@@ -24,11 +24,11 @@ case "${1:-}" in
   *) echo "run.sh: unknown option $1; see tests/run.sh --help" >&2; exit 2 ;;
 esac
 
-# A label or name without tests is an error.
+# A label or name that matches no test is an error.
 run_tests() {
   local result=0
   ctest --test-dir "$build" --output-on-failure --no-tests=error --timeout 900 "$@" || result=$?
-  # A program passes although some of its cases were skipped: list them.
+  # Lists skipped cases, since a program passes in spite of them.
   grep -hE '^\[  SKIPPED \] .*\(' "$build/Testing/Temporary/LastTest.log" | sort -u || true
   return "$result"
 }
@@ -58,7 +58,7 @@ if [ -n "$name$changed" ]; then
   [ -n "$targets" ] || { echo "run.sh: no test program matches" >&2; exit 1; }
   # shellcheck disable=SC2086
   cmake --build "$build" --target $targets
-  # The tests of these programs: a fast one is one test of its own name, others have suites of cases.
+  # Tests of these programs: a fast program is one test of its name, others have one test per case.
   programs="^($(for program in $targets; do
     echo "$program\$"
     "$build/bin/$program" --gtest_list_tests | sed -nE 's|^([A-Za-z0-9_/]+\.)$|\1|p'
@@ -67,7 +67,7 @@ if [ -n "$name$changed" ]; then
     run_tests -j 2 -R "$programs" -L '^(fast|stability)$'
   elif grep -qE -e "$name" <<<"$targets"; then
     run_tests -R "$programs"
-  else  # cases; a fast program runs whole, as one test
+  else  # matches cases; a fast program is one test, run whole
     run_tests -R "$name|^($(paste -sd'|' <<<"$targets"))\$"
   fi
   exit
@@ -86,7 +86,7 @@ tests/check_thread_safety.sh "$build"
 if [ -n "$label" ]; then
   run_tests -L "^$label\$"
 else
-  # Quick programs in pairs; others use every core and run one at a time.
+  # Quick programs run in pairs; others use every core and run one at a time.
   run_tests -j 2 -L "^(fast|stability)\$"
   run_tests -LE "^(fast|stability|slow|long|chaos|soak|load)\$"
 fi

@@ -64,7 +64,7 @@ def changed_folders(since):
 
 
 def patterns_without_cases():
-    """Patterns after LONG that match no case: the case was renamed and is long no more."""
+    """Patterns after LONG that match no case, because the case was renamed."""
     tests = [read(os.path.join(ROOT, file)) for file in git("ls-files", "*_test.cc") if file]
     cases = [".".join(case) for text in tests for case in CASE.findall(text)]
     for file in git("ls-files", "*CMakeLists.txt"):

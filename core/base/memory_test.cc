@@ -61,7 +61,7 @@ TEST(MachineMemory, IsMinimumOfMachineAndGroupLimits) {
   EXPECT_EQ(MachineMemoryBytes(root.path()), 9000 * 1024);
   put("proc/self/cgroup", "0::/c/d\n");
   put("sys/fs/cgroup/c/memory.max", "4000000\n");
-  put("sys/fs/cgroup/c/memory.current", "3999999\n");  // what is used is part of it
+  put("sys/fs/cgroup/c/memory.current", "3999999\n");  // includes the used memory
   EXPECT_EQ(MachineMemoryBytes(root.path()), 4000000);
 }
 
@@ -77,7 +77,7 @@ TEST(IsOutOfMemory, KnowsMessagesOfLibraries) {
 }
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-// In a process of its own: a limit cannot be raised again.
+// Runs `check` in a child process, because a limit cannot be raised again.
 int InLimitedProcess(int64_t memory_bytes, const std::function<bool()>& check) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -117,14 +117,14 @@ TEST(OwnMemory, ReportsRemainderOfLimit) {
 
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 TEST(ReleaseFreedMemory, ReturnsFreedMemoryToSystem) {
-  constexpr size_t kBlock = 16 << 10, kBlocks = 8192;  // too small to be mapped each by itself
+  constexpr size_t kBlock = 16 << 10, kBlocks = 8192;  // too small for a mapping each
   std::vector<std::unique_ptr<char[]>> blocks(kBlocks);
   for (auto& block : blocks) {
     block.reset(new char[kBlock]);
     std::memset(block.get(), 1, kBlock);
   }
   const int64_t full = ResidentMemoryBytes();
-  // The last one holds fast what lies below it.
+  // The last block prevents the heap from shrinking by itself.
   for (size_t i = 0; i + 1 < kBlocks; ++i) blocks[i].reset();
   ReleaseFreedMemory();
   EXPECT_LT(ResidentMemoryBytes(), full - int64_t{kBlock * kBlocks / 2});
@@ -153,7 +153,7 @@ int ArenasOfEightThreads() {
   return count;
 }
 
-// In processes of their own: the limit holds for all threads, forever.
+// In child processes, because the limit holds for all threads and cannot be undone.
 TEST(ShareMallocArenasDeathTest, ThreadsShareArenas) {
   testing::FLAGS_gtest_death_test_style = "threadsafe";
   EXPECT_EXIT(

@@ -6,8 +6,8 @@
 namespace color3d {
 namespace {
 
-// Loops follow each other within microseconds, and waking a sleeping thread takes up to 100 us:
-// spin for this long before sleeping. Other threads get the core meanwhile.
+// Time that a thread spins before it sleeps, since loops follow each other within microseconds and
+// waking a thread takes up to 100 us. Other threads get the core meanwhile.
 constexpr std::chrono::microseconds kWatchFor(50);
 
 template <class Condition>
@@ -25,10 +25,10 @@ ThreadPool::ThreadPool(int threads) {
 
 ThreadPool::~ThreadPool() {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
-  start_.notify_all();
+  start_.NotifyAll();
   for (std::thread& worker : workers_) worker.join();
 }
 
@@ -38,8 +38,8 @@ void ThreadPool::WorkerLoop(int thread) {
     const std::function<void(int)>* task = nullptr;
     WatchFor([&] { return generation_ != seen; });
     {
-      std::unique_lock lock(mutex_);
-      start_.wait(lock, [&] { return stopping_ || generation_ != seen; });
+      const MutexLock lock(mutex_);
+      while (!stopping_ && generation_ == seen) start_.Wait(mutex_);
       if (stopping_) return;
       seen = generation_;
       task = task_;
@@ -50,21 +50,21 @@ void ThreadPool::WorkerLoop(int thread) {
     } catch (...) {
       failure = std::current_exception();
     }
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (failure && !failure_) failure_ = failure;
-    if (--running_ == 0) done_.notify_one();
+    if (--running_ == 0) done_.NotifyOne();
   }
 }
 
 void ThreadPool::Run(const std::function<void(int)>& task) {
   {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     task_ = &task;
     failure_ = nullptr;
     running_ = static_cast<int>(workers_.size());
     ++generation_;
   }
-  start_.notify_all();
+  start_.NotifyAll();
   std::exception_ptr failure;
   try {
     task(0);
@@ -72,8 +72,8 @@ void ThreadPool::Run(const std::function<void(int)>& task) {
     failure = std::current_exception();
   }
   WatchFor([&] { return running_ == 0; });
-  std::unique_lock lock(mutex_);
-  done_.wait(lock, [&] { return running_ == 0; });
+  const MutexLock lock(mutex_);
+  while (running_ != 0) done_.Wait(mutex_);
   task_ = nullptr;
   if (!failure) failure = failure_;
   if (failure) std::rethrow_exception(failure);

@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-// What a check says about a value; empty when it accepts it.
+// Returns the message of a check; empty if it accepts the value.
 std::string RangeComplaint(double value, double low, double high) {
   try {
     RangeCheck("test option")("sigma", value, low, high);

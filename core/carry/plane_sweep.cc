@@ -211,22 +211,23 @@ CostVolume MatchPlanes(const PosedLuminance& reference,
   return volume;
 }
 
+// Costs of the paths that arrive at the previous pixel, and of changing the plane after it.
+struct PathCosts {
+  const int16_t* paths;  // per plane; [-1] and [planes] are padding with a high cost
+  int16_t least;
+  int16_t small_step;
+  int16_t large_step;
+};
+
 // One step of semi-global matching: best cost of a path that arrives at a pixel, per plane.
-void PathStep(const int16_t* cost,
-              const int16_t* previous,
-              int16_t previous_least,
-              int16_t small_step,
-              int16_t large_step,
-              int planes,
-              int16_t* out,
-              int16_t* sum) {
-  const int16_t jump = static_cast<int16_t>(previous_least + large_step);
+void PathStep(const int16_t* cost, PathCosts previous, int planes, int16_t* out, int16_t* sum) {
+  const int16_t jump = static_cast<int16_t>(previous.least + previous.large_step);
   for (int d = 0; d < planes; ++d) {
-    // previous[-1] and previous[planes] are padding with a high cost.
-    int16_t best = std::min(previous[d], jump);
-    best = std::min<int16_t>(best, static_cast<int16_t>(previous[d - 1] + small_step));
-    best = std::min<int16_t>(best, static_cast<int16_t>(previous[d + 1] + small_step));
-    const auto value = static_cast<int16_t>(cost[d] + best - previous_least);
+    const int16_t* path = previous.paths + d;
+    int16_t best = std::min(*path, jump);
+    best = std::min<int16_t>(best, static_cast<int16_t>(path[-1] + previous.small_step));
+    best = std::min<int16_t>(best, static_cast<int16_t>(path[1] + previous.small_step));
+    const auto value = static_cast<int16_t>(cost[d] + best - previous.least);
     out[d] = value;
     sum[d] = static_cast<int16_t>(sum[d] + value);
   }
@@ -274,14 +275,8 @@ void AggregateDirection(const CostVolume& volume,
         const double large = options.large_step / (1.0 + contrast / options.edge_contrast);
         const auto large_step = static_cast<int16_t>(
             kCostScale * std::max(large, options.small_step + 1.0 / kCostScale));
-        PathStep(cost,
-                 above.data() + static_cast<size_t>(px) * stride + 1,
-                 above_least[px],
-                 small_step,
-                 large_step,
-                 planes,
-                 out,
-                 total);
+        const int16_t* paths = above.data() + static_cast<size_t>(px) * stride + 1;
+        PathStep(cost, {paths, above_least[px], small_step, large_step}, planes, out, total);
       }
       int16_t smallest = out[0];
       for (int d = 1; d < planes; ++d) smallest = std::min(smallest, out[d]);
@@ -312,13 +307,12 @@ Image SweepPlanes(const PosedLuminance& reference,
                   const CancellationToken& cancel) {
   options.Validate();
   if (sources.empty() || static_cast<int>(sources.size()) > kMaxSweepSources) {
-    throw InvalidArgument("plane sweep compares a view with 1 to {} others, not {}",
-                          kMaxSweepSources,
-                          sources.size());
+    throw InvalidArgument(
+        "the plane sweep takes 1 to {} sources, but got {}", kMaxSweepSources, sources.size());
   }
   if (!(nearest > 0.0 && farthest > nearest && std::isfinite(farthest))) {
     throw InvalidArgument(
-        "plane sweep between depths {} and {}: nothing lies between them", nearest, farthest);
+        "the depth range {} to {} of the plane sweep is empty", nearest, farthest);
   }
   const auto depth_of = [&](double plane) {
     const double t = plane / (options.planes - 1.0);

@@ -40,11 +40,11 @@ void CopyKnown(const CarriedColor& carried, const Image& known, Image* inferred_
 
 }  // namespace
 
-FusedColor ColorOfView(const Image& luminance,
-                       const CarriedColor& carried,
-                       const ColorSources& sources,
-                       ThreadPool& pool,
-                       const CancellationToken& cancel) {
+FusedColor FuseViewColor(const Image& luminance,
+                         const CarriedColor& carried,
+                         const ColorSources& sources,
+                         ThreadPool& pool,
+                         const CancellationToken& cancel) {
   FusionOptions options;
   options.relative_chroma = sources.relative_chroma;
   const Image known = DecisivelyCarried(carried);

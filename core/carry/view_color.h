@@ -25,10 +25,10 @@ struct ColorSources {
 
 // `luminance`: 1 channel, L 0..100. `carried`: of the same size; confidence 0 where nothing was
 // carried.
-FusedColor ColorOfView(const Image& luminance,
-                       const CarriedColor& carried,
-                       const ColorSources& sources,
-                       ThreadPool& pool,
-                       const CancellationToken& cancel);
+FusedColor FuseViewColor(const Image& luminance,
+                         const CarriedColor& carried,
+                         const ColorSources& sources,
+                         ThreadPool& pool,
+                         const CancellationToken& cancel);
 
 }  // namespace color3d

@@ -10,7 +10,7 @@ std::vector<Stage> WithArtifacts(std::vector<Stage> stages) {
   for (Stage& stage : stages) {
     for (const Artifact& artifact : ArtifactCatalogue()) {
       if (artifact.stage == nullptr || std::string_view(artifact.stage) != stage.kind) continue;
-      stage.leaves.push_back(artifact.name);
+      stage.outputs.push_back(artifact.name);
       if (artifact.is_result) stage.results.push_back(artifact.name);
     }
   }

@@ -38,7 +38,7 @@ struct Stage {
   std::vector<const char*> reads = {};  // artifacts that it reads if they are among its inputs
   // Artifacts that it writes, some of them only if there is something to write, and those of them
   // that belong to a coloured scene. From artifacts.cc.
-  std::vector<const char*> leaves = {};
+  std::vector<const char*> outputs = {};
   std::vector<const char*> results = {};
   // A job submitted alone also plans the stages that write what it needs, because they require no
   // decision of the user.

@@ -21,20 +21,20 @@ TEST(StageCatalogueTest, EarlierStagesWriteEveryInput) {
         EXPECT_TRUE(made.contains(name) || of_an_earlier_job) << stage.kind << " reads " << name;
       }
     }
-    made.insert(stage.leaves.begin(), stage.leaves.end());
+    made.insert(stage.outputs.begin(), stage.outputs.end());
   }
 }
 
 TEST(StageCatalogueTest, EveryArtifactHasOneWriter) {
   std::set<std::string_view> made;
   for (const Stage& stage : StageCatalogue()) {
-    for (const char* name : stage.leaves) EXPECT_TRUE(made.insert(name).second) << name;
+    for (const char* name : stage.outputs) EXPECT_TRUE(made.insert(name).second) << name;
   }
 }
 
 TEST(StageCatalogueTest, ResultsAreOutputsOfTheirStage) {
   for (const Stage& stage : StageCatalogue()) {
-    const std::set<std::string_view> made(stage.leaves.begin(), stage.leaves.end());
+    const std::set<std::string_view> made(stage.outputs.begin(), stage.outputs.end());
     for (const char* name : stage.results) EXPECT_TRUE(made.contains(name)) << name;
   }
 }

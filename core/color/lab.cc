@@ -127,7 +127,7 @@ RgbColor LinearFromLab(const LabColor& lab) {
           m[2][0] * x + m[2][1] * y + m[2][2] * z};
 }
 
-// In linear units; far below what a 16-bit code can show.
+// Linear units; far below a step of 16 bits.
 constexpr double kGamutSlack = 1e-9;
 
 // At constant lightness and hue the sRGB gamut is star-shaped about the neutral axis with one
@@ -142,7 +142,7 @@ double RedLimit(double l) {
   return 1.0 + kDepth * std::clamp(std::min(rise, fall), 0.0, 1.0);
 }
 
-// How far the worst linear channel lies outside the gamut; <= 0 inside.
+// Distance of the worst linear channel from the gamut; <= 0 inside.
 double Excess(const RgbColor& v, double red_limit) {
   const double low = std::min({v.r, v.g, v.b});
   const double high = std::max({v.r - red_limit, v.g - 1.0, v.b - 1.0});
@@ -150,7 +150,7 @@ double Excess(const RgbColor& v, double red_limit) {
 }
 
 // The largest scale of (a, b) that fits, found by the Illinois variant of false position: the
-// bracket keeps a colour inside the gamut at its low end, which is what we return.
+// low end of the bracket is always inside the gamut and is returned.
 RgbColor LinearInGamut(LabColor lab) {
   lab.l = std::clamp(lab.l, 0.0, 100.0);
   const double red_limit = RedLimit(lab.l);

@@ -41,7 +41,7 @@ TEST(Lab, GraysAreNeutralAndMonotone) {
 }
 
 TEST(Lab, ImagePathAgreesWithFloat64) {
-  // 65^3 lattice plus random colours plus the dark corner, where the functions bend most.
+  // A lattice of 65^3, random colours, and the dark corner, where the functions are most curved.
   const int n = 65;
   Image srgb(n * n, n + 40, 3);
   Random random(1);
@@ -117,14 +117,15 @@ TEST(Lab, GamutMappingKeepsLightnessAndHue) {
       continue;
     }
     ++mapped;
-    // Nothing but bright colours' last 1.3 % of red is ever clipped; else lightness and hue hold.
+    // Only the last 1.3 % of red of bright colours is clipped; otherwise lightness and hue are
+    // kept.
     const bool red_clipped = lab.l > 90.0 && srgb.r > 1.0 - 1e-9;
     strict += red_clipped ? 0 : 1;
     EXPECT_NEAR(got.l, lab.l, red_clipped ? 0.45 : 1e-3);
     // Distance of (a, b) from the ray of constant hue.
     const double off_ray = std::abs(got.a * lab.b - got.b * lab.a) / wanted;
     EXPECT_LT(off_ray, red_clipped ? 2.0 : 2e-3);
-    // As far out as it goes: 0.1 % more chroma does not fit.
+    // The chroma is maximal: 0.1 % more does not fit.
     if (chroma > 1.0 && !red_clipped) {
       const double more = 1.001 * chroma / wanted;
       EXPECT_FALSE(Fits(SrgbFromLabUnclamped({lab.l, more * lab.a, more * lab.b})));
@@ -135,8 +136,8 @@ TEST(Lab, GamutMappingKeepsLightnessAndHue) {
 }
 
 TEST(Lab, GamutMappingIsContinuousAtYellow) {
-  // Just off the gamut's surface, everywhere: strict chroma reduction fails this by up to 30 units
-  // at bright yellow, where the gamut is not star-shaped.
+  // Just outside the gamut's surface, everywhere: strict chroma reduction fails this by up to 30
+  // units at bright yellow, where the gamut is not star-shaped.
   Random random(7);
   double worst = 0.0;
   for (int i = 0; i < 40000; ++i) {

@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-// One hue under light that changes within every window.
+// One hue under light that varies within every window.
 struct Shaded {
   Image luminance{96, 64, 1};
   Image ab{96, 64, 2};

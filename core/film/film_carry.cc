@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
 #include <numeric>
 #include <optional>
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/mutex.h"
 #include "core/base/range_check.h"
 #include "core/carry/confidence.h"
 #include "core/film/frame_motion.h"
@@ -403,14 +403,14 @@ void CarryAlongFilm(const FilmFrames& frames,
     }
   }
   for (const FilmKey& key : keys) on_frame(key.frame, key.color);
-  std::mutex handing_over;
+  Mutex handing_over;
   const auto go = [&](size_t count, const OnCarriedFrame& to, Walk* walk) {
     if (count == 0) return;
     Walker walker(*walk, frames, options, cancel);
     for (size_t i = 0; i < count; ++i) {
       const int frame = walk->frames[i];
       const CarriedColor color = walker.CarryTo(frame);
-      const std::lock_guard lock(handing_over);
+      const MutexLock lock(handing_over);
       if (resume.on_walk) resume.on_walk(walker.State());
       to(frame, color);
     }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <mutex>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -13,6 +12,7 @@
 
 #include "core/base/error.h"
 #include "core/base/median.h"
+#include "core/base/mutex.h"
 #include "core/image/box_mean.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
@@ -261,9 +261,9 @@ PairResidual CompareFrames(const Image& from, const Image& to) {
   return Compare(from, DenseFlow(from, to), DenseFlow(to, from));
 }
 
-ShotMotion MotionOfCamera(const ShotFrames& frames,
-                          ThreadPool& pool,
-                          const CancellationToken& cancel) {
+ShotMotion MeasureCameraMotion(const ShotFrames& frames,
+                               ThreadPool& pool,
+                               const CancellationToken& cancel) {
   const std::vector<std::pair<int, int>> pairs = SpreadPairs(frames.count);
   std::vector<double> shift(pairs.size(), -1.0);
   pool.ForEach(static_cast<int64_t>(pairs.size()), [&](int64_t i, int) {
@@ -286,8 +286,8 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
                              const CancellationToken& cancel,
                              const std::function<void(int frame, const Image& moving)>& on_frame) {
   constexpr int kAtOnce = 16;  // frames; bounds memory
-  ShotMotion motion = MotionOfCamera(frames, pool, cancel);
-  std::mutex adding, handing_over;
+  ShotMotion motion = MeasureCameraMotion(frames, pool, cancel);
+  Mutex adding, handing_over;
   std::vector<Votes> votes(frames.count);
   std::vector<double> share(frames.count, 0.0);
   for (int begin = 0; begin < frames.count; begin += kAtOnce) {
@@ -301,7 +301,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
       const Image forth = DenseFlow(*before, *behind), back = DenseFlow(*behind, *before);
       const PairResidual of_earlier = Compare(*before, forth, back);
       const PairResidual of_later = Compare(*behind, back, forth);
-      const std::lock_guard lock(adding);
+      const MutexLock lock(adding);
       Add(of_earlier, &votes[earlier]);
       Add(of_later, &votes[later]);
     });
@@ -317,7 +317,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
       double sum = 0.0;
       for (const float v : moving.data) sum += v;
       share[frame] = sum / static_cast<double>(moving.data.size());
-      const std::lock_guard lock(handing_over);
+      const MutexLock lock(handing_over);
       on_frame(frame, moving);
     });
   }
@@ -327,7 +327,7 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
   return motion;
 }
 
-double FootRow(const Image& moving) {
+double LowestMovingRow(const Image& moving) {
   constexpr double kMinShare = 0.003;
   cv::Mat is_moving(moving.height, moving.width, CV_8U);
   std::transform(moving.data.begin(), moving.data.end(), is_moving.begin<uint8_t>(), [](float v) {

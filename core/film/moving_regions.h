@@ -53,9 +53,9 @@ struct ShotMotion {
 };
 
 // Measures the camera's motion from a few near and far pairs. Leaves moving_share at 0.
-ShotMotion MotionOfCamera(const ShotFrames& frames,
-                          ThreadPool& pool,
-                          const CancellationToken& cancel);
+ShotMotion MeasureCameraMotion(const ShotFrames& frames,
+                               ThreadPool& pool,
+                               const CancellationToken& cancel);
 
 // Also calls `on_frame` with the moving regions of each frame, in any order, from several threads,
 // one call at a time: 1 channel, 1 where most of the usable neighbours at distance 1, 2, 4 and 8
@@ -68,6 +68,6 @@ ShotMotion FindMovingRegions(const ShotFrames& frames,
 
 // Lowest row of the largest moving region, as a share of the picture's height from the top; < 0
 // when less than 0.3 % of the picture moves. `moving`: as FindMovingRegions passes it.
-double FootRow(const Image& moving);
+double LowestMovingRow(const Image& moving);
 
 }  // namespace color3d

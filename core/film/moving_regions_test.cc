@@ -170,13 +170,13 @@ TEST(MovingRegionsTest, CanBeCancelled) {
 
 TEST(FootRowTest, IsLowestRowOfLargestRegion) {
   Image moving(100, 50, 1);
-  EXPECT_LT(FootRow(moving), 0.0);
+  EXPECT_LT(LowestMovingRow(moving), 0.0);
   moving.At(0, 49, 3) = 1.0f;  // a speck
-  EXPECT_LT(FootRow(moving), 0.0);
+  EXPECT_LT(LowestMovingRow(moving), 0.0);
   for (int y = 10; y < 40; ++y) {
     for (int x = 20; x < 30; ++x) moving.At(0, y, x) = 1.0f;
   }
-  EXPECT_DOUBLE_EQ(FootRow(moving), 0.8);
+  EXPECT_DOUBLE_EQ(LowestMovingRow(moving), 0.8);
 }
 
 }  // namespace

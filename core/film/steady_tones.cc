@@ -192,7 +192,7 @@ SteadyTones FindSteadyTones(const std::vector<Image>& pictures,
                             const CancellationToken& cancel) {
   if (shot.size() != pictures.size()) {
     throw InvalidArgument(
-        "there are {} frames, but shot numbers of {}", pictures.size(), shot.size());
+        "there are {} frames, but shot numbers for {}", pictures.size(), shot.size());
   }
   std::map<int, std::vector<int>> frames_of_shot;
   for (size_t i = 0; i < pictures.size(); ++i) {

@@ -21,8 +21,8 @@ struct AggregateGraph {
   int64_t NodeCount() const { return static_cast<int64_t>(data.size()); }
 };
 
-// Cluster of every node of the finer graph. Nodes without an edge get any cluster: nothing may be
-// restricted from them, and what is prolonged to them must not matter.
+// Cluster of every node of the finer graph. Nodes without an edge get an arbitrary cluster: their
+// values must be zero before a restriction and are ignored after a prolongation.
 struct Clusters {
   std::vector<int32_t> of_node;
   int64_t count = 0;

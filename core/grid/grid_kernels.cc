@@ -38,7 +38,7 @@ HWY_INLINE Stencil LoadStencil(const GridSystem& s, int64_t i) {
           {-w - 1, -w, -w + 1, -1, 1, w - 1, w, w + 1}};
 }
 
-// -(A u): differences are taken before they are weighted, which keeps what smooth u would cancel.
+// -(A u). Differences are taken before they are weighted, which avoids cancellation for smooth u.
 HWY_INLINE Vec MinusApplied(const Stencil& stencil, Vec data, const float* u) {
   const Tag d;
   const Vec center = hn::LoadU(d, u);

@@ -80,7 +80,7 @@ class Solver {
       body(k * kGridChunk, std::min(pixels, (k + 1) * kGridChunk), k);
     });
   }
-  // Sum over the chunks in their order, whatever thread computes which.
+  // Sum over the chunks in their order, independent of the threads.
   template <typename Body>
   GridPair SumChunks(Body&& body) {
     std::vector<GridPair> parts((system_.PixelCount() + kGridChunk - 1) / kGridChunk);
@@ -175,7 +175,7 @@ class Solver {
     std::swap(z_, t_);
   }
 
-  // Flexible conjugate gradients from the residual r_ on until the recursion says so. The
+  // Flexible conjugate gradients, starting from the residual r_, until the recursion converges. The
   // preconditioner is not linear, hence beta by Polak-Ribiere: (r' - r) . z' = -alpha A p . z'.
   void Iterate(const GridSolveOptions& options,
                const GridPair& b_norm,

@@ -165,7 +165,7 @@ TEST_P(GridSolverTest, PinnedPixelsAreExact) {
 }
 
 TEST_P(GridSolverTest, PinnedRowsSplitPicture) {
-  // Pockets that are connected to nothing but pinned pixels, and one without any connection.
+  // Regions that are connected to pinned pixels only, and one without any connection.
   GridSystem system = RandomSystem(96, 96, 2, 96 * 96 - 1, 9);
   for (int y = 0; y < 96; ++y) {
     for (int x = 0; x < 96; ++x) system.pinned[y * 96 + x] = x % 4 == 0 || y % 4 == 0;
@@ -179,7 +179,7 @@ TEST_P(GridSolverTest, PinnedRowsSplitPicture) {
 }
 
 TEST_P(GridSolverTest, CoarsensStarGraphs) {
-  // One huge, tightly bound region with 10^4 specks that touch nothing else.
+  // One huge, tightly connected region with 10^4 isolated specks.
   GridSystem system(300, 300);
   for (int64_t i = 0; i < system.PixelCount(); ++i) {
     const int64_t x = i % 300, y = i / 300;

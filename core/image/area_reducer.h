@@ -24,7 +24,8 @@ class AreaReducer {
   template <typename Sample>
   void AddRow(const Sample* row) {
     ReduceRow(row);
-    const double rows = static_cast<double>(height_) / reduced_.height;  // that form one row
+    const double rows =
+        static_cast<double>(height_) / reduced_.height;  // source rows per reduced row
     double from = next_row_;
     const double to = ++next_row_;
     while (from < to && filled_ < reduced_.height) {
@@ -47,7 +48,8 @@ class AreaReducer {
     for (int x = 0; x < reduced_.width; ++x) {
       const double begin = columns * x, end = x + 1 == reduced_.width ? width_ : columns * (x + 1);
       const int first = static_cast<int>(begin);
-      const int last = std::min(width_ - 1, static_cast<int>(end));  // in part, perhaps not at all
+      const int last =
+          std::min(width_ - 1, static_cast<int>(end));  // covered in part or not at all
       for (int c = 0; c < channels_; ++c) {
         double sum = 0.0;
         for (int i = first + 1; i < last; ++i) sum += row[static_cast<size_t>(i) * channels_ + c];

@@ -163,7 +163,8 @@ cv::Mat DecodeStored(std::string_view bytes,
   }
   if (mat.empty()) {
     throw InvalidArgument(
-        "{} cannot be decoded: its image data is damaged or of a rare kind; save it again as JPEG "
+        "{} cannot be decoded: its image data is damaged or of an unsupported kind; save it again "
+        "as JPEG "
         "or PNG",
         file_name);
   }
@@ -253,7 +254,7 @@ Image Decode(std::string_view bytes,
       image = FloatsFromMat<uint8_t>(mat, 1.0f / 255.0f, size);
     } else if (mat.depth() == CV_16U) {
       image = FloatsFromMat<uint16_t>(mat, 1.0f / 65535.0f, size);
-      // OpenCV inverts 8-bit ones, but not these (film scans).
+      // OpenCV inverts such pictures of 8 bits but not of 16 (film scans).
       if (info.min_is_white) {
         for (float& v : image.data) v = 1.0f - v;
       }
@@ -307,7 +308,7 @@ bool IsGray(const Image& srgb, float tolerance) {
 
 namespace {
 
-// Behind the header, which is a PNG's first chunk and 33 bytes long with the signature.
+// Inserts the chunk after the header, the first chunk, which ends at byte 33.
 std::string WithSrgbChunk(const std::string& png) {
   constexpr size_t kHeaderEnd = 33;
   // Length 1, type, relative to white as photographs are, checksum.
@@ -315,7 +316,7 @@ std::string WithSrgbChunk(const std::string& png) {
   return std::string(png).insert(kHeaderEnd, chunk);
 }
 
-// Behind the JFIF segment, which has to be the first.
+// Inserts the profile after the JFIF segment, which must be the first.
 std::string WithProfile(const std::string& jpeg, const std::string& profile) {
   const size_t first =
       4 + static_cast<unsigned char>(jpeg[4]) * 256u + static_cast<unsigned char>(jpeg[5]);

@@ -132,12 +132,12 @@ TEST(Codec, GrayKeepsOneChannelAndClamps) {
   EXPECT_EQ(DecodeImage(EncodeJpeg(image), "a.jpg").channels, 1);
 }
 
-// A marked corner tells all eight orientations apart. Where the stored pixel (0,0) and the next one
-// in its row end up, from the EXIF standard's table.
+// A marked corner distinguishes all eight orientations. Positions of the stored pixel (0, 0) and
+// the next one in its row, from the EXIF standard's table.
 struct Expected {
   int orientation;
-  bool origin_right, origin_bottom;  // where stored (0, 0) is seen
-  bool row_is_vertical;              // the stored row 0 is seen as a column
+  bool origin_right, origin_bottom;  // position of the stored (0, 0)
+  bool row_is_vertical;              // the stored row 0 becomes a column
 };
 constexpr Expected kOrientations[] = {{1, false, false, false},
                                       {2, true, false, false},

@@ -11,9 +11,9 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kMiB = int64_t{1} << 20;
-// Pictures up to this take so little that asking would cost more.
+// Smaller pictures are not counted: measuring the available memory would cost more.
 constexpr int64_t kUncountedBytes = 16 * kMiB;
-// Of what is available; the rest is for what grows meanwhile.
+// Share of the available memory; the rest is for other growth.
 constexpr double kShare = 0.9;
 
 // Codecs give grey with alpha as four channels.
@@ -55,20 +55,20 @@ int64_t DecodeBudget::Granted() const {
 }
 
 void DecodeBudget::Acquire(const PictureNeed& need) {
-  std::unique_lock lock(mutex_);
-  // What others were promised they may have taken already: then less is available, too, and this
-  // waits longer than it must, but never takes too much.
-  while (promised_ > 0 && need.bytes > Granted() - promised_) freed_.wait(lock);
+  const MutexLock lock(mutex_);
+  // Promised memory that is already in use is subtracted twice: this may wait too long but never
+  // takes too much.
+  while (promised_ > 0 && need.bytes > Granted() - promised_) freed_.Wait(mutex_);
   if (promised_ == 0) RequirePictureMemory(need, Granted(), "while it is decoded");
   promised_ += need.bytes;
 }
 
 void DecodeBudget::Release(int64_t bytes) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     promised_ -= bytes;
   }
-  freed_.notify_all();
+  freed_.NotifyAll();
 }
 
 PictureTurn::PictureTurn(const PictureNeed& need, DecodeBudget& budget)
@@ -91,8 +91,8 @@ int64_t FloatBytes(const ImageInfo& info, int width, int height) {
 int64_t DecodingBytes(const ImageInfo& info, bool copies) {
   const int64_t samples = int64_t{info.width} * info.height * CodecChannels(info);
   const int64_t stored = samples * (info.bits_per_channel > 8 ? 2 : 1);
-  // JPEG files that come in several scans are held as coefficients of two bytes.
-  // WebP and HEIC are held as planes of luma and chroma, too.
+  // JPEG files of several scans are held as coefficients of two bytes, WebP and HEIC also as planes
+  // of luma and chroma.
   const bool is_held_twice = info.format == ImageFormat::kJpeg ||
                              info.format == ImageFormat::kWebp || info.format == ImageFormat::kHeif;
   const int64_t coefficients = is_held_twice ? 2 * samples : 0;

@@ -1,12 +1,11 @@
 // Limits concurrent decoding of pictures to the memory available to the process. Thread-safe.
 #pragma once
 
-#include <condition_variable>
 #include <cstdint>
 #include <functional>
-#include <mutex>
 #include <string>
 
+#include "core/base/mutex.h"
 #include "core/image/probe/probe.h"
 
 namespace color3d {
@@ -41,9 +40,9 @@ class DecodeBudget {
   int64_t Granted() const;
 
   const std::function<int64_t()> available_;
-  std::mutex mutex_;
-  std::condition_variable freed_;
-  int64_t promised_ = 0;
+  Mutex mutex_;
+  CondVar freed_;
+  int64_t promised_ COLOR3D_GUARDED_BY(mutex_) = 0;
 };
 
 // Reserves a picture's memory during its lifetime. Small pictures are not counted. Nested

@@ -66,7 +66,7 @@ TEST(DecodeBudget, LimitsConcurrentDecodes) {
 TEST(DecodeBudget, NestedTurnsOfOneThreadDoNotWait) {
   DecodeBudget budget([] { return 1000 * kMiB; });
   const PictureTurn whole({"a.png", 10'000, 7'000, 800 * kMiB}, budget);
-  const PictureTurn part({"a.png", 10'000, 7'000, 700 * kMiB}, budget);  // must not wait for itself
+  const PictureTurn part({"a.png", 10'000, 7'000, 700 * kMiB}, budget);  // must not deadlock
 }
 
 TEST(DecodingBytes, CountsCodecMemory) {
@@ -78,11 +78,10 @@ TEST(DecodingBytes, CountsCodecMemory) {
   EXPECT_EQ(DecodingBytes(info, true), 24'000'000);
   info.bits_per_channel = 16;
   EXPECT_EQ(DecodingBytes(info, false), 18'000'000);
-  info.channels = 2;  // a codec's four
+  info.channels = 2;  // four in the codec
   EXPECT_EQ(DecodingBytes(info, false), 24'000'000);
 }
 
-// What Resize makes of the whole picture.
 TEST(AreaReducer, AveragesLikeResize) {
   Random random(3);
   for (const auto& [width, height] : {std::pair{31, 17}, {20, 40}, {64, 64}, {65, 3}}) {

@@ -52,7 +52,7 @@ TEST(Resize, MixedScalingKeepsMean) {
   EXPECT_NEAR(before, after, 1e-5);
 }
 
-// Confidences are checked against 0..1 by those who read them.
+// Readers of confidences require 0..1.
 TEST(Resize, StaysWithinValueRange) {
   Random random(7);
   for (int trial = 0; trial < 400; ++trial) {

@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-// 40 where known, something else where not.
+// 40 where known, another value elsewhere.
 struct HalfKnown {
   Image values{50, 38, 2, 40.0f};
   Image weight{50, 38, 1};

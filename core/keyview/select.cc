@@ -254,7 +254,7 @@ std::vector<double> SoftmaxEntropies(const std::vector<std::vector<double>>& des
 KeyViewSelection RankViews(GuardedViews guarded, const std::vector<double>& scores) {
   if (scores.size() != guarded.views.size()) {
     throw InvalidArgument(
-        "there are scores for {} views, but {} views", scores.size(), guarded.views.size());
+        "there are scores for {} views, expected {}", scores.size(), guarded.views.size());
   }
   std::vector<double> kept_scores;
   for (RankedView& view : guarded.views) {

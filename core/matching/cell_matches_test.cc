@@ -67,7 +67,7 @@ TEST(CellMatchesTest, MedianOfEqualColorsIsThatColor) {
   EXPECT_LT((matches.ab + 31.5f).abs().max().item<float>(), 1e-4f);
 }
 
-TEST(CellMatchesTest, CellsWithoutWeightGiveGray) {
+TEST(CellMatchesTest, ReturnsGrayForCellsWithoutWeight) {
   CellBank bank = RandomBank();
   bank.weights.zero_();
   const CellMatches matches = MatchCells({bank.features}, bank, {});

@@ -24,8 +24,8 @@ PosedDepth View(double x, double yaw, int width = 64, int height = 48) {
   return view;
 }
 
-// Where the pixel's ray meets the slanted plane z = 4 + 0.2 x, or, with an occluder, the square
-// |x| < 0.3, |y| < 0.3 at z = 2. float64.
+// Intersection of the pixel's ray with the slanted plane z = 4 + 0.2 x, or, with an occluder, the
+// square |x| < 0.3, |y| < 0.3 at z = 2. float64.
 Eigen::Vector3d Surface(const PosedDepth& view, double u, double v, bool occluder) {
   const Eigen::Vector3d center = view.cam_from_world.Center();
   const Eigen::Vector3d ray =
@@ -94,7 +94,7 @@ TEST(MatchByGeometry, OccludedPixelsDoNotMatch) {
   }
   EXPECT_EQ(wrong, 0);
   EXPECT_GT(on_occluder, 100);
-  // The plane behind the square, as each view sees it, is hidden from the other.
+  // The part of the plane that the square hides in one view has no match in the other.
   const auto without = MatchByGeometry(Look(-0.5, 0.0, false).view, Look(0.5, 0.0, false).view, {});
   EXPECT_LT(matches.size(), without.size());
 }
@@ -157,7 +157,7 @@ TEST(ConsistencyPairs, HaveShortAndLongGaps) {
 }
 
 TEST(ConsistencyPairs, StayWithinAGroup) {
-  // Views 0..3 are of one moment, 4 of another, 5..6 of a third.
+  // Views 0..3 are of one time, 4 of another, 5..6 of a third.
   const auto pairs = ConsistencyPairs({4, 1, 2}, 24);
   std::vector<std::tuple<int, int, bool>> found;
   for (const ViewPair& pair : pairs) found.emplace_back(pair.first, pair.second, pair.long_gap);

@@ -35,7 +35,7 @@ FollowedPixels FollowToPreviousFrame(const Image& luminance, const Image& lumina
 
 // Sums over pairs of neighbouring frames. A plain value.
 struct ChromaAlongMotion {
-  int64_t pixels = 0;       // with sure flow
+  int64_t pixels = 0;       // with reliable flow
   int64_t all_pixels = 0;   // of all pairs
   double difference = 0.0;  // sum of |ab - ab before|, Lab units
   double chroma = 0.0;      // sum of |ab|

@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWidth = 96, kHeight = 64;
 
-// Texture that wanders by `step_px` a frame.
+// Texture that moves by `step_px` per frame.
 Image Luminance(int frame, double step_px) {
   Image image(kWidth, kHeight, 1);
   for (int y = 0; y < kHeight; ++y) {
@@ -31,7 +31,7 @@ Image Luminance(int frame, double step_px) {
   return image;
 }
 
-// Colours that go with it, or stay where they are.
+// Colours that move by `color_step_px` per frame.
 Image Lab(int frame, double step_px, double color_step_px, double flicker) {
   Image ab(kWidth, kHeight, 2);
   for (int y = 0; y < kHeight; ++y) {
@@ -99,7 +99,7 @@ TEST(TemporalConsistency, ColorsThatFollowMotionAreSteady) {
   EXPECT_NEAR(flickers.tc_chroma, 6.0, 0.2);
   EXPECT_EQ(gray.tc_chroma, 0.0);
   EXPECT_EQ(gray.chroma, 0.0);
-  // It flickers from frame to frame, not from one to the next but one.
+  // Flickers between adjacent frames, not over two.
   EXPECT_GT(flickers.cdc_at[0], 2.0 * flickers.cdc_at[1]);
   EXPECT_GT(flickers.cdc_at[0], 2.0 * steady.cdc_at[0]);
   EXPECT_NEAR(

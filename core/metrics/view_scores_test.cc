@@ -37,7 +37,7 @@ Image Stripes(int width, float shift) {
   return srgb;
 }
 
-// Figures of a preset that works on sharper pictures are those of the pictures at the common size.
+// Scores of larger pictures are those of the pictures at the common size.
 TEST(ScoreView, ReducesLargePicturesToTheCommonSize) {
   const Image truth = LabFromSrgb(Stripes(2 * kScoreSidePx, 0.0f));
   const Image wrong = LabFromSrgb(Stripes(2 * kScoreSidePx, 0.1f));
@@ -51,7 +51,7 @@ TEST(ScoreView, ReducesLargePicturesToTheCommonSize) {
   EXPECT_GT(small.at("delta_e00_chroma"), 1.0);
 }
 
-// The scores of a half are those of the cropped pictures, whatever the other half shows.
+// The scores of a masked picture equal those of its cropped half.
 TEST(ScoreView, CountsUnmaskedPixelsOnly) {
   const Image truth = Stripes(96, 0.0f), drawn = LabFromSrgb(Stripes(96, 0.1f));
   Image mask(96, 72, 1), spoilt = drawn;

@@ -103,7 +103,7 @@ void CurveRecorder::OnProgress(int64_t step, int64_t total_steps, const std::str
 
 void CurveRecorder::OnError(int64_t iteration, const std::string& error_name, double value) {
   if (std::isfinite(value)) {
-    std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     points_.push_back({stage_, Seconds(), iteration, error_name, value});
   }
   outer_.OnError(iteration, error_name, value);
@@ -112,7 +112,7 @@ void CurveRecorder::OnError(int64_t iteration, const std::string& error_name, do
 void CurveRecorder::OnWarning(const std::string& message) { outer_.OnWarning(message); }
 
 std::vector<CurvePoint> CurveRecorder::points() const {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return points_;
 }
 
@@ -129,7 +129,7 @@ std::string CurveRecorder::Facts() const {
 }
 
 void CurveRecorder::TakeFacts(double seconds, std::string_view csv) {
-  std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   points_ = CurvesFromCsv(csv);
   earlier_seconds_ = seconds;
 }

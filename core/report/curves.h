@@ -3,11 +3,11 @@
 
 #include <chrono>
 #include <cstdint>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "core/base/progress.h"
 
 namespace color3d {
@@ -55,9 +55,9 @@ class CurveRecorder : public ProgressObserver, public CheckpointStore {
   ProgressObserver& outer_;
   CheckpointStore& checkpoints_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  double earlier_seconds_ = 0.0;
-  mutable std::mutex mutex_;
-  std::vector<CurvePoint> points_;
+  double earlier_seconds_ = 0.0;  // set by Load() and LoadTo()
+  mutable Mutex mutex_;
+  std::vector<CurvePoint> points_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

@@ -156,7 +156,7 @@ void ShareMoments(const std::vector<std::string>& camera,
 
 }  // namespace
 
-FrameMoments MomentsOf(const std::vector<FrameTime>& frames) {
+FrameMoments AssignMoments(const std::vector<FrameTime>& frames) {
   FrameMoments result;
   result.moments.resize(frames.size());
   if (!AllOrNone(frames, "time", [](const FrameTime& f) { return f.time.has_value(); })) {

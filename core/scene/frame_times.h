@@ -32,7 +32,7 @@ struct FrameMoments {
 // can move. Throws Error{kInvalidArgument} that names the frames if only some have a time, only
 // some name a camera, two of one camera have the same time, or times are too far apart for a
 // number.
-FrameMoments MomentsOf(const std::vector<FrameTime>& frames);
+FrameMoments AssignMoments(const std::vector<FrameTime>& frames);
 // Gives the views of the scene their moments, in order. `warnings` (may be null) receives the note,
 // `cameras` (may be null) the names of the cameras.
 void AddMoments(FrameMoments moments,

@@ -22,22 +22,23 @@ FrameTime Frame(const std::string& file,
 }
 
 TEST(FrameTimes, OrdersFramesOfOneCamera) {
-  const FrameMoments m = MomentsOf(
+  const FrameMoments m = AssignMoments(
       {Frame("images/c.png", 0.5), Frame("images/a.png", -0.5), Frame("images/b.png", 0)});
   EXPECT_EQ(m.moments[0], (Moment{1.0, 0}));
   EXPECT_EQ(m.moments[1], (Moment{0.0, 0}));
   EXPECT_EQ(m.moments[2], (Moment{0.5, 0}));
   EXPECT_EQ(m.cameras.size(), 1u);
   // Folders are no cameras if no two frames share a time.
-  EXPECT_EQ(MomentsOf({Frame("a/1.png", 0), Frame("b/2.png", 1)}).cameras.size(), 1u);
+  EXPECT_EQ(AssignMoments({Frame("a/1.png", 0), Frame("b/2.png", 1)}).cameras.size(), 1u);
 }
 
 TEST(FrameTimes, FoldersAreCamerasIfFramesShareTime) {
-  const FrameMoments m = MomentsOf({Frame("images/cam02/1.png", 3),
-                                    Frame("images/cam01/1.png", 3),
-                                    Frame("images/cam01/2.png", 3.04),
-                                    Frame("images/cam02/2.png", 3.04),
-                                    Frame("images/cam02/3.png", 3.08)});  // films of other lengths
+  const FrameMoments m =
+      AssignMoments({Frame("images/cam02/1.png", 3),
+                     Frame("images/cam01/1.png", 3),
+                     Frame("images/cam01/2.png", 3.04),
+                     Frame("images/cam02/2.png", 3.04),
+                     Frame("images/cam02/3.png", 3.08)});  // films of other lengths
   EXPECT_EQ(m.cameras, (std::vector<std::string>{"cam01", "cam02"}));
   EXPECT_EQ(m.moments[0], (Moment{0.0, 1}));
   EXPECT_EQ(m.moments[1], (Moment{0.0, 0}));
@@ -46,20 +47,20 @@ TEST(FrameTimes, FoldersAreCamerasIfFramesShareTime) {
 }
 
 TEST(FrameTimes, NamedCamerasMayShareFolder) {
-  const FrameMoments m = MomentsOf({Frame("a.png", 0, "right"),
-                                    Frame("b.png", 0, "left"),
-                                    Frame("c.png", 1, "right"),
-                                    Frame("d.png", 1, "left")});
+  const FrameMoments m = AssignMoments({Frame("a.png", 0, "right"),
+                                        Frame("b.png", 0, "left"),
+                                        Frame("c.png", 1, "right"),
+                                        Frame("d.png", 1, "left")});
   EXPECT_EQ(m.cameras, (std::vector<std::string>{"left", "right"}));
   EXPECT_EQ(m.moments[2], (Moment{1.0, 1}));
 }
 
 TEST(FrameTimes, MergesTimesThatDifferByRounding) {
-  const FrameMoments m = MomentsOf({Frame("a/1.png", 0.1 * 3),
-                                    Frame("b/1.png", 0.3),
-                                    Frame("a/0.png", 0),
-                                    Frame("b/0.png", 0),
-                                    Frame("a/2.png", 0.4)});
+  const FrameMoments m = AssignMoments({Frame("a/1.png", 0.1 * 3),
+                                        Frame("b/1.png", 0.3),
+                                        Frame("a/0.png", 0),
+                                        Frame("b/0.png", 0),
+                                        Frame("a/2.png", 0.4)});
   EXPECT_EQ(m.moments[0]->time_s, m.moments[1]->time_s);
   EXPECT_EQ(m.moments[4]->time_s, 0.4);
 }
@@ -78,7 +79,7 @@ TEST(FrameTimes, CamerasShareMomentsDespiteRounding) {
   constexpr int kCount = 900;  // rounded steps of 1/600 s drift by 15 ticks
   std::vector<FrameTime> frames = Rounded("a", 600, 0.0, kCount);
   for (const FrameTime& frame : Rounded("b", 90000, 0.0, kCount)) frames.push_back(frame);
-  const FrameMoments m = MomentsOf(frames);
+  const FrameMoments m = AssignMoments(frames);
   for (int i = 0; i < kCount; ++i) {
     ASSERT_EQ(m.moments[i]->time_s, m.moments[kCount + i]->time_s) << i;
     ASSERT_NEAR(m.moments[i]->time_s, i * 1001 / 30000.0, 1.0 / 600) << i;
@@ -89,7 +90,7 @@ TEST(FrameTimes, CamerasShareMomentsDespiteRounding) {
 TEST(FrameTimes, NotesOffsetOfFifthOfStep) {
   std::vector<FrameTime> frames = Rounded("a", 90000, 0.0, 40);
   for (const FrameTime& frame : Rounded("b", 90000, 0.0067, 40)) frames.push_back(frame);
-  const FrameMoments m = MomentsOf(frames);
+  const FrameMoments m = AssignMoments(frames);
   for (int i = 0; i < 40; ++i) EXPECT_EQ(m.moments[i]->time_s, m.moments[40 + i]->time_s) << i;
   EXPECT_THAT(m.note, HasSubstr("clocks differ by up to 0.0067"));
 }
@@ -97,31 +98,31 @@ TEST(FrameTimes, NotesOffsetOfFifthOfStep) {
 TEST(FrameTimes, KeepsTimesOfUnsynchronizedCameras) {
   std::vector<FrameTime> halves = Rounded("a", 90000, 0.0, 40);
   for (const FrameTime& frame : Rounded("b", 90000, 0.0167, 40)) halves.push_back(frame);
-  const FrameMoments m = MomentsOf(halves);
+  const FrameMoments m = AssignMoments(halves);
   EXPECT_NEAR(m.moments[40]->time_s, 0.0167, 1e-4);
   EXPECT_EQ(m.note, "");
-  const FrameMoments rates = MomentsOf({Frame("a0", 0.0, "a"),
-                                        Frame("a1", 0.1, "a"),
-                                        Frame("a2", 0.2, "a"),
-                                        Frame("b0", 0.0, "b"),
-                                        Frame("b1", 0.06, "b"),
-                                        Frame("b2", 0.12, "b")});
+  const FrameMoments rates = AssignMoments({Frame("a0", 0.0, "a"),
+                                            Frame("a1", 0.1, "a"),
+                                            Frame("a2", 0.2, "a"),
+                                            Frame("b0", 0.0, "b"),
+                                            Frame("b1", 0.06, "b"),
+                                            Frame("b2", 0.12, "b")});
   EXPECT_EQ(rates.moments[4]->time_s, 0.06);
 }
 
 TEST(FrameTimes, OneTimeMakesStaticScene) {
-  const FrameMoments m = MomentsOf({Frame("a.png", 7), Frame("b.png", 7)});
+  const FrameMoments m = AssignMoments({Frame("a.png", 7), Frame("b.png", 7)});
   EXPECT_FALSE(m.moments[0] || m.moments[1]);
   EXPECT_THAT(m.note, HasSubstr("all 2 frames were taken at one time"));
   EXPECT_TRUE(m.cameras.empty());
-  const FrameMoments none = MomentsOf({Frame("a.png", {}), Frame("b.png", {})});
+  const FrameMoments none = AssignMoments({Frame("a.png", {}), Frame("b.png", {})});
   EXPECT_FALSE(none.moments[0]);
   EXPECT_EQ(none.note, "");
-  EXPECT_TRUE(MomentsOf({}).moments.empty());
+  EXPECT_TRUE(AssignMoments({}).moments.empty());
 }
 
 std::string Said(const std::vector<FrameTime>& frames) {
-  return Refusal([&] { MomentsOf(frames); });
+  return Refusal([&] { AssignMoments(frames); });
 }
 
 TEST(FrameTimes, NamesContradictions) {

@@ -160,5 +160,32 @@ TEST(Scene, JsonHasKindAndOlderFilesOpenWithoutIt) {
   }
 }
 
+// As an earlier version wrote it: a film with a relief, without the kind.
+TEST(Scene, ReadsJsonOfEarlierVersion) {
+  const std::string view =
+      R"("camera":{"cx":4.0,"cy":3.0,"fx":9.0,"fy":9.0,"height":6,"width":8},)"
+      R"("cam_from_world":{"rotation_wxyz":[1.0,0.0,0.0,0.0],"translation":[0.0,0.0,0.0]},)"
+      R"("captured_camera":{"cx":4.0,"cy":3.0,"fx":9.0,"fy":9.0,"height":6,"width":8},)"
+      R"("distortion":{"k":[0.1,0.0,0.0,0.0,0.0,0.0,0.0,0.0],"model":"brown"},)";
+  const Scene scene = SceneFromJson(
+      R"({"format":"color3d-scene","points":[[0.0,0.5,2.0,0.25,[0,1]]],)"
+      R"("relief":{"backdrop_depth":4.0,"foot":0.5,"horizon":0.3},"version":1,"views":[{)" +
+      view +
+      R"("held_out":false,"image_file":"images/0001.png","mask_file":"masks/0001.png",)"
+      R"("moment":{"shot":0,"time_s":0.0},"name":"0001.png"},{)" +
+      view +
+      R"("held_out":true,"image_file":"images/0002.png",)"
+      R"("moment":{"shot":0,"time_s":0.04},"name":"0002.png"}],)"
+      R"("world_from_scene_scale":1.0,"world_offset":[0.0,0.0,1.0]})");
+  EXPECT_EQ(scene.kind(), CaptureKind::kRelief);
+  ASSERT_EQ(scene.views.size(), 2u);
+  EXPECT_EQ(scene.views[0].mask_file, "masks/0001.png");
+  EXPECT_EQ(scene.views[0].distortion.model, Distortion::Model::kBrown);
+  EXPECT_TRUE(scene.views[1].held_out);
+  EXPECT_EQ(scene.views[1].moment->time_s, 0.04);
+  EXPECT_EQ(scene.points.at(0).views, (std::vector<int>{0, 1}));
+  EXPECT_EQ(scene.world_offset.z(), 1.0);
+}
+
 }  // namespace
 }  // namespace color3d

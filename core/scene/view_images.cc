@@ -8,13 +8,13 @@
 #include <deque>
 #include <list>
 #include <map>
-#include <mutex>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/mutex.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/decode_budget.h"
@@ -113,13 +113,15 @@ struct ViewImages::Impl {
   const int max_side_px;
   const int64_t budget_bytes;
 
-  std::vector<int> lens_of_view;                       // index of the first view with the same lens
-  std::deque<std::mutex> loading;                      // one per view: each picture is decoded once
-  std::mutex mutex;                                    // guards all below
-  std::map<int, std::shared_ptr<const Image>> cached;  // by view; masks by MaskKey()
-  std::list<int> recent;                               // most recently used first
-  int64_t cached_bytes = 0;
-  std::list<std::pair<int, std::shared_ptr<const RemapTable>>> tables;  // most recent first
+  std::vector<int> lens_of_view;  // index of the first view with the same lens
+  std::deque<Mutex> loading;      // one per view: each picture is decoded once
+  Mutex mutex;
+  // By view; masks by MaskKey().
+  std::map<int, std::shared_ptr<const Image>> cached COLOR3D_GUARDED_BY(mutex);
+  std::list<int> recent COLOR3D_GUARDED_BY(mutex);  // most recently used first
+  int64_t cached_bytes COLOR3D_GUARDED_BY(mutex) = 0;
+  // By lens, most recently used first.
+  std::list<std::pair<int, std::shared_ptr<const RemapTable>>> tables COLOR3D_GUARDED_BY(mutex);
 
   Impl(const Scene& s, std::filesystem::path f, int side, int64_t budget)
       : scene(s),
@@ -149,7 +151,7 @@ struct ViewImages::Impl {
     constexpr size_t kMaxTables = 4;
     const int lens = lens_of_view[view];
     {
-      const std::lock_guard<std::mutex> lock(mutex);
+      const MutexLock lock(mutex);
       for (auto it = tables.begin(); it != tables.end(); ++it) {
         if (it->first != lens) continue;
         tables.splice(tables.begin(), tables, it);
@@ -159,7 +161,7 @@ struct ViewImages::Impl {
     const View& v = scene.views[view];
     auto table = std::make_shared<const RemapTable>(MakeRemap(
         v.captured_camera.FitWithin(RemapSide()), v.distortion, v.camera.FitWithin(RemapSide())));
-    const std::lock_guard<std::mutex> lock(mutex);
+    const MutexLock lock(mutex);
     tables.emplace_front(lens, table);
     if (tables.size() > kMaxTables) tables.pop_back();
     return table;
@@ -211,7 +213,7 @@ struct ViewImages::Impl {
   int MaskKey(int view) const { return view + static_cast<int>(scene.views.size()); }
 
   std::shared_ptr<const Image> FindCached(int view) {
-    const std::lock_guard<std::mutex> lock(mutex);
+    const MutexLock lock(mutex);
     const auto it = cached.find(view);
     if (it == cached.end()) return nullptr;
     recent.remove(view);
@@ -221,7 +223,7 @@ struct ViewImages::Impl {
 
   void Keep(int view, const std::shared_ptr<const Image>& image) {
     const int64_t bytes = static_cast<int64_t>(image->data.size() * sizeof(float));
-    const std::lock_guard<std::mutex> lock(mutex);
+    const MutexLock lock(mutex);
     if (bytes > budget_bytes) return;
     cached[view] = image;
     recent.push_front(view);
@@ -251,7 +253,7 @@ Camera ViewImages::WorkingCamera(int view) const {
 std::shared_ptr<const Image> ViewImages::Luminance(int view) const {
   impl_->At(view);
   if (auto image = impl_->FindCached(view)) return image;
-  const std::lock_guard<std::mutex> lock(impl_->loading[view]);
+  const MutexLock lock(impl_->loading[view]);
   if (auto image = impl_->FindCached(view)) return image;
   auto image = std::make_shared<const Image>(LuminanceFromSrgb(impl_->Load(view)));
   impl_->Keep(view, image);
@@ -262,7 +264,7 @@ std::shared_ptr<const Image> ViewImages::Mask(int view) const {
   const View& v = impl_->At(view);
   if (v.mask_file.empty()) return nullptr;
   const int key = impl_->MaskKey(view);
-  const std::lock_guard<std::mutex> lock(impl_->loading[view]);
+  const MutexLock lock(impl_->loading[view]);
   if (auto mask = impl_->FindCached(key)) return mask;
   const Camera& c = v.captured_camera;
   const PictureTurn turn(MaskNeed(v.mask_file, c.width, c.height));

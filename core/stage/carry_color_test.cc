@@ -76,7 +76,7 @@ class CarryStageTest : public StageTest {
     return nlohmann::json::parse(ReadFile(scratch_.path() / "out" / artifact::kCarryFacts));
   }
   AbMap Carried(int view) {
-    const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view], ".png");
+    const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view]);
     return DecodeAbPng(ReadFile(scratch_.path() / "out" / name), name);
   }
   std::string Complaint() {
@@ -210,7 +210,7 @@ TEST_F(CarryStageTest, GivesTheSameBytesAgain) {
   EXPECT_EQ(first, ReadFile(scratch_.path() / "out" / "carried/p2.png"));
 }
 
-// Keeps every state that is saved, and loses the lease at the third.
+// Keeps every saved state, and loses the lease at the third.
 class Dying : public CheckpointStore {
  public:
   std::optional<std::string> Load() override {
@@ -228,7 +228,7 @@ TEST_F(CarryStageTest, ResumesWithTheSameResult) {
   const nlohmann::json facts = Run();
   std::vector<std::string> files;
   const auto file = [&](int i) {
-    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[i], ".png");
+    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[i]);
   };
   for (int i = 0; i < 5; ++i) {
     files.push_back(ReadFile(file(i)));

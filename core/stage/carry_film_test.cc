@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kWidth = 96, kHeight = 64, kFrames = 12, kKey = 5;
 
-// Cancels the work at one of the frames.
+// Counts the frames, and cancels the work at one of them.
 class FrameCounter : public NullObserver {
  public:
   void OnProgress(int64_t step, int64_t total, const std::string&) override {
@@ -77,8 +77,7 @@ class CarryFilmTest : public StageTest {
   std::vector<std::string> Carried() {
     std::vector<std::string> files;
     for (const View& view : scene_.views) {
-      files.push_back(
-          ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kCarried, view, ".png")));
+      files.push_back(ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kCarried, view)));
     }
     return files;
   }
@@ -125,7 +124,7 @@ TEST_F(CarryFilmTest, StopsBeforeNextFrameWhenCancelled) {
   frames_.cancel_at = 3;
   try {
     Run();
-    FAIL() << "it went on";
+    FAIL() << "it continued";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kCancelled);
   }
@@ -159,7 +158,7 @@ class ReturningShotTest : public StageTest {
     return ReadFile(scratch_.path() / "out" / artifact::kCarryFacts);
   }
   std::filesystem::path Carried(int frame) {
-    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[frame], ".png");
+    return scratch_.path() / "out" / ViewArtifact(artifact::kCarried, scene_.views[frame]);
   }
   Scene scene_;
 };

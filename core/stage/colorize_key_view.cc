@@ -39,10 +39,10 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
                                {"view", scene.views[key].name}};
   facts.update(result.facts);
   for (const auto& warning : facts.value("warnings", nlohmann::ordered_json::array())) {
-    context.progress().OnWarning(warning.get<std::string>());
+    context.Warn(warning.get<std::string>());
   }
   for (const std::string& note : NotesOnGivenPicture(options)) {
-    context.progress().OnWarning("the picture given for the key view " + note);
+    context.Warn("the picture given for the key view " + note);
   }
   // Everything after this works on undistorted pictures.
   const ViewImages images(scene, context.scene_folder(), 0, 0);

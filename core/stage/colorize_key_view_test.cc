@@ -94,7 +94,7 @@ TEST_F(StageTest, PassesOnFactsAndWarningsOfBackend) {
   const Image shown = ReadImage(scratch_.path() / "out/key_view_colored.png");
   const Image photo = ReadImage(scratch_.path() / "p1.png");
   EXPECT_NEAR(LuminanceFromSrgb(shown).At(0, 16, 24), LuminanceFromSrgb(photo).At(0, 16, 24), 1.0)
-      << "the photo's own luminance was not put back";
+      << "the luminance of the photo was not restored";
 }
 
 TEST_F(StageTest, EverySourceOfKeyColorHasARow) {

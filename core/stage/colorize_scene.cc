@@ -28,12 +28,6 @@ using nlohmann::ordered_json;
 
 constexpr int kReportSidePx = 540;
 
-// A picture for the page, small enough to embed many.
-ReportPicture Picture(const StageContext& context, const std::string& name, std::string caption) {
-  const Image image = DecodeImage(context.ReadInput(name), name);
-  return {std::move(caption), EncodeJpeg(FitWithin(image, kReportSidePx), 88)};
-}
-
 std::vector<std::string> KeysInOrder(const ordered_json& object) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : object.items()) keys.push_back(key);
@@ -251,14 +245,13 @@ std::vector<std::pair<std::string, std::string>> Headline(const ordered_json& me
 }
 
 // The pictures of the key view that there are.
-ReportRow KeyPictures(const std::string& name, const StageContext& context) {
-  ReportRow row{name, {}};
-  if (context.HasInput(artifact::kKeyViewGray)) {
-    row.pictures.push_back(Picture(context, artifact::kKeyViewGray, "as captured"));
-  }
-  if (context.HasInput(artifact::kKeyViewColored)) {
-    row.pictures.push_back(Picture(
-        context, artifact::kKeyViewColored, "coloured: all colours of the scene come from here"));
+ReportRow KeyPictures(const std::string& title, const StageContext& context) {
+  ReportRow row{title, {}};
+  for (const auto& [name, caption] :
+       {std::pair{artifact::kKeyViewGray, "as captured"},
+        {artifact::kKeyViewColored, "coloured: all colours of the scene come from here"}}) {
+    if (!context.HasInput(name)) continue;
+    row.pictures.push_back(SmallPicture(ReadPicture(context, name), caption, kReportSidePx));
   }
   return row;
 }
@@ -296,11 +289,10 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   data.key_view = KeyViewChapter(KeyPictures(key ? scene.views[*key].name : "", context), context);
   data.additional_key_views = AdditionalKeyViewChapters(scene, kReportSidePx, context);
   std::vector<CurvePoint> personalization;
-  std::partition_copy(curves.begin(),
-                      curves.end(),
-                      std::back_inserter(personalization),
-                      std::back_inserter(data.curves),
-                      [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
+  std::ranges::partition_copy(curves,
+                              std::back_inserter(personalization),
+                              std::back_inserter(data.curves),
+                              [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
   data.sections = colors.Sections(std::move(personalization));
   data.views = ReportViews(scene, context);
   data.headline = Headline(metrics);

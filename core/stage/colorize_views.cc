@@ -37,10 +37,10 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
   const auto colorizer = LoadColorizer(
       context.ReadInput(artifact::kColorizer), context.LoadEncoder(encoder), /*threads=*/1);
   const ViewPositions positions(scene, context);
-  const bool are_frames = scene.HasTimes() && !positions.NothingMoves();
+  const bool are_frames = scene.HasTimes() && !positions.IsStatic();
   const ViewImages images(
       scene, context.scene_folder(), max_side_px, are_frames ? kColoredFramesCacheBytes : 0);
-  const auto total = static_cast<int64_t>(scene.views.size());
+  const auto total = std::ssize(scene.views);
   const auto sources = [&](int number) {
     return SourcesOf(*colorizer, [&, number](const Image& luminance) {
       return positions.Of(
@@ -59,14 +59,14 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     return ColorFrames(scene, images, coloring, context);
   }
   context.pool().ForEach(total, [&](int64_t index, int) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     const auto number = static_cast<int>(index);
     if (done.WasDone(number)) return;
     const auto luminance = images.Luminance(number);
     const CarriedColor carried =
         ReadCarried(context, scene.views[index], luminance->width, luminance->height);
     ThreadPool one(1);
-    done.Add(number, ColorOfView(*luminance, carried, sources(number), one, context.cancel()));
+    done.Add(number, FuseViewColor(*luminance, carried, sources(number), one, context.cancel()));
   });
 }
 

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-// Three views of a ramp, into each of which other colours were carried.
+// Three views of a ramp with different carried colours.
 class ColorizeViewsTest : public StageTest {
  protected:
   ColorizeViewsTest() : scene_(RampScene(scratch_.path(), kWidth, kHeight)) {
@@ -20,7 +20,7 @@ class ColorizeViewsTest : public StageTest {
     AddInput(artifact::kColorizer, ReadFile(scratch_.path() / "out" / artifact::kColorizer));
     AddInput(artifact::kCarryFacts, R"({"key_views": ["p1.png"]})");
     for (size_t i = 0; i < scene_.views.size(); ++i) {
-      AddInput(ViewArtifact(artifact::kCarried, scene_.views[i], ".png"),
+      AddInput(ViewArtifact(artifact::kCarried, scene_.views[i]),
                EncodeAbPng(Image(kWidth, kHeight, 2, 15.0f * static_cast<float>(i))));
     }
   }
@@ -31,8 +31,7 @@ class ColorizeViewsTest : public StageTest {
     RunColorizeViews(kWidth, context);
     std::vector<std::string> files;
     for (const View& view : scene_.views) {
-      files.push_back(
-          ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kViewsAb, view, ".png")));
+      files.push_back(ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kViewsAb, view)));
     }
     return files;
   }

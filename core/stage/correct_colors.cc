@@ -1,17 +1,16 @@
 #include <algorithm>
 #include <functional>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "core/base/range_check.h"
 #include "core/carry/confidence.h"
 #include "core/color/lab.h"
 #include "core/colorizer/corrector.h"
-#include "core/colorizer/personal/train_colorizer.h"
 #include "core/image/codec.h"
 #include "core/scene/key_photo.h"
 #include "core/scene/photo_masks.h"
@@ -90,22 +89,13 @@ struct Painted {
   Correction correction;
 };
 
-void MixIn(const Image& ab, const Image& share, Image* colors) {
-  for (int c = 0; c < 2; ++c) {
-    for (size_t i = 0; i < share.data.size(); ++i) {
-      float& value = colors->Plane(c)[i];
-      value += share.data[i] * (ab.Plane(c)[i] - value);
-    }
-  }
-}
-
 double Mean(const Image& picture) {
   double sum = 0.0;
   for (const float value : picture.data) sum += value;
   return sum / static_cast<double>(std::max<size_t>(picture.data.size(), 1));
 }
 
-void WarnIfGeometryDiffers(const Painted& painted, const std::string& name, StageContext& context) {
+void WarnIfOffGeometry(const Painted& painted, const std::string& name, StageContext& context) {
   const Image& position = painted.correction.picture.position;
   double known = 0.0, all = 0.0;
   for (size_t i = 0; i < painted.correction.painted.data.size(); ++i) {
@@ -114,9 +104,9 @@ void WarnIfGeometryDiffers(const Painted& painted, const std::string& name, Stag
     if (!position.Empty()) known += weight * position.Plane(3)[i];
   }
   if (known >= kHardlyKnown * all) return;
-  context.progress().OnWarning("the correction of " + name +
-                               " lies where the 3D scene does not show the photo, e.g. on sky; it "
-                               "reaches other views by similarity alone");
+  context.Warn("the correction of " + name +
+               " lies where the 3D scene does not show the photo, e.g. on sky; it "
+               "reaches other views by similarity alone");
 }
 
 Painted ReadCorrection(const ColorCorrection& wanted,
@@ -143,7 +133,7 @@ Painted ReadCorrection(const ColorCorrection& wanted,
       throw InvalidArgument("all that it paints is masked out; paint other pixels");
     }
   }
-  WarnIfGeometryDiffers(painted, view.name, context);
+  WarnIfOffGeometry(painted, view.name, context);
   return painted;
 }
 
@@ -152,7 +142,7 @@ std::vector<Painted> ReadCorrections(const std::vector<ColorCorrection>& wanted,
                                      StageContext& context) {
   std::vector<Painted> painted;
   for (size_t i = 0; i < wanted.size(); ++i) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     try {
       painted.push_back(ReadCorrection(wanted[i], views, context));
     } catch (const Error& e) {
@@ -218,7 +208,7 @@ nlohmann::ordered_json WriteProposals(const std::vector<ProposedPlace>& proposed
                       {"y", static_cast<int>(place.y * photo.height)},
                       {"gain", place.gain}});
     if (!painted.insert(index).second) continue;
-    context.WriteOutput(ViewArtifact(artifact::kPaint, view, ".png"),
+    context.WriteOutput(ViewArtifact(artifact::kPaint, view),
                         EncodePng8(PaintablePhoto(photo, colors(index))));
   }
   return places;
@@ -258,14 +248,14 @@ void RunCorrectColors(const CorrectColorsOptions& options,
                                        context.LoadEncoder(encoder),
                                        /*threads=*/1);
   const auto corrector = colorizer->Correct(corrections);
-  const auto total = static_cast<int64_t>(scene.views.size());
+  const auto total = std::ssize(scene.views);
   const int samples = static_cast<int>(kPlacesOfAllViews / scene.TrainingViews().size() + 1);
   std::vector<PlaceSample> samples_of(total);
-  std::mutex outputs;
+  Mutex outputs;
   int64_t done = 0;
   double changed = 0.0;
   context.pool().ForEach(total, [&](int64_t index, int) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     const auto number = static_cast<int>(index);
     const View& view = scene.views[index];
     const PlacedPicture picture = views.Picture(number);
@@ -275,17 +265,16 @@ void RunCorrectColors(const CorrectColorsOptions& options,
     if (!provenance.Empty()) CountAsSeen(answer.share, &provenance);
     const std::string ab_png = EncodeAbPng(ab);
     const std::string provenance_png = provenance.Empty() ? "" : EncodePng8(provenance);
-    const std::lock_guard lock(outputs);
+    const MutexLock lock(outputs);
     changed += Mean(answer.share);
     if (!painted.empty()) {
-      context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view, ".png"), ab_png);
+      context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view), ab_png);
       if (!provenance.Empty()) {
-        context.WriteOutput(ViewArtifact(artifact::kCorrectedProvenance, view, ".png"),
-                            provenance_png);
+        context.WriteOutput(ViewArtifact(artifact::kCorrectedProvenance, view), provenance_png);
       }
     }
     samples_of[index] = std::move(answer.sample);
-    context.progress().OnProgress(++done, total, "correcting " + view.name);
+    context.ReportProgress(++done, total, "correcting " + view.name);
   });
   const std::vector<int> training = scene.TrainingViews();
   std::vector<PlaceSample> places;

@@ -16,12 +16,12 @@
 #include "core/scene/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/film/film_writer.h"
 #include "core/stage/film/temporal_scores.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
 #include "core/stage/sources/chroma_budget.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {
@@ -113,8 +113,7 @@ SceneConsistency CompareViews(const Scene& scene,
     const int view = order[number];
     const Pose& pose = scene.views[view].cam_from_world;
     const Camera camera = images.WorkingCamera(view);
-    RenderedView rendered =
-        RenderView(model, camera, pose, context.pool(), 0.0f, scene.views[view].time_s());
+    RenderedView rendered = RenderView(model, scene.views[view], camera, context.pool());
     ClearMasked(images.Mask(view).get(), &rendered.depth);  // no matches there
     return ConsistencySource::Rendered{{camera, pose, std::move(rendered.depth)},
                                        std::move(rendered.lab)};
@@ -145,7 +144,7 @@ class HeldOutScores {
   void Add(int index, const std::filesystem::path& truth) {
     const View& view = scene_.views[index];
     const std::string ab_name = ViewAbArtifact(context_, view);
-    const Image ab = DecodeAbPng(context_.ReadInput(ab_name), ab_name).ab;
+    const Image ab = ReadAbMap(context_, ab_name).ab;
     const ViewImages images(scene_, context_.scene_folder(), std::max(ab.width, ab.height), 0);
     const Image true_srgb = images.UndistortFile(index, truth);
     if (true_srgb.channels != 3)
@@ -156,7 +155,7 @@ class HeldOutScores {
     const auto mask = images.Mask(index);
     Scores scores = ScoreView(true_srgb, delivered, ab, mask.get());
     if (scores.empty()) {
-      context_.progress().OnWarning(view.name + " is not scored: no pixel of it is unmasked");
+      context_.Warn(view.name + " is not scored: no pixel of it is unmasked");
       return;
     }
     if (bound_) {
@@ -166,8 +165,7 @@ class HeldOutScores {
     }
     const std::string provenance = ProvenanceArtifact(context_, view);
     if (context_.HasInput(provenance)) {
-      sources_.Add(
-          true_srgb, ab, DecodeImage(context_.ReadInput(provenance), provenance), mask.get());
+      sources_.Add(true_srgb, ab, ReadPicture(context_, provenance), mask.get());
     }
     ordered_json entry{{"view", view.name}};
     const std::string how = NameOf(how_[index]);
@@ -219,7 +217,7 @@ class HeldOutScores {
   }
 
   Image Rendered(const GaussianModel& model, const Camera& camera, const View& view) {
-    return RenderView(model, camera, view.cam_from_world, context_.pool(), 0.0f, view.time_s()).lab;
+    return RenderView(model, view, camera, context_.pool()).lab;
   }
 
   const Scene& scene_;
@@ -275,10 +273,9 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   HeldOutScores scores(scene, model, bound, context);
   int64_t done = 0;
   for (const auto& [view, file] : held_out) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     scores.Add(view, file);
-    context.progress().OnProgress(
-        ++done, static_cast<int64_t>(held_out.size()), "scoring " + scene.views[view].name);
+    context.ReportProgress(++done, std::ssize(held_out), "scoring " + scene.views[view].name);
   }
   TruthFiles all = held_out;
   all.insert(training.begin(), training.end());

@@ -59,10 +59,10 @@ class Exporter {
         with_confidence_(options.confidence && !model_.confidence.empty()),
         views_(ViewsToCompare(scene, &view_names_)) {
     if (options.confidence && !with_confidence_) {
-      Warn("the model has no provenance: {} has no confidence", artifact::kPly);
+      context_.Warn("the model has no provenance: {} has no confidence", artifact::kPly);
     }
     if (!frame_.left_out.isZero(0.0)) {
-      Warn(
+      context_.Warn(
           "the scene lies too far from the origin for 32-bit positions: they are relative to the "
           "offset in the header of {}",
           artifact::kPly);
@@ -72,11 +72,11 @@ class Exporter {
   void Run() {
     for (const ExportFormatInfo& info : kExportFormats) {
       if (!options_.formats.contains(info.format)) continue;
-      context_.cancel().ThrowIfCancelled();
+      context_.ThrowIfCancelled();
       if (!info.needs_motion || in_time_.motion.size() > 0) {
         Write(info.format);
       } else if (info.by_default == ExportDefault::kOff || options_.formats.size() == 1) {
-        Warn("nothing moves in this scene: {} is not written", info.artifact);
+        context_.Warn("nothing moves in this scene: {} is not written", info.artifact);
       }
     }
     if (context_.HasInput(artifact::kKeyView)) {
@@ -86,11 +86,6 @@ class Exporter {
   }
 
  private:
-  template <typename... Values>
-  void Warn(fmt::format_string<Values...> text, Values&&... values) {
-    context_.progress().OnWarning(fmt::format(text, std::forward<Values>(values)...));
-  }
-
   // The one list of writers.
   void Write(ExportFormat format) {
     switch (format) {
@@ -169,7 +164,7 @@ class Exporter {
   void WriteMoments() {
     const double span = in_time_.motion.end_s - in_time_.motion.begin_s;
     for (int i = 0; i < options_.moments; ++i) {
-      context_.cancel().ThrowIfCancelled();
+      context_.ThrowIfCancelled();
       const double share =
           options_.moments > 1 ? static_cast<double>(i) / (options_.moments - 1) : 0.5;
       const GaussianModel at =
@@ -177,7 +172,7 @@ class Exporter {
       context_.WriteOutput(
           fmt::format("{}{:05}.ply", artifact::kMoments, i + 1),
           EncodeGaussianPly(at, FitRgbHarmonics(at, context_.pool()), frame_, context_.pool()));
-      context_.progress().OnProgress(i + 1, options_.moments, "writing moments");
+      context_.ReportProgress(i + 1, options_.moments, "writing moments");
     }
   }
 
@@ -206,7 +201,7 @@ void ExportOptions::Validate() const {
   if (formats.empty()) {
     throw InvalidArgument("the export has nothing to write; ask for {}", ExportFormatNames());
   }
-  if (confidence && std::none_of(formats.begin(), formats.end(), [](ExportFormat format) {
+  if (confidence && std::ranges::none_of(formats, [](ExportFormat format) {
         return InfoOf(format).carries_confidence;
       })) {
     throw InvalidArgument("only a PLY can carry confidence; ask for ply too");

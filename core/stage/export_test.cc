@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, ExportWritesFilesInTheFrameOfTheWorld) {
+TEST_F(StageTest, ExportUsesWorldCoordinates) {
   Scene scene = RampScene(scratch_.path(), 48, 32);
   scene.world_from_scene_scale = 0.001;
   scene.world_offset = {1e6, 0.0, 0.0};
@@ -60,12 +60,12 @@ TEST_F(StageTest, ExportWritesFilesInTheFrameOfTheWorld) {
   EXPECT_EQ(ReadGlb(ReadFile(scratch_.path() / "out/scene.glb")).position, from_ply.position);
 }
 
-// The ball is the Gaussian that is not as far as the wall.
+// x of the ball, the Gaussian in front of the wall.
 double BallX(const std::vector<double>& position) {
   return position[2] < position[5] ? position[0] : position[3];
 }
 
-class ExportInTime : public StageTest {
+class ExportDynamicTest : public StageTest {
  protected:
   void SetUp() override {
     Scene scene = RampScene(scratch_.path(), 48, 32);
@@ -76,7 +76,7 @@ class ExportInTime : public StageTest {
   }
 };
 
-TEST_F(ExportInTime, WritesAPlyForEachTime) {
+TEST_F(ExportDynamicTest, WritesAPlyForEachTime) {
   StageContext context = MakeContext();
   RunExport({.formats = {ExportFormat::kPly, ExportFormat::kMoments}, .moments = 5}, context);
   for (int i = 0; i < 5; ++i) {
@@ -89,7 +89,7 @@ TEST_F(ExportInTime, WritesAPlyForEachTime) {
                           context.outputs().end(),
                           [](const std::string& name) { return name.starts_with("moments/"); }),
             5);
-  // scene.ply is the key view's moment, the middle one; so is a single moment.
+  // scene.ply has the time of the key view, the middle one; so does a single moment.
   const ViewerGaussians key = ReadPly(ReadFile(scratch_.path() / "out/scene.ply"));
   EXPECT_NEAR(BallX({key.position.begin(), key.position.end()}), 0.0, 1e-5);
   StageContext one = MakeContext();
@@ -99,7 +99,7 @@ TEST_F(ExportInTime, WritesAPlyForEachTime) {
   EXPECT_NEAR(BallX({middle.position.begin(), middle.position.end()}), 0.0, 1e-5);
 }
 
-TEST_F(ExportInTime, Splat4dHasAFrameForEachTime) {
+TEST_F(ExportDynamicTest, Splat4dHasAFrameForEachTime) {
   StageContext context = MakeContext();
   RunExport({.formats = {ExportFormat::kSplat4d}}, context);
   const Splat4dFile file = ReadSplat4d(ReadFile(scratch_.path() / "out/scene.splat4d"));
@@ -113,7 +113,7 @@ TEST_F(ExportInTime, Splat4dHasAFrameForEachTime) {
   EXPECT_EQ(std::count(without.outputs().begin(), without.outputs().end(), "scene.splat4d"), 0);
 }
 
-TEST_F(ExportInTime, WritesEveryFormatAlone) {
+TEST_F(ExportDynamicTest, WritesEveryFormatAlone) {
   for (const ExportFormatInfo& info : kExportFormats) {
     SCOPED_TRACE(info.option);
     std::filesystem::remove_all(scratch_.path() / "out");
@@ -124,14 +124,14 @@ TEST_F(ExportInTime, WritesEveryFormatAlone) {
   }
 }
 
-TEST_F(ExportInTime, WarnsWhenTheOnlyFormatNeedsMotion) {
+TEST_F(ExportDynamicTest, WarnsWhenTheOnlyFormatNeedsMotion) {
   AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
   StageContext context = MakeContext();
   RunExport({.formats = {ExportFormat::kSplat4d}}, context);
   EXPECT_NE(observer_.text.find("scene.splat4d is not written"), std::string::npos);
 }
 
-TEST_F(ExportInTime, WritesNoMomentsOfAStaticScene) {
+TEST_F(ExportDynamicTest, WritesNoMomentsOfAStaticScene) {
   AddInput(artifact::kModel, SerializeGaussians(SmallModel()));
   StageContext context = MakeContext();
   RunExport({.formats = {ExportFormat::kPly, ExportFormat::kMoments}, .moments = 3}, context);

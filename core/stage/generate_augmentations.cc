@@ -47,7 +47,7 @@ struct Outcome {
 };
 
 // Number of pictures of each kind. Turns of disabled kinds are dropped.
-std::map<Kind, int> AssignKinds(const AugmentationOptions& options) {
+std::map<Kind, int> CountByKind(const AugmentationOptions& options) {
   std::map<Kind, int> counts;
   for (int i = 0; i < options.samples; ++i) {
     const Kind kind = kOrder[static_cast<size_t>(i) % std::size(kOrder)];
@@ -61,7 +61,7 @@ std::map<Kind, int> AssignKinds(const AugmentationOptions& options) {
 
 // Coloured key view at working size.
 Image KeyLab(const Scene& scene, int key, int max_side_px, const StageContext& context) {
-  const AbMap color = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
+  const AbMap color = ReadAbMap(context, artifact::kKeyColor);
   const ViewImages images(scene, context.scene_folder(), max_side_px, 0);
   const auto l = images.Luminance(key);
   return JoinLab(*l, Resize(color.ab, l->width, l->height));
@@ -80,11 +80,11 @@ KeyPicture ReadKeyPicture(const Scene& scene,
 }
 
 // Requests pictures of the kinds that the backend supports. Other kinds stay in `counts`.
-void TakeFromBackend(const AugmentationOptions& options,
-                     const Image& key_srgb,
-                     StageContext& context,
-                     std::map<Kind, int>* counts,
-                     Outcome* outcome) {
+void GenerateWithBackend(const AugmentationOptions& options,
+                         const Image& key_srgb,
+                         StageContext& context,
+                         std::map<Kind, int>* counts,
+                         Outcome* outcome) {
   const auto remote = context.Remote(options.backend);
   const RemoteInfo info = remote->GetInfo(context.progress(), context.cancel());
   bool asked = false;
@@ -94,15 +94,9 @@ void TakeFromBackend(const AugmentationOptions& options,
       continue;
     }
     asked = true;
-    std::vector<Augmentation> made = AugmentationsFromBackend(options.backend,
-                                                              *remote,
-                                                              info,
-                                                              it->first,
-                                                              it->second,
-                                                              key_srgb,
-                                                              options.max_side_px,
-                                                              context);
-    std::move(made.begin(), made.end(), std::back_inserter(outcome->made));
+    std::vector<Augmentation> made =
+        AugmentationsFromBackend(options, *remote, info, it->first, it->second, key_srgb, context);
+    std::ranges::move(made, std::back_inserter(outcome->made));
     it = counts->erase(it);
   }
   if (asked || counts->empty()) return;
@@ -135,7 +129,7 @@ void MakeSurrogates(const std::map<Kind, int>& counts,
     const std::string obstacle = surrogates.Obstacle(kind);
     int poor = 0;
     for (int i = 0; obstacle.empty() && i < count; ++i) {
-      context.cancel().ThrowIfCancelled();
+      context.ThrowIfCancelled();
       std::optional<GeneratedPicture> made = surrogates.Make(kind, i);
       if (made) {
         outcome->made.push_back(
@@ -143,7 +137,7 @@ void MakeSurrogates(const std::map<Kind, int>& counts,
       } else {
         ++poor;
       }
-      context.progress().OnProgress(++done, total, "generating augmentations");
+      context.ReportProgress(++done, total, "generating augmentations");
     }
     if (!obstacle.empty()) outcome->LeaveOut(name, obstacle);
     if (poor > 0) {
@@ -152,10 +146,10 @@ void MakeSurrogates(const std::map<Kind, int>& counts,
   }
 }
 
-void RemoveNeedless(const AugmentationOptions& options,
-                    const StageContext& context,
-                    std::map<Kind, int>* counts,
-                    Outcome* outcome) {
+void SkipNeedless(const AugmentationOptions& options,
+                  const StageContext& context,
+                  std::map<Kind, int>* counts,
+                  Outcome* outcome) {
   if (options.samples > 0) {
     const std::pair<Kind, bool> switches[] = {{Kind::kOutpaint, options.outpaint},
                                               {Kind::kAnimate, options.animate},
@@ -175,7 +169,7 @@ void RemoveNeedless(const AugmentationOptions& options,
 }
 
 // Masked pixels must not be learnt, and their places in generated pictures are unknown.
-void LeaveOutMasked(std::map<Kind, int>* counts, Outcome* outcome) {
+void SkipMasked(std::map<Kind, int>* counts, Outcome* outcome) {
   for (const auto& [kind, count] : *counts) {
     outcome->LeaveOut(AugmentationKindName(kind), "parts of the key view are masked out");
   }
@@ -246,13 +240,13 @@ void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& 
     }
   }
   const KeyPicture key = ReadKeyPicture(scene, key_index, options.max_side_px, context);
-  std::map<Kind, int> counts = AssignKinds(options);
-  RemoveNeedless(options, context, &counts, &outcome);
-  if (!scene.views[key_index].mask_file.empty()) LeaveOutMasked(&counts, &outcome);
+  std::map<Kind, int> counts = CountByKind(options);
+  SkipNeedless(options, context, &counts, &outcome);
+  if (!scene.views[key_index].mask_file.empty()) SkipMasked(&counts, &outcome);
   if (!options.backend.empty() && !counts.empty()) {
     const int side = std::max(options.max_side_px, kRemoteSidePx);
     const Image key_srgb = SrgbFromLab(KeyLab(scene, key_index, side, context));
-    TakeFromBackend(options, key_srgb, context, &counts, &outcome);
+    GenerateWithBackend(options, key_srgb, context, &counts, &outcome);
   }
   if (!counts.empty()) {
     const Surrogates surrogates(key,

@@ -1,4 +1,4 @@
-// The stage generate_augmentations: the user's files, a generator of the user's, our surrogates.
+// The stage generate_augmentations: files and a generator of the user, and embedded surrogates.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -40,7 +40,8 @@ TEST_F(AugmentationStageTest, MakesEightPicturesWithGeometry) {
     for (size_t i = 0; i < weight.PlaneSize(); ++i) {
       if (weight.data[i] == 0.0f) continue;
       ++weighed;
-      ASSERT_NEAR(ab.ab.Plane(1)[i], 20.0f, 3.0f) << name << ": a colour of nowhere";
+      ASSERT_NEAR(ab.ab.Plane(1)[i], 20.0f, 3.0f)
+          << name << ": a colour that the key view does not have";
     }
     EXPECT_GT(weighed, kWidth * kHeight / 2) << name;
   }
@@ -121,7 +122,7 @@ TEST_F(AugmentationStageTest, ReducesFilesToWorkingSize) {
   EXPECT_EQ(facts.at("samples")[1].at("width"), kWidth);
   EXPECT_EQ(facts.at("samples")[1].at("height"), kWidth / 3);
   options_.files = false;
-  EXPECT_THAT(Names(Run()), IsEmpty()) << "nobody asked for them";
+  EXPECT_THAT(Names(Run()), IsEmpty()) << "not requested";
 }
 
 TEST_F(AugmentationStageTest, NamesUnusableFiles) {

@@ -26,15 +26,15 @@ void WriteEmptyArtifacts(std::string_view stage, StageContext& context) {
 
 }  // namespace
 
-std::string_view LeaveOutIdleStage(std::string_view stage, StageContext& context) {
+std::string_view SkipIdleStage(std::string_view stage, StageContext& context) {
   const auto is_idle = [&](const CaptureKindInfo& info) {
     return !WhyNothingToDo(info.kind, stage).empty();
   };
-  if (std::none_of(CaptureKinds().begin(), CaptureKinds().end(), is_idle)) return "";
+  if (std::ranges::none_of(CaptureKinds(), is_idle)) return "";
   const std::string_view reason = WhyNothingToDo(ReadScene(context).kind(), stage);
   if (reason.empty()) return "";
   WriteEmptyArtifacts(stage, context);
-  context.progress().OnProgress(1, 1, std::string(reason));
+  context.ReportProgress(1, 1, std::string(reason));
   return reason;
 }
 

@@ -10,6 +10,6 @@ namespace color3d {
 
 // Returns the reason why a stage has nothing to do for the scene among the inputs, after writing
 // the empty artifacts that later stages read. Returns "" if the stage has to run.
-std::string_view LeaveOutIdleStage(std::string_view stage, StageContext& context);
+std::string_view SkipIdleStage(std::string_view stage, StageContext& context);
 
 }  // namespace color3d

@@ -26,7 +26,7 @@ std::string FindSplat(const std::vector<std::string>& files) {
   const auto is_splat = [](const std::string& file) {
     return HasSplatExtension(file) && !IsAugmentFile(file) && !IsMaskFile(file);
   };
-  const auto splat = std::find_if(files.begin(), files.end(), is_splat);
+  const auto splat = std::ranges::find_if(files, is_splat);
   if (splat == files.end()) throw InvalidArgument("the scene holds no splat outside of masks/");
   return *splat;
 }
@@ -50,11 +50,11 @@ void ImportSplatScene(const std::string& file,
   Scene& scene = splat.scene;
   if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &splat.warnings);
   if (options.hold_out_block > 0.0) HoldOutBlock(options.hold_out_block, &scene);
-  for (const std::string& warning : splat.warnings) context.progress().OnWarning(warning);
-  const auto count = static_cast<int64_t>(scene.views.size());
+  for (const std::string& warning : splat.warnings) context.Warn(warning);
+  const auto count = std::ssize(scene.views);
   for (int64_t i = 0; i < count; ++i) {
-    context.cancel().ThrowIfCancelled();
-    context.progress().OnProgress(i, count, "drawing views");
+    context.ThrowIfCancelled();
+    context.ReportProgress(i, count, "drawing views");
     View& view = scene.views[static_cast<size_t>(i)];
     view.image_file = artifact::kGivenViews + view.name;
     context.WriteOutput(view.image_file, PhotoOf(splat.geometry, view, context.pool()));
@@ -84,14 +84,15 @@ void RunImportScene(const ImportOptions& options,
   if (layout == CaptureLayout::kFilm)
     return ImportFilm(FindFilm(files), film_options, options, context);
   if (layout == CaptureLayout::kSplat) {
-    WarnOfUnusedOptions(film_options, NoFilm::kPhotos, context);
+    WarnOfUnusedOptions(film_options, ImportedAs::kPhotos, context);
     return ImportSplatScene(FindSplat(files), options, splat_views, context);
   }
   ImportOptions within = options;
   within.memory_bytes = context.MemoryBytes();
   const ImportResult result =
       ImportScene(context.scene_folder(), context.scratch_folder(), within, context.control());
-  const NoFilm what = result.scene.capture().is_dynamic ? NoFilm::kTimedPictures : NoFilm::kPhotos;
+  const ImportedAs what =
+      result.scene.capture().is_dynamic ? ImportedAs::kTimedPictures : ImportedAs::kPhotos;
   WarnOfUnusedOptions(film_options, what, context);
   WriteImported(result, context);
 }

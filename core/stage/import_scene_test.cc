@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, ASplatBecomesViewsAndGeometryThatNeedsNoTraining) {
+TEST_F(StageTest, ImportsSplatAsViewsAndGeometry) {
   ViewerGaussians splat = BallOnGround(800, 0.0f, 1);
   splat.position[4] = std::nanf("");
   WriteFileAtomic(scratch_.path() / "scene.ply", SplatPly(splat));
@@ -38,7 +38,7 @@ TEST_F(StageTest, ASplatBecomesViewsAndGeometryThatNeedsNoTraining) {
   EXPECT_EQ(ParseGaussians(ReadFile(out / artifact::kGeometry)).size(), 799u);
 }
 
-TEST_F(StageTest, PhotosWinOverASplatBesideThem) {
+TEST_F(StageTest, IgnoresSplatBesidePhotos) {
   RampScene(scratch_.path(), 32, 32);
   WriteFileAtomic(scratch_.path() / "points.ply", "ply");
   StageContext context = MakeContext();
@@ -50,16 +50,16 @@ TEST_F(StageTest, PhotosWinOverASplatBesideThem) {
   }
 }
 
-TEST_F(StageTest, OptionsOfFilmsAreToldToBeOfNoUseForPhotosAndSplats) {
+TEST_F(StageTest, WarnsOfFilmOptionsForSplat) {
   WriteFileAtomic(scratch_.path() / "scene.ply", SplatPly(BallOnGround(800, 0.0f, 1)));
   StageContext context = MakeContext();
   RunImportScene({}, context, {.views = 8, .side_px = 96}, {.stride = 2, .deflicker = true});
-  EXPECT_NE(observer_.text.find("film_stride, film_deflicker are left aside: the scene is no film"),
+  EXPECT_NE(observer_.text.find("film_stride, film_deflicker are ignored: the scene is no film"),
             std::string::npos)
       << observer_.text;
 }
 
-TEST_F(StageTest, PicturesWithTimesAreNotCalledNoFilm) {
+TEST_F(StageTest, WarnsOfFilmOptionsForTimedPictures) {
   std::string frames;
   for (const View& view : RampScene(scratch_.path(), 48, 32).views) {
     const double x = -view.cam_from_world.translation.x();
@@ -70,10 +70,9 @@ TEST_F(StageTest, PicturesWithTimesAreNotCalledNoFilm) {
   WriteFileAtomic(scratch_.path() / "transforms.json", "{\"fl_x\":50,\"frames\":[" + frames + "]}");
   StageContext context = MakeContext();
   RunImportScene({}, context, {}, {.stride = 2, .frames_per_second = 16});
-  EXPECT_NE(
-      observer_.text.find("film_stride, film_frames_per_second are left aside: pictures whose "
-                          "times and poses are given are all taken"),
-      std::string::npos)
+  EXPECT_NE(observer_.text.find("film_stride, film_frames_per_second are ignored: pictures with "
+                                "times and poses are all taken"),
+            std::string::npos)
       << observer_.text;
 }
 

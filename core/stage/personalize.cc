@@ -6,7 +6,6 @@
 #include "core/base/evenly.h"
 #include "core/carry/confidence.h"
 #include "core/color/lab.h"
-#include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"
@@ -41,20 +40,20 @@ TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageConte
   ClearMasked(mask, &color.confidence);
   const ChromaLevel chroma = MeasureChroma(JoinLab(luminance, color.ab));
   if (chroma.IsGray()) {
-    context.progress().OnWarning(
-        fmt::format("the coloured key view has almost no colour (mean chroma {:.2f} Lab units), so "
-                    "the scene will stay grey; colour it with hints or a picture",
-                    chroma.mean));
+    context.Warn(
+        "the coloured key view has almost no colour (mean chroma {:.2f} Lab units), so "
+        "the scene will stay grey; colour it with hints or a picture",
+        chroma.mean);
   }
   TrainingPicture picture{"the key view", luminance, std::move(color.ab)};
   const auto unpainted = [](float confidence) { return confidence == 0.0f; };
-  if (std::all_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
+  if (std::ranges::all_of(color.confidence.data, unpainted)) {
     throw InvalidArgument(
         "the painted (and unmasked) parts of the key view are too fine at {} px; "
         "paint areas, or give the picture as strokes, which spread",
         SizeText(luminance));
   }
-  if (std::any_of(color.confidence.data.begin(), color.confidence.data.end(), unpainted)) {
+  if (std::ranges::any_of(color.confidence.data, unpainted)) {
     for (float& value : color.confidence.data) value = unpainted(value) ? 0.0f : 1.0f;
     picture.weight = std::move(color.confidence);
   }
@@ -73,7 +72,7 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
                                              const StageContext& context) {
   std::vector<std::pair<double, TrainingPicture>> found;
   for (int view : PickEvenly(scene.TrainingViews(), kMaxViewsToLookAt)) {
-    const std::string name = ViewArtifact(artifact::kCarried, scene.views[view], ".png");
+    const std::string name = ViewArtifact(artifact::kCarried, scene.views[view]);
     if (view == key || !context.HasInput(name)) continue;
     const auto luminance = images.Luminance(view);
     CarriedColor carried =
@@ -84,10 +83,8 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
       if (value < kTrainingConfidence) value = 0.0f;
     }
     // Best ones so far, best first; ties in order.
-    const auto place =
-        std::upper_bound(found.begin(), found.end(), coverage, [](double value, const auto& other) {
-          return value > other.first;
-        });
+    const auto place = std::ranges::upper_bound(
+        found, coverage, std::ranges::greater(), [](const auto& other) { return other.first; });
     found.insert(place,
                  {coverage,
                   {scene.views[view].name,

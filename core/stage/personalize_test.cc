@@ -50,10 +50,10 @@ TEST_F(PersonalizeStageTest, RefusesKeyColorOfAnotherShape) {
     EXPECT_THAT(e.what(), AllOf(HasSubstr("72x96"), HasSubstr("64x48")));
   }
   AddInput(artifact::kKeyColor, EncodeAbPng(Image(2 * kWidth, 2 * kHeight, 2, 30.0f)));
-  EXPECT_FALSE(Personalize().empty()) << "another size of the same shape will do";
+  EXPECT_FALSE(Personalize().empty()) << "another size of the same shape is accepted";
 }
 
-// Its grey would answer for every other view's, too.
+// Otherwise other views would learn its grey.
 TEST_F(PersonalizeStageTest, IgnoresUnpaintedPixels) {
   Image ab(kWidth, kHeight, 2, 30.0f), painted(kWidth, kHeight, 1, 1.0f);
   for (int y = 0; y < kHeight; ++y) {
@@ -114,7 +114,7 @@ TEST_F(PersonalizeStageTest, RefusesPaintedPartThatIsTooFine) {
 }
 
 TEST_F(PersonalizeStageTest, TrainsOnGeneratedPictures) {
-  // Not the key view itself, whose own cells would answer.
+  // Another picture, because the key view itself is matched exactly.
   const Image luminance = LuminanceOfLab(Painting(kWidth / 2, kHeight));
   const auto colors = [&] {
     return LoadColorizer(Personalize(), Encoder::Embedded(), 1)->Colorize(luminance).data;

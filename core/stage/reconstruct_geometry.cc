@@ -53,7 +53,7 @@ Scene WithDensePoints(Scene scene,
   DensePointsOptions options;
   options.max_points = static_cast<int>(kDenseShare * max_gaussians);
   std::vector<SparsePoint> points = DensePoints(scene, images, options, run, still);
-  std::move(points.begin(), points.end(), std::back_inserter(scene.points));
+  std::ranges::move(points, std::back_inserter(scene.points));
   return scene;
 }
 
@@ -63,10 +63,10 @@ PictureSource StillRegionsOf(const Scene& scene,
                              const StageContext& context) {
   if (context.InputsBelow(artifact::kMovingRegions).empty()) return {};
   return [&](int view) -> std::shared_ptr<const Image> {
-    const std::string name = ViewArtifact(artifact::kMovingRegions, scene.views[view], ".png");
+    const std::string name = ViewArtifact(artifact::kMovingRegions, scene.views[view]);
     if (!context.HasInput(name)) return nullptr;
     return std::make_shared<const Image>(
-        StillRegion(images, scene, view, DecodeImage(context.ReadInput(name), name)));
+        StillRegion(images, scene, view, ReadPicture(context, name)));
   };
 }
 
@@ -100,7 +100,7 @@ void RunReconstructGeometry(const GeometryOptions& options,
   }
   const MemoryPlan memory = PlanMemory(planned, max_side_px, scene, context.MemoryBytes());
   planned.max_gaussians = memory.max_gaussians;
-  if (!memory.note.empty()) context.progress().OnWarning(memory.note);
+  if (!memory.note.empty()) context.Warn(memory.note);
   const ViewImages images(
       scene, context.scene_folder(), memory.max_side_px, memory.image_cache_bytes);
   const Scene unmasked = WithoutMaskedPoints(scene, images);

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, PosesWithoutPointsReconstructAndLittleMemoryIsPlannedFor) {
+TEST_F(StageTest, ReconstructsWithoutPointsAndWithLittleMemory) {
   WriteTransformsJson(RampScene(scratch_.path(), 48, 32), scratch_.path() / "transforms.json");
   StageContext import = MakeContext();
   RunImportScene({}, import);
@@ -37,8 +37,8 @@ TEST_F(StageTest, PosesWithoutPointsReconstructAndLittleMemoryIsPlannedFor) {
   EXPECT_THROW(RunReconstructGeometry(options, 64, none), Error);
 }
 
-// What an import saw to move is nothing to learn from at first.
-TEST_F(StageTest, WhatWasSeenToMoveReachesTheTraining) {
+// Training ignores the moving regions at first.
+TEST_F(StageTest, MovingRegionsAffectTraining) {
   Scene scene = RampScene(scratch_.path(), 48, 32);
   for (size_t v = 0; v < scene.views.size(); ++v) {
     scene.views[v].moment = Moment{0.1 * static_cast<double>(v), 0};
@@ -58,8 +58,7 @@ TEST_F(StageTest, WhatWasSeenToMoveReachesTheTraining) {
   const std::string without = trained();
   EXPECT_EQ(trained(), without);
   for (const View& view : scene.views) {
-    AddInput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
-             EncodePng8(Image(12, 8, 1, 1.0f)));
+    AddInput(ViewArtifact(artifact::kMovingRegions, view), EncodePng8(Image(12, 8, 1, 1.0f)));
   }
   EXPECT_NE(trained(), without);
 }

@@ -1,4 +1,3 @@
-#include "core/splat/raster/render.h"
 
 #include <algorithm>
 
@@ -11,6 +10,7 @@
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/movie/movie.h"
 #include "core/stage/run_stages.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {
@@ -33,7 +33,7 @@ bool HasColors(const StageContext& context, const Scene& scene) {
 }
 
 // Films without poses cannot be rendered along a camera path: they have no geometry.
-void RefusePathThroughFilm(const RenderOptions& options) {
+void CheckPathOfFilm(const RenderOptions& options) {
   if (options.path == RenderOptions::Path::kViews && !options.time_s) return;
   throw InvalidArgument(
       "this film has no poses, so no camera can move through it; its coloured frames are {} of the "
@@ -66,7 +66,7 @@ void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   if (!ColoredAs(context, scene).is_reconstructed) {
-    RefusePathThroughFilm(options);
+    CheckPathOfFilm(options);
     return RenderFilm(options, scene, ViewsToRender(options, scene), context);
   }
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
@@ -86,23 +86,19 @@ void RunRender(const RenderOptions& options, StageContext& context) {
   if (scene.HasTimes()) {  // moving or static
     if (HasColors(context, scene)) WriteFilmsOfCameras(scene, options.pictures, context);
   } else if (options.pictures) {
-    context.progress().OnWarning(
+    context.Warn(
         "pictures is ignored: it is for the frames of films and of dynamic scenes, and these are "
         "photos");
   }
   for (size_t i = 0; i < views.size(); ++i) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     const View& view = scene.views[views[i]];
-    const RenderedView rendered = RenderView(model,
-                                             view.camera.FitWithin(options.max_side_px),
-                                             view.cam_from_world,
-                                             context.pool(),
-                                             0.0f,
-                                             view.time_s());
-    context.WriteOutput(ViewArtifact(artifact::kRenders, view, ".png"),
+    const RenderedView rendered =
+        RenderView(model, view, view.camera.FitWithin(options.max_side_px), context.pool());
+    context.WriteOutput(ViewArtifact(artifact::kRenders, view),
                         EncodePng8(SrgbFromLab(rendered.lab)));
-    context.progress().OnProgress(
-        static_cast<int64_t>(i) + 1, static_cast<int64_t>(views.size()), "rendering " + view.name);
+    context.ReportProgress(
+        static_cast<int64_t>(i) + 1, std::ssize(views), "rendering " + view.name);
   }
 }
 

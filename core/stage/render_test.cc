@@ -6,7 +6,7 @@
 namespace color3d {
 namespace {
 
-TEST(RenderOptions, RangesAreChecked) {
+TEST(RenderOptionsTest, ChecksRanges) {
   RenderOptions options;
   options.Validate();
   options.max_views = 0;

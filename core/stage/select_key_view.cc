@@ -66,7 +66,7 @@ void ChooseManually(const std::string& name,
                     const std::vector<int>& candidates,
                     KeyViewRanking* ranking) {
   const int view = scene.FindView(name);
-  const auto found = std::find(candidates.begin(), candidates.end(), view);
+  const auto found = std::ranges::find(candidates, view);
   if (found == candidates.end()) {
     throw InvalidArgument("the view {} is held out for evaluation and cannot be the key view",
                           scene.views[view].name);
@@ -161,7 +161,7 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
     } else {
       strategy = KeyViewStrategy::kCoverage;
       ranking->fallback = "Coverage in place of tracks: " + reason + ".";
-      context.progress().OnWarning(fmt::format("key view: {}", ranking->fallback));
+      context.Warn("key view: {}", ranking->fallback);
     }
   }
   if (strategy == KeyViewStrategy::kEntropy) {
@@ -215,7 +215,7 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
     ChooseByScore(options, scene, candidates, is_film, context, &ranking);
   }
   for (const std::string& warning : ranking.selection.warnings) {
-    context.progress().OnWarning(warning);
+    context.Warn(warning);
   }
   WarnOfViewsSetAside(ranking, context.progress());
   const View& key = scene.views[candidates[ranking.selection.index]];

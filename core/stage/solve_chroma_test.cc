@@ -8,7 +8,7 @@
 namespace color3d {
 namespace {
 
-// The chroma stage's inputs, on top of the fixture's.
+// Adds the inputs of solve_chroma.
 class ConfidenceTest : public EvaluatedSceneTest {
  protected:
   void SetUp() override {
@@ -41,12 +41,12 @@ TEST_F(ConfidenceTest, ReachesTheModelAndThePly) {
     if (i % 3 == 2) right += model.confidence[i] / 3.0;
   }
   EXPECT_GT(left, right + 0.1);
-  EXPECT_GT(right, 0.3) << "the key view has no provenance of its own: it is seen everywhere";
+  EXPECT_GT(right, 0.3) << "the key view has no provenance and counts as seen";
   EXPECT_THAT(ExportedPly(), testing::HasSubstr("property float confidence\nend_header"));
   EXPECT_EQ(observer_.text, "");
 }
 
-// The two training views disagree: p1 says a = 5, p2 says 25.
+// The two training views disagree: a is 5 in p1 and 25 in p2.
 TEST_F(ConfidenceTest, MaskedPartsDoNotColorTheModel) {
   Image mask(48, 32, 1);
   for (int y = 0; y < 32; ++y) mask.At(0, y, 0) = 1.0f;

@@ -26,7 +26,7 @@ constexpr size_t kMaxPictures =
     48;  // photos with a picture; the others have a name and a camera only
 
 // Adds the exported file and the confidence of its Gaussians in the same order.
-void AddScene(const GaussianModel& model,
+void SetScene(const GaussianModel& model,
               const ExportFrame& frame,
               const ExportedFile& file,
               StageContext& context,
@@ -61,8 +61,8 @@ std::vector<ViewPagePhoto> PhotosOf(const Scene& scene,
     if (count <= kMaxPictures || next > evenly || photos[i].view == key_view) pictured.push_back(i);
   }
   const ViewImages images(scene, context.scene_folder(), kPhotoPx, 0);
-  context.pool().ForEach(static_cast<int64_t>(pictured.size()), [&](int64_t i, int) {
-    context.cancel().ThrowIfCancelled();
+  context.pool().ForEach(std::ssize(pictured), [&](int64_t i, int) {
+    context.ThrowIfCancelled();
     ViewPagePhoto& photo = photos[pictured[i]];
     photo.jpeg = EncodeJpeg(images.Srgb(photo.view), kPhotoQuality);
   });
@@ -79,9 +79,9 @@ bool WriteViewPage(const Scene& scene,
                    StageContext& context) {
   if (file.name.empty()) return false;
   if (!HasViewer()) {
-    context.progress().OnWarning(fmt::format(
+    context.Warn(
         "this build has no viewer, so {} is not written; build it where npm reaches its registry",
-        artifact::kViewPage));
+        artifact::kViewPage);
     return false;
   }
   const View& key = scene.views.at(key_view);
@@ -89,7 +89,7 @@ bool WriteViewPage(const Scene& scene,
   const RenderedView rendered = RenderView(model, camera, key.cam_from_world, context.pool());
 
   ViewPage page;
-  AddScene(model, ExportFrameOf(scene), file, context, &page);
+  SetScene(model, ExportFrameOf(scene), file, context, &page);
   page.key_view = key_view;
   page.focus = FocusOf(key, camera, rendered.median_depth);
   page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);

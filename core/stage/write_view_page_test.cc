@@ -5,6 +5,7 @@
 #include "core/base/text/base64.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/view/view_page.h"
+#include "core/zip/gzip.h"
 #include "tests/support/stages/stage_fixture.h"
 
 namespace color3d {

@@ -1,4 +1,4 @@
-// Films of every codec and container: all their frames, and no frame that is damaged.
+// Films of every codec and container: all frames are read, and damaged ones are not returned.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,8 +22,8 @@ class FilmContainersTest : public testing::Test {
   ScratchFolder folder_;
 };
 
-// In order; a second time, as it is done to steady exposure; from the middle; by strides longer
-// than a group; and backwards.
+// Reads in order, twice (as the exposure correction does); from the middle; by strides longer than
+// a group; and backwards.
 void ExpectEveryFrame(const fs::path& file, int frames) {
   FilmReader film(file);
   ASSERT_EQ(film.times().size(), static_cast<size_t>(frames));
@@ -44,7 +44,7 @@ TEST_F(FilmContainersTest, FindsEveryFrameOfEveryContainer) {
     int b_frames;
     bool is_flat;
   } kinds[] = {{"libx264", "film.mts", 2, false},
-               {"libx264", "film.avi", 3, false},  // of which some are referred to
+               {"libx264", "film.avi", 3, false},  // some of which are reference pictures
                {"libx264", "film.vob", 2, true},
                {"libx264", "film.mkv", 2, false},
                {"libx264", "film.flv", 2, false},
@@ -121,14 +121,14 @@ double DifferingShare(const Image& x, const Image& y) {
   return static_cast<double>(differ) / static_cast<double>(x.PlaneSize());
 }
 
-// A frame in the middle of a group is damaged. What is handed over is as it was.
+// A frame in the middle of a group is damaged. Returned frames are unchanged.
 TEST_F(FilmContainersTest, FramesPredictedFromDamagedOneAreDamaged) {
   constexpr int kFrames = 60, kDamaged = 16;  // key frames at 0, 12, 24, ... or one or two later
   const struct {
     const char* encoder;
     const char* ending;
     int b_frames;
-    int begin, end;  // of what is damaged, behind the headers of the picture and its container
+    int begin, end;  // damaged bytes, after the headers of the picture and its container
   } kinds[] = {{"libx264", ".mp4", 0, 40, 2000},
                {"libx264", ".mkv", 2, 40, 2000},
                {"mpeg2video", ".mts", 2, 380, 560},
@@ -169,7 +169,7 @@ TEST_F(FilmContainersTest, FramesPredictedFromDamagedOneAreDamaged) {
       const bool is_near = i >= 12 && i < 27;
       EXPECT_TRUE(is_whole[i] || is_near) << i;
     }
-    // Whatever it is read after.
+    // Independent of the order of reading.
     FilmReader back(broken);
     for (int i = kFrames - 1; i >= 0; --i) {
       try {

@@ -1,4 +1,4 @@
-// Films that name other files: none of these is opened.
+// Films that refer to other files, which must not be opened.
 #include "core/video/film_file.h"
 
 #include <gmock/gmock.h>
@@ -29,7 +29,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-// What the kernel tells of a file.
+// Events of a file from the kernel.
 class Watch {
  public:
   Watch(const fs::path& file, uint32_t events) : descriptor_(inotify_init1(IN_CLOEXEC)) {
@@ -68,8 +68,8 @@ uint32_t ReadBigEndian(const std::string& bytes, size_t at) {
   return value;
 }
 
-// An alias of Mac OS (the `alis` box), as it stands in reference movies: with the name of the file
-// and its path as records 14 and 18.
+// An alias of Mac OS (the `alis` box) of reference movies, with the file's name and path as records
+// 14 and 18.
 std::string Alias(const std::string& name, const std::string& path) {
   std::string alias = BigEndian(0, 4) + BigEndian(0, 2) + BigEndian(2, 2) + BigEndian(0, 2);
   alias += '\4' + std::string("disk") + std::string(23, '\0');  // volume
@@ -85,7 +85,7 @@ std::string Alias(const std::string& name, const std::string& path) {
          BigEndian(0, 2);
 }
 
-// A movie whose samples lie at the same places of another file.
+// A movie whose samples are at the same offsets of another file.
 void MakeReferenceMovie(const fs::path& from, const fs::path& to, const std::string& other) {
   std::string bytes = ReadFile(from);
   const size_t type = bytes.rfind("dref");
@@ -111,7 +111,7 @@ std::string Element(uint32_t id, const std::string& body) {
   return BigEndian(id, id_bytes) + '\1' + BigEndian(body.size(), 7) + body;
 }
 
-// A segment without pictures that names the one that goes on, by its identity and its file.
+// A segment without pictures that names the next one by its identity and its file.
 std::string LinkedMatroska(const std::string& next) {
   const std::string header = Element(0x1A45DFA3, Element(0x4282, "matroska"));
   const std::string info =
@@ -127,7 +127,7 @@ std::string LinkedMatroska(const std::string& next) {
 
 class FilmFileTest : public testing::Test {
  protected:
-  // A film with sound that others name.
+  // A film with sound that other films refer to.
   FilmFileTest() {
     WriteNumberedFilm(folder_.path() / "pictures.ts",
                       {.encoder = "mpeg2video", .frames = 30, .group = 6});
@@ -172,7 +172,7 @@ TEST_F(FilmFileTest, RejectsPlaylistsUnderAnyExtension) {
       "#EXTM3U\n#EXT-X-VERSION:3\n#EXT-X-TARGETDURATION:2\n#EXTINF:1.2,\nsecret.ts\n#EXT-X-"
       "ENDLIST\n",
       "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXTINF:1.2,\nfile://" + path + "\n#EXT-X-ENDLIST\n",
-      // One without an end, which is asked for again and again.
+      // A live playlist, which players request repeatedly.
       "#EXTM3U\n#EXT-X-TARGETDURATION:2\n#EXT-X-MEDIA-SEQUENCE:0\n#EXTINF:1.2,\nsecret.ts\n",
       "#EXTM3U\n#EXT-X-STREAM-INF:BANDWIDTH=1000\nother.m3u8\n",
       "ffconcat version 1.0\nfile secret.ts\n",
@@ -219,7 +219,7 @@ TEST_F(FilmFileTest, MatroskaSegmentsOpenNoOtherFile) {
   EXPECT_FALSE(opened.HasEvent());
 }
 
-// A name in which FFmpeg's libraries would see a pattern, a protocol or a list is one of a file.
+// Names that FFmpeg's libraries would take as a pattern, a protocol or a list are file names.
 TEST_F(FilmFileTest, TakesUrlsAsFileNames) {
   for (const char* name :
        {"f%01d.mp4", "concat:a|b.ts", "http:a.ts", "*.ts", "-i.ts", "a b#?.ts"}) {
@@ -277,8 +277,8 @@ TEST_F(FilmFileTest, CancellationEndsEveryCall) {
       ErrorCode::kCancelled);
 }
 
-// A terabyte of nothing behind the film's beginning: FFmpeg's libraries look for a picture in it
-// for a quarter of an hour, in one call.
+// A terabyte of zeros after the film's beginning: FFmpeg's libraries search it for a picture for a
+// quarter of an hour in one call.
 TEST_F(FilmFileTest, CancellationInterruptsLibraries) {
   const fs::path file = folder_.path() / "film.mpg";
   ASSERT_TRUE(WriteNumberedFilm(file, {.encoder = "mpeg2video", .frames = 30}));

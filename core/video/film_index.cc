@@ -16,16 +16,16 @@ struct CloseParser {
 
 // A larger step back in decoding time means concatenated films.
 constexpr double kFallbackS = 1.0;
-constexpr size_t kMostPackets = 4'000'000;  // more than any part and stride asks for
+constexpr size_t kMostPackets = 4'000'000;  // more than any part and stride needs
 
 struct Scanned {
   FilmPacket packet;
-  int64_t dts = AV_NOPTS_VALUE;  // without such falls
-  // Properties that the picture states, if parsed:
+  int64_t dts = AV_NOPTS_VALUE;  // continuous over concatenated films
+  // Read from the picture's header, if parsed:
   bool is_b = false;         // shown as soon as it is decoded
-  int number = 0;            // its place among those shown since the numbers began anew
-  bool begins_anew = false;  // with this one
-  bool is_second = false;    // field, of the frame that the packet before it began
+  int number = 0;            // presentation number since the last restart
+  bool begins_anew = false;  // numbers restart at this picture
+  bool is_second = false;    // second field of the previous packet's frame
 };
 
 // Presentation order follows picture numbers; B pictures may be reference pictures.
@@ -86,7 +86,7 @@ class PictureHeaders {
 };
 
 // Shifts concatenated films so that each begins where the previous one ends.
-void RaiseFalls(double tick, std::vector<Scanned>* scanned) {
+void JoinConcatenatedTimes(double tick, std::vector<Scanned>* scanned) {
   int64_t rise = 0, last = AV_NOPTS_VALUE, step = 0;
   for (Scanned& picture : *scanned) {
     const int64_t dts = picture.packet.dts;
@@ -221,7 +221,7 @@ void NumberFrames(FilmIndex* index) {
                                     stamps.begin());
     if (packet.is_key) {
       index->keys.push_back(static_cast<int>(i));
-      latest = -1;  // what comes before it says nothing of what is behind it
+      latest = -1;  // earlier packets do not affect later ones
     }
     packet.is_leading =
         !index->keys.empty() && packet.stamp < index->packets[index->keys.back()].stamp;
@@ -265,7 +265,7 @@ FilmIndex IndexFilm(FilmPackets* packets) {
   }
   if (scanned.empty()) return index;
   if (packets->container()->iformat->flags & AVFMT_TS_DISCONT) {
-    RaiseFalls(av_q2d(packets->stream()->time_base), &scanned);
+    JoinConcatenatedTimes(av_q2d(packets->stream()->time_base), &scanned);
   } else {
     // Only recordings begin between key packets; in other files the first packet just lacks the
     // flag.

@@ -243,7 +243,7 @@ class FilmReader::Impl {
   std::optional<HdrTones> tones_;  // none: they stay
   FilmFacts facts_;
   std::vector<double> times_;
-  int width_ = 0, height_ = 0;  // of square pixels, before turning
+  int width_ = 0, height_ = 0;  // of square pixels, before rotation
 };
 
 FilmReader::FilmReader(fs::path file, const CancellationToken* cancel)

@@ -98,8 +98,8 @@ TEST_F(FilmReaderTest, ReadsFramesInAnyOrder) {
   EXPECT_THROW(film.Read(-1), Error);
 }
 
-// A bar walks to the right; the even lines of each frame show it at one moment, the odd ones half a
-// frame later.
+// A bar moves to the right; the odd lines of each frame show it half a frame later than the even
+// ones.
 double BarAt(double frame) { return 10.0 + 6.0 * frame; }
 
 double MiddleOfBar(const Image& image, int y) {
@@ -171,7 +171,7 @@ TEST_F(FilmReaderTest, AppliesRotationOfPhone) {
     const Image image = film.Read(1);
     ASSERT_EQ(image.width, film.facts().width);
     ASSERT_EQ(image.height, film.facts().height);
-    // The dark side was on the left: clockwise it comes to the top, the right, the bottom.
+    // The dark left side turns clockwise to the top, the right, the bottom.
     const int w = image.width, h = image.height;
     const float dark = turns == 1   ? MeanGreen(image, 8, w - 8, 4, h / 2 - 4)
                        : turns == 2 ? MeanGreen(image, w / 2 + 4, w - 4, 8, h - 8)
@@ -189,7 +189,7 @@ uint32_t BigEndian(const std::string& bytes, size_t at) {
   return value;
 }
 
-// As a phone trims: the track's edit list (ISO 14496-12, 8.6.6) begins later, the pictures stay.
+// Trims as phones do: the track's edit list (ISO 14496-12, 8.6.6) begins later, the pictures stay.
 void TrimBegin(const fs::path& file, double seconds) {
   std::string bytes = ReadFile(file);
   const size_t media = bytes.find("mdhd"), edits = bytes.find("elst");
@@ -265,7 +265,7 @@ TEST_F(FilmReaderTest, RejectsOtherFiles) {
   EXPECT_THAT(Complaint(folder_.path() / "empty.mp4"), HasSubstr("empty.mp4"));
   EXPECT_THAT(Complaint(folder_.path() / "none.mp4"), HasSubstr("there is no film"));
   EXPECT_THAT(Complaint(folder_.path()), HasSubstr("there is no film"));
-  // The index at the front, nothing behind it.
+  // The index at the front, without data after it.
   const fs::path file = Film(30);
   const std::string bytes = ReadFile(file);
   WriteFileAtomic(file, bytes.substr(0, bytes.find("mdat") + 8));

@@ -199,7 +199,7 @@ class FilmSound::Impl {
     }
   }
 
-  // The sample with which the next one that is decoded is heard.
+  // Index of the next decoded sample in the written sound.
   int64_t NextSample() const { return encoded_ + static_cast<int64_t>(waiting_[0].size()); }
 
   void PlaceFrame() {

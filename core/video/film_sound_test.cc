@@ -26,7 +26,7 @@ double Beeps(double time_s) {
   return 0.6 * std::sin(2.0 * M_PI * (400.0 + 200.0 * second) * time_s);
 }
 
-// Where it grows loud after silence, s.
+// Times at which sound follows silence, s.
 std::vector<double> Onsets(const HeardSound& sound) {
   const int window = sound.sample_rate / 200;
   std::vector<double> onsets;
@@ -41,7 +41,7 @@ std::vector<double> Onsets(const HeardSound& sound) {
   return onsets;
 }
 
-// Waves per second after a time.
+// Frequency after a time, Hz.
 double PitchAt(const HeardSound& sound, double time_s) {
   const int begin = static_cast<int>((time_s + 0.02) * sound.sample_rate);
   const int end = static_cast<int>((time_s + 0.08) * sound.sample_rate);
@@ -165,7 +165,7 @@ TEST_F(FilmSoundTest, LeadingSilenceTakesNoMemory) {
 }
 
 TEST_F(FilmSoundTest, NamesUnreadableSound) {
-  // A rate that AAC does not know.
+  // A rate that AAC does not support.
   const fs::path film = WithSound(
       {.encoder = "pcm_s16le", .sample_rate = 37000, .seconds = 2.0, .level = Beeps}, ".mov");
   EXPECT_EQ(PartOf(film, 0.0, 2.0).codec, "");
@@ -208,11 +208,11 @@ TEST_F(FilmSoundTest, KeepsSoundOfRealClips) {
     ASSERT_EQ(part.sample_rate, whole.sample_rate);
     const auto is_zero = [](float sample) { return sample == 0.0f; };
     if (std::all_of(whole.samples.begin(), whole.samples.end(), is_zero)) {
-      // A track of silence stays one.
+      // A silent track is kept.
       EXPECT_TRUE(std::all_of(part.samples.begin(), part.samples.end(), is_zero));
       continue;
     }
-    // Sample by sample, at its place.
+    // Every sample at its time.
     const auto shift = static_cast<int>(std::lround((facts.first_s + begin_s) * whole.sample_rate));
     double best = -1.0;
     int at = 0;

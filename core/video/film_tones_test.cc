@@ -1,4 +1,4 @@
-// Tones of films in every codec and pixel format that archives, cameras and programs give them.
+// Tones of films in every codec and pixel format of archives, cameras and programs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -28,7 +28,7 @@ struct Fit {
   double slope = 0.0, offset = 0.0;
 };
 
-// Of the first frame's tones over those of a wedge from 0 to 1.
+// Fits the first frame's tones to those of a wedge from 0 to 1.
 Fit FitTones(const Image& image) {
   const int n = image.width;
   double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
@@ -173,7 +173,7 @@ TEST_F(FilmTonesTest, TakesDefaultOfSeveralStreams) {
                {{small, large}, 0.75, "the largest"},
                {{large, small}, 0.75, "the largest"}};
   for (const auto& [streams, tone, said] : films) {
-    // AVI marks none.
+    // AVI states none.
     const bool has_default = streams[0].is_default || streams[1].is_default;
     const fs::path file = folder_.path() / (has_default ? "a.mkv" : "a.avi");
     ASSERT_TRUE(WriteToneFilm(file, streams));
@@ -198,7 +198,7 @@ TEST_F(FilmTonesTest, RejectsLargeFramesBeforeDecoding) {
   const fs::path file = folder_.path() / "a.mov";
   ASSERT_TRUE(WriteToneFilm(file, {{.encoder = "png", .width = 9000, .height = 16}}));
   EXPECT_THAT(Complaint(file), HasSubstr("its frames are 9000 x 16 px; up to 8192 px are taken"));
-  // Pictures that claim 30,000 x 30,000 px, in a film that says 64 x 48.
+  // Pictures that claim 30,000 x 30,000 px in a film of 64 x 48.
   ASSERT_TRUE(WriteToneFilm(file, {{.encoder = "png"}}));
   std::string bytes = ReadFile(file);
   const std::string side("\0\0\x75\x30", 4);

@@ -68,7 +68,8 @@ Image FrameConverter::Convert(const AVFrame& frame, AVColorRange range, int widt
   Prepare({frame.width, lines, frame.format, width, height});
   const bool is_full = range == AVCOL_RANGE_UNSPECIFIED ? is_full_ : range == AVCOL_RANGE_JPEG;
   constexpr int kOne = 1 << 16;
-  // Both count matrices as the standards do; a frame of Y'CbCr that claims to be RGB does not know.
+  // FFmpeg's and the frame's numbers of matrices agree. Y'CbCr frames that claim RGB get the
+  // default.
   const int matrix = frame.colorspace == AVCOL_SPC_RGB ? SWS_CS_DEFAULT : frame.colorspace;
   sws_setColorspaceDetails(converter_.get(),
                            sws_getCoefficients(matrix),

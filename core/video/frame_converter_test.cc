@@ -34,8 +34,8 @@ Frame EmptyFrame(AVPixelFormat format) {
 
 bool IsFloat(const AVPixFmtDescriptor& facts) { return (facts.flags & AV_PIX_FMT_FLAG_FLOAT) != 0; }
 
-// Colours that change along both sides, as FFmpeg's libraries put them into the format; where they
-// only read it, any bytes.
+// A gradient along both axes, converted by FFmpeg's libraries; arbitrary bytes for formats that
+// they only read.
 Frame Pattern(AVPixelFormat format) {
   Frame frame = EmptyFrame(format);
   if (sws_isSupportedOutput(format) <= 0) {
@@ -73,7 +73,7 @@ Frame Pattern(AVPixelFormat format) {
   return frame;
 }
 
-// As `ffmpeg -pix_fmt rgb48` does it: a range that the frame states counts, else the format's own.
+// Converts as `ffmpeg -pix_fmt rgb48`: with the range that the frame states, else the format's own.
 Image Expected(const AVFrame& frame) {
   const auto format = static_cast<AVPixelFormat>(frame.format);
   SwsContext* reader = sws_getContext(kWidth,
@@ -92,7 +92,7 @@ Image Expected(const AVFrame& frame) {
   int from_full = 0, to_full = 0, brightness = 0, contrast = 0, saturation = 0;
   sws_getColorspaceDetails(
       reader, &from, &from_full, &to, &to_full, &brightness, &contrast, &saturation);
-  // Of greys in floating point FFmpeg's libraries forget that they are of full range.
+  // FFmpeg's libraries do not treat grey floating-point formats as full range.
   if (IsGray(format) && IsFloat(facts)) from_full = 1;
   if (frame.color_range != AVCOL_RANGE_UNSPECIFIED) {
     from_full = frame.color_range == AVCOL_RANGE_JPEG ? 1 : 0;
@@ -128,7 +128,7 @@ std::vector<AVPixelFormat> Formats() {
   return formats;
 }
 
-// With a luma of whole numbers.
+// Formats with integer luma.
 std::vector<AVPixelFormat> LumaFormats() {
   std::vector<AVPixelFormat> formats;
   for (const AVPixelFormat format : Formats()) {
@@ -150,7 +150,7 @@ class FrameConverterTest : public testing::TestWithParam<AVPixelFormat> {
  protected:
   const AVPixFmtDescriptor& facts() const { return *av_pix_fmt_desc_get(GetParam()); }
 
-  // A frame of one luma, and of no colour: `share` of the way from black to white.
+  // A grey frame of one luma, `share` of the way from black to white.
   Frame Plain(double share, bool is_full) {
     Frame frame = EmptyFrame(GetParam());
     for (int c = 0; c < facts().nb_components; ++c) {
@@ -187,7 +187,7 @@ TEST_P(FrameConverterTest, AgreesWithFfmpeg) {
   }
 }
 
-// Without any help of FFmpeg's conversions: black, grey and white by what the standards say.
+// Black, grey and white by the standards, without FFmpeg's conversions.
 TEST_P(LumaFormatTest, TonesMatchFormat) {
   const bool is_jpeg = std::string(facts().name).starts_with("yuvj");
   FrameConverter converter;

@@ -8,7 +8,7 @@ namespace color3d {
 namespace {
 
 constexpr int kCodes = 65536;
-constexpr int kSteps = 4096;  // of a table between which values are interpolated
+constexpr int kSteps = 4096;  // of the interpolated tables
 constexpr double kMostNits = 10000.0;
 // Weights of luminance, BT.2020.
 constexpr float kRed = 0.2627f, kGreen = 0.6780f, kBlue = 0.0593f;

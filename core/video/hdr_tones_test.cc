@@ -80,7 +80,7 @@ TEST(HdrTones, ConvertsBt2020ToBt709) {
   EXPECT_NEAR(red.At(0, 0, 0), 1.0f, 2e-3f);
   EXPECT_NEAR(red.At(1, 0, 0), 0.0f, 0.01f);
   EXPECT_NEAR(red.At(2, 0, 0), 0.0f, 0.01f);
-  // What BT.709's primaries cannot show is clipped.
+  // Colours outside BT.709 are clipped.
   Image wide(2, 1, 3);
   wide.At(1, 0, 0) = 1.0f;
   wide.At(2, 0, 1) = 1.0f;

@@ -33,12 +33,12 @@ struct CloseMovie {
   }
 };
 
-// `result`: what FFmpeg returned, < 0.
+// `result`: return value of FFmpeg, < 0.
 [[noreturn]] void Fail(const fs::path& path, const char* what, int result) {
   const std::string words = LibavError(result);
   if (result == AVERROR(ENOSPC) || result == AVERROR(EDQUOT) || result == AVERROR(EFBIG)) {
     throw Error(ErrorCode::kResourceExhausted,
-                "no room for {}: {}; free some disk space",
+                "cannot write {}: {}; free some disk space",
                 path.filename().string(),
                 words);
   }
@@ -88,7 +88,7 @@ class Mp4Writer::Impl {
 
   void Add(const Image& srgb, ThreadPool& pool) {
     if (options_.ticks_per_second > 0) {
-      throw InvalidArgument("pictures of this movie have times of their own (AddAt)");
+      throw InvalidArgument("pictures of this movie need a time; use AddAt");
     }
     AddTick(count_, 1, srgb, pool);
   }
@@ -98,7 +98,7 @@ class Mp4Writer::Impl {
     if (options_.ticks_per_second == 0 || !(seconds > 0.0) || tick < 0 ||
         (count_ == 0 ? tick != 0 : tick <= last_tick_)) {
       throw InvalidArgument(
-          "a picture at {} s for {} s cannot follow {} others in a movie of {} ticks a second",
+          "a picture at {} s for {} s cannot follow {} others in a movie of {} ticks per second",
           time_s,
           seconds,
           count_,
@@ -109,7 +109,7 @@ class Mp4Writer::Impl {
   }
 
   void Finish() {
-    if (count_ == 0) throw InvalidArgument("a movie needs a picture");
+    if (count_ == 0) throw InvalidArgument("a movie needs at least one picture");
     Encode(nullptr);
     WriteSound(std::numeric_limits<double>::infinity());
     Require(av_write_trailer(movie_.get()), "write the end of");
@@ -122,8 +122,8 @@ class Mp4Writer::Impl {
   void AddTick(int64_t tick, int64_t ticks, const Image& srgb, ThreadPool& pool) {
     if (srgb.width != options_.width || srgb.height != options_.height || srgb.channels != 3) {
       throw InvalidArgument(
-          "a picture of {} x {} px and {} channels is no part of a movie of {} x "
-          "{} px in colour",
+          "a picture of {} x {} px and {} channels does not fit a colour movie of {} x "
+          "{} px",
           srgb.width,
           srgb.height,
           srgb.channels,
@@ -157,7 +157,7 @@ class Mp4Writer::Impl {
     check("threads", options_.threads, 1, 1024);
     if (options_.width % 2 != 0 || options_.height % 2 != 0) {
       throw InvalidArgument(
-          "a movie's sides must be even; these are {} x {} px", options_.width, options_.height);
+          "the sides of a movie must be even, not {} x {} px", options_.width, options_.height);
     }
   }
 
@@ -173,8 +173,8 @@ class Mp4Writer::Impl {
     av_strerror(failure, words, sizeof words);
     throw Error(
         ErrorCode::kFailedPrecondition,
-        "this machine's libavcodec encodes no movie ({}): it has none of {}, or none works; "
-        "install one with libx264 (Debian's libavcodec), or ask for pictures instead",
+        "libavcodec of this machine cannot encode movies ({}): it has none of {}, or none works; "
+        "install one with libx264 (Debian's libavcodec), or render pictures instead",
         words,
         EncodersText());
   }

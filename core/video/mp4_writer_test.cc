@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-// Soft stripes of full colours that wander by a few pixels from frame to frame.
+// Soft stripes of full colours that move by a few pixels per frame.
 Image Stripes(int width, int height, int frame) {
   Image image(width, height, 3);
   for (int y = 0; y < height; ++y) {

@@ -14,12 +14,12 @@ namespace color3d {
 namespace {
 
 constexpr float kSilence = -8.0f;
-constexpr int kTrend = 20;  // levels to either side: what is slower is the room's and the gain's
+constexpr int kTrend = 20;  // levels on either side; slower changes are of the room and the gain
 // Adjacent levels are correlated: this number of them counts as one observation.
 constexpr double kLevelsPerSample = 5.0;
 constexpr double kLeastOverlapS = 2.0;
-// Minimum correlation in standard deviations of unrelated sounds: one lag of many must stand out
-// clearly.
+// Minimum correlation in standard deviations of unrelated sounds: one lag of many must be
+// clearly better.
 constexpr double kLeastScore = 7.0;
 constexpr double kLeastLead = 1.4;  // over the best lag elsewhere
 constexpr int kPeakReach = 25;      // levels about the best lag that are still its peak

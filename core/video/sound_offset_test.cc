@@ -14,7 +14,7 @@
 namespace color3d {
 namespace {
 
-// Speech of a kind: syllables of uneven strength, a hundred levels a second.
+// Like speech: syllables of uneven strength, a hundred levels per second.
 std::vector<float> Talk(uint64_t seed, int count) {
   Random random(seed);
   std::vector<float> levels;
@@ -66,7 +66,7 @@ TEST(SoundOffsetTest, UnrelatedSoundsHaveNoOffset) {
   EXPECT_FALSE(SoundOffset(Talk(1, 100), Talk(1, 100))) << "a second tells too little";
 }
 
-// A beat fits as well a beat later.
+// A beat matches itself one beat later, too.
 TEST(SoundOffsetTest, PeriodicSoundHasNoOffset) {
   std::vector<float> beat(2000, -6.0f);
   for (size_t i = 0; i < beat.size(); i += 50) beat[i] = beat[i + 1] = beat[i + 2] = -2.0f;

@@ -10,7 +10,7 @@ extern "C" {
 namespace color3d {
 namespace {
 
-constexpr int kMostTicks = 65535;  // that MPEG-4's own header can say
+constexpr int kMostTicks = 65535;  // maximum of MPEG-4's header
 constexpr int kLeastTicks = 1000;  // players take coarser clocks for broken ones
 constexpr double kWholeTick = 1e-3;
 

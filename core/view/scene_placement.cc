@@ -44,7 +44,7 @@ ScenePlacement PlaceScene(const Scene& scene, int key_view, const Vector3d& focu
   const View& key = scene.views.at(key_view);
   const double distance = (focus - key.cam_from_world.Center()).norm();
   if (!(distance > 0.0) || !std::isfinite(distance)) {
-    throw InvalidArgument("the key view {} looks at nothing: its focus is where its camera is",
+    throw InvalidArgument("the focus of the key view {} is at its camera; choose another key view",
                           key.name);
   }
   const Vector3d y = UpVector(scene.views);

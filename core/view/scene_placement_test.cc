@@ -28,7 +28,7 @@ View Looking(const Vector3d& position,
   return view;
 }
 
-TEST(UpTest, CamerasLookingDownFromOneSideAreLevel) {
+TEST(UpVectorTest, CamerasLookingDownFromOneSideAreLevel) {
   const Vector3d up = Vector3d(0.2, -0.9, 0.3).normalized();
   const Vector3d side = up.unitOrthogonal();
   std::vector<View> views;
@@ -36,11 +36,11 @@ TEST(UpTest, CamerasLookingDownFromOneSideAreLevel) {
     const Vector3d around = AngleAxisd(degrees * M_PI / 180, up) * side;
     views.push_back(Looking(3.0 * around + 3.0 * up, Vector3d::Zero(), up));
   }
-  // Their mean leans by 40 degrees; level horizons tell the truth.
+  // Their mean leans by 40 degrees; the level horizons determine the up vector.
   EXPECT_GT(UpVector(views).dot(up), std::cos(12.0 * M_PI / 180));
 }
 
-TEST(UpTest, AveragesRollAndAcceptsOverheadViews) {
+TEST(UpVectorTest, AveragesRollAndAcceptsOverheadViews) {
   const Vector3d up = -Vector3d::UnitY();
   const std::vector<View> rolled = {Looking({0, 0, -2}, Vector3d::Zero(), up, 0.2),
                                     Looking({0.1, 0, -2}, Vector3d::Zero(), up, -0.2)};
@@ -53,7 +53,7 @@ TEST(UpTest, AveragesRollAndAcceptsOverheadViews) {
   EXPECT_EQ(UpVector({}), -Vector3d::UnitY());
 }
 
-TEST(StandTest, KeyViewIsInFrontWithSamePicture) {
+TEST(ScenePlacementTest, KeyViewIsInFrontWithSamePicture) {
   Scene scene;
   const Vector3d up = Vector3d(0.1, -1.0, 0.2).normalized(), focus(1.0, 2.0, 3.0);
   scene.views = {Looking({5, 1, 0}, focus, up), Looking({4, 1, -4}, focus, up)};
@@ -65,7 +65,7 @@ TEST(StandTest, KeyViewIsInFrontWithSamePicture) {
   EXPECT_GT(key.position.z(), 0.0);
   EXPECT_LT(key.target.norm(), 1e-9);
   EXPECT_GT((placement.rotation * up).y(), 0.999);
-  // A point has the same place before the camera in both worlds, but for the size and the axes.
+  // A point has the same position relative to the camera in both worlds, up to scale and axes.
   const Vector3d point(1.5, 2.5, 2.0);
   for (const View& view : scene.views) {
     const PageCamera camera = PlaceCamera(placement, view);
@@ -77,7 +77,7 @@ TEST(StandTest, KeyViewIsInFrontWithSamePicture) {
   EXPECT_THROW(PlaceScene(scene, 1, scene.views[1].cam_from_world.Center()), Error);
 }
 
-TEST(StandTest, OverheadCameraHasUprightPicture) {
+TEST(ScenePlacementTest, OverheadCameraHasUprightPicture) {
   Scene scene;
   scene.views = {Looking({0, -3, 0}, Vector3d::Zero(), Vector3d::UnitZ()),
                  Looking({0, 0, -3}, Vector3d::Zero(), -Vector3d::UnitY()),
@@ -86,7 +86,7 @@ TEST(StandTest, OverheadCameraHasUprightPicture) {
   const ScenePlacement placement = PlaceScene(scene, 0, Vector3d::Zero());
   EXPECT_NEAR(std::abs(placement.rotation.toRotationMatrix().determinant()), 1.0, 1e-12);
   EXPECT_GT(PlaceCamera(placement, scene.views[0]).position.y(), 1.8);
-  // What is behind a camera is nothing to turn around.
+  // A point behind the camera is not a centre of orbit.
   View away = Looking({0, 0, -3}, {0, 0, -9}, -Vector3d::UnitY());
   EXPECT_GT((PlaceCamera(placement, away).target - PlaceCamera(placement, away).position).norm(),
             1.0);

@@ -31,7 +31,7 @@ std::string FirstOf(const std::vector<std::string>& programs) {
 }
 
 // A wall that the camera sees as two halves: red and seen on its left, blue and guessed on its
-// right. Its Gaussians are not in an order that a viewer would choose.
+// right. Its Gaussians are not in the order of any viewer.
 constexpr int kSide = 48;
 bool OnTheLeft(int i) { return (i * 37) % kSide < kSide / 2; }
 
@@ -59,7 +59,7 @@ Wall MakeWall() {
   return wall;
 }
 
-// The wall in the format of this name, its sureness in the order of that.
+// The wall in this format, with its confidence in the order of the file.
 void TakeWall(const std::string& file_name, ViewPage* page) {
   ThreadPool pool(1);
   const Wall wall = MakeWall();
@@ -159,7 +159,7 @@ TEST_P(BrowserFormatTest, ShowsColorGrayAndProvenance) {
     EXPECT_NEAR(gray[1], gray[2], 2);
     EXPECT_GT(gray[1], 40);
   }
-  // Greens for what was seen, reds for what was guessed; each Gaussian has kept its own.
+  // Seen colours are green, guessed ones red, per Gaussian.
   const auto seen = Seen(looked, "where_from", "left");
   const auto guessed = Seen(looked, "where_from", "right");
   EXPECT_GT(seen[1], seen[0] + 15);

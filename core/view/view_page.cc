@@ -1,7 +1,6 @@
 #include "core/view/view_page.h"
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,13 +10,14 @@
 #include "core/base/text/base64.h"
 #include "core/view/path/turn.h"
 #include "core/view/view_assets.h"
+#include "core/zip/gzip.h"
 
 namespace color3d {
 namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int kTurnSeconds = 24;  // a place of the camera for each
+constexpr int kTurnSeconds = 24;  // one camera position per second
 
 constexpr const char* kAbout =
     "A scene of monochrome photos in colour, made by Color3D. All of it is in this file; nothing "
@@ -103,30 +103,10 @@ std::string Facts(const Scene& scene, const ViewPage& page) {
 
 bool HasViewer() { return !ViewerProgram().empty(); }
 
-std::string Gzip(std::string_view bytes) {
-  z_stream stream{};
-  constexpr int kGzipWindow = 15 + 16;
-  if (deflateInit2(&stream, 6, Z_DEFLATED, kGzipWindow, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
-    throw Error(ErrorCode::kInternal, "zlib does not start");
-  }
-  std::string packed(deflateBound(&stream, bytes.size()), '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
-  stream.avail_in = static_cast<uInt>(bytes.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  const int result = deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  if (result != Z_STREAM_END) {
-    throw Error(ErrorCode::kInternal, "zlib does not pack {} bytes", bytes.size());
-  }
-  return packed;
-}
-
 std::string RenderViewPage(const Scene& scene, const ViewPage& page) {
   if (!HasViewer()) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "this build has no viewer: build again where npm reaches its registry");
+                "this build has no viewer; build again with access to the npm registry");
   }
   const std::string scene_text =
       Base64(page.file_is_compressed ? page.file_bytes : Gzip(page.file_bytes));

@@ -41,7 +41,4 @@ struct ViewPage {
 // Error{kInvalidArgument} if the key view is not among the photos or has no focus (PlaceScene).
 std::string RenderViewPage(const Scene& scene, const ViewPage& page);
 
-// RFC 1952.
-std::string Gzip(std::string_view bytes);
-
 }  // namespace color3d

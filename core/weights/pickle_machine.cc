@@ -117,7 +117,7 @@ void PickleMachine::PushGlobalOfNames() {
 void PickleMachine::PushStorage() {
   const std::vector<uint32_t> id = FirstItems(Pop(), 5, "storage id");
   if (id.size() < 5 || Expect(id[0], Kind::kText, "storage id").text != "storage") {
-    throw bytes_.Damaged("refers to something that is no storage");
+    throw bytes_.Damaged("refers to a value that is not a storage");
   }
   const int64_t type = Expect(id[1], Kind::kGlobal, "storage type").number - kStorageTypes;
   PickleStorage storage;

@@ -8,7 +8,7 @@
 
 #include "core/weights/element_type.h"
 #include "core/weights/pickle.h"
-#include "core/weights/zip_archive.h"
+#include "core/zip/zip.h"
 
 namespace color3d {
 namespace {
@@ -66,14 +66,13 @@ std::vector<float> Gather(const std::vector<float>& storage,
 
 class ArchiveReader {
  public:
-  explicit ArchiveReader(const ByteSource& source)
-      : source_(source), directory_(ReadZipDirectory(source)) {
+  explicit ArchiveReader(const ByteSource& source) : source_(source), zip_(source) {
     FindStem();
-    const ZipRecord* order = FindStored(directory_, stem_ + "byteorder", source);
+    const ZipRecord* order = FindStored("byteorder");
     if (order && source.ReadString(order->offset, std::min<uint64_t>(order->size, 3)) == "big") {
       throw source.Refusal("it was written on a big-endian machine; save it again on another");
     }
-    const ZipRecord& pickle = *FindStored(directory_, stem_ + "data.pkl", source);
+    const ZipRecord& pickle = *FindStored("data.pkl");
     if (pickle.size > kMaxPickleBytes) {
       throw source.Refusal("its data.pkl has {} bytes, far more than a state dict needs",
                            pickle.size);
@@ -97,7 +96,7 @@ class ArchiveReader {
 
  private:
   void FindStem() {
-    for (const auto& [name, record] : directory_) {
+    for (const auto& [name, record] : zip_.records()) {
       const size_t slash = name.find('/');
       if (slash == std::string::npos || name.substr(slash) != "/data.pkl") continue;
       if (!stem_.empty()) throw source_.Refusal("it has more than one data.pkl");
@@ -108,9 +107,22 @@ class ArchiveReader {
           "a zip archive without data.pkl: neither a PyTorch state dict nor "
           "TorchScript");
     }
-    const auto code = directory_.lower_bound(stem_ + "code/");
-    is_script_ = directory_.count(stem_ + "constants.pkl") > 0 ||
-                 (code != directory_.end() && code->first.starts_with(stem_ + "code/"));
+    const auto code = zip_.records().lower_bound(stem_ + "code/");
+    is_script_ = zip_.Find(stem_ + "constants.pkl") != nullptr ||
+                 (code != zip_.records().end() && code->first.starts_with(stem_ + "code/"));
+  }
+
+  // Returns the record of that name below the stem, or nullptr. Its bytes are read in place, and
+  // checksums are not verified, since PyTorch may omit them.
+  const ZipRecord* FindStored(const std::string& name) const {
+    const ZipRecord* record = zip_.Find(stem_ + name);
+    if (record && record->method != 0) {
+      throw source_.Refusal(
+          "the record {} is compressed, which PyTorch never does; pack the archive again with "
+          "stored records (zip -0)",
+          QuotedName(stem_ + name));
+    }
+    return record;
   }
 
   void ReadStateDict() {
@@ -171,8 +183,7 @@ class ArchiveReader {
   std::vector<float> ReadTensor(const std::string& name,
                                 const PickleTensor& tensor,
                                 const PickleStorage& storage) {
-    const ZipRecord* record =
-        FindStored(directory_, stem_ + "data/" + std::string(storage.key), source_);
+    const ZipRecord* record = FindStored("data/" + std::string(storage.key));
     if (!record) {
       throw source_.Refusal(
           "the data of {} (record {}) are missing", QuotedName(name), QuotedName(storage.key));
@@ -202,7 +213,7 @@ class ArchiveReader {
   }
 
   const ByteSource& source_;
-  ZipDirectory directory_;
+  ZipReader zip_;
   std::string stem_;  // ends in '/'
   bool is_script_ = false;
   std::string pickle_;

@@ -113,7 +113,7 @@ TEST(TorchArchiveTest, ReadsTensorsThatShareStorage) {
 }
 
 TEST(TorchArchiveTest, RunsNoCode) {
-  // os.system("true"), and the same behind the other way to name a class.
+  // os.system("true"), and the same with the other instruction that names a class.
   PickleWriter direct;
   direct.Global("os", "system").Text("true").Op('\x85').Op('R');
   EXPECT_THAT(RefusalOf(Archive(direct.Finish())), HasSubstr("\"os.system\""));
@@ -197,7 +197,7 @@ TEST(TorchArchiveTest, EndsQuicklyForDeepAndCyclicPickles) {
               HasSubstr("no tensors"));
 }
 
-// Modules that hold each other, and a chain of 60 modules that each hold the next twice (2^60
+// Modules that contain each other, and a chain of 60 modules that each contain the next twice (2^60
 // paths).
 TEST(TorchArchiveTest, RefusesCyclicAndDoublingModules) {
   const auto script = [](const std::string& pickle) {
@@ -269,8 +269,8 @@ TEST(WeightFileTest, DistinguishesOtherKindsOfFiles) {
                                     "F\xf9 j\xa8P\x19.",
                                     15)),
               HasSubstr("before 1.6"));
-  EXPECT_THAT(RefusalOf("\x89HDF\r\n\x1a\n plus more"), HasSubstr("no weight file"));
-  EXPECT_THAT(RefusalOf(""), HasSubstr("no weight file"));
+  EXPECT_THAT(RefusalOf("\x89HDF\r\n\x1a\n plus more"), HasSubstr("not a weight file"));
+  EXPECT_THAT(RefusalOf(""), HasSubstr("not a weight file"));
 }
 
 TEST(WeightFileTest, FourFormatsHaveTheSameValues) {

@@ -28,7 +28,7 @@ WeightMap ReadWeights(const ByteSource& source, WeightMetadata* metadata) {
         "torch; torch.save(torch.load('old.pth', map_location='cpu'), 'new.pth')\"");
   }
   throw source.Refusal(
-      "no weight file of a known kind: safetensors, a PyTorch state dict (.pth, .bin) or "
+      "not a weight file of a supported kind: safetensors, a PyTorch state dict (.pth, .bin) or "
       "TorchScript (.pt)");
 }
 

@@ -6,8 +6,8 @@
 #include <bit>
 #include <utility>
 
+#include "core/base/byte_source.h"
 #include "core/base/error.h"
-#include "core/weights/byte_source.h"
 
 namespace color3d {
 namespace {

@@ -48,7 +48,7 @@ BackendAddress ParseBackendAddress(const std::string& name, const std::string& a
   if (!http && !result.tls && !IsLoopback(result.target)) {
     throw InvalidArgument(
         "{} is another machine, and photos would be sent unencrypted; use {}{} (TLS), or {}{} in "
-        "a network you trust",
+        "a trusted network",
         flag,
         kHttps,
         result.target,

@@ -1,5 +1,5 @@
-// The clock on the wall jumps by days while the service runs: nothing is lost, late or collected.
-// Needs libfaketime (Debian: faketime). COLOR3D_CHAOS_JOBS (6) run meanwhile; label "chaos".
+// The wall clock jumps by days while the service runs: nothing is lost, late or collected. Requires
+// libfaketime (Debian: faketime). COLOR3D_CHAOS_JOBS: number of jobs (6). Label "chaos".
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,8 +30,8 @@ fs::path FindLibrary() {
   return {};
 }
 
-// Programs that are started while it lives are told another time by the clock on the wall; the
-// steady clock and the times of files are left alone.
+// Changes the wall clock of programs started during its lifetime, but not their steady clock and
+// file times.
 class WallClock {
  public:
   WallClock(const fs::path& library, const fs::path& file) : file_(file) {
@@ -63,7 +63,7 @@ class ChaosClockTest : public ::testing::Test {
     }
   }
 
-  // An upload of which half is there.
+  // A half-finished upload.
   static std::string BeginUpload(TestClient& client, const std::string& content) {
     const v1::Digest digest = testing::DigestOf(content);
     google::bytestream::WriteRequest request;
@@ -91,9 +91,9 @@ class ChaosClockTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-TEST_F(ChaosClockTest, JumpsOfTheClockEndNoLeaseStallNoRetryAndCollectNothing) {
+TEST_F(ChaosClockTest, ClockJumpsEndNoLeaseAndCollectNothing) {
   WallClock wall(library_, scratch_.path() / "offset");
-  // Long enough for a machine that is busy with other things; a jump is longer.
+  // Long enough for a busy machine, shorter than a jump.
   ChaosService service(scratch_.path(), {"--lease-seconds", "20", "--heartbeat-seconds", "0.5"});
   const std::string scene = service.client().MakeScene().name();
   const std::string unnamed = "nothing names this yet";
@@ -127,7 +127,7 @@ TEST_F(ChaosClockTest, JumpsOfTheClockEndNoLeaseStallNoRetryAndCollectNothing) {
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
   EXPECT_EQ(service.Count("select count(*) from job_attempt where outcome='LOST'"), 0);
 
-  // A server that starts sweeps at once.
+  // A starting server sweeps at once.
   Random random(1);
   for (const int jump : {2 * kDay, -2 * kDay, 0}) {
     wall.Jump(jump);

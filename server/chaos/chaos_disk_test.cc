@@ -1,6 +1,6 @@
-// The disk of the data folder fills up while jobs run, and is given space again. The folder is a
-// small file system of its own, which needs root or user namespaces. COLOR3D_CHAOS_JOBS (8); label
-// "chaos".
+// The disk of the data folder fills up while jobs run, and gets space again. The folder is a small
+// file system of its own, which requires root or user namespaces. COLOR3D_CHAOS_JOBS: number of
+// jobs (8). Label "chaos".
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sched.h>
@@ -33,7 +33,8 @@ bool Says(const char* file, const std::string& text) {
   return static_cast<bool>(std::ofstream(file) << text << std::flush);
 }
 
-// What this thread and its children mount from now on, they alone see. Says why not, or nothing.
+// Makes later mounts visible to this thread and its children only. Returns the reason of a failure,
+// or an empty string.
 std::string UnshareMounts() {
   const uid_t user = ::geteuid();
   const gid_t group = ::getegid();
@@ -67,7 +68,7 @@ class ChaosDiskTest : public ::testing::Test {
     if (is_mounted_) ::umount2(disk_.c_str(), MNT_DETACH);
   }
 
-  // So that `free_bytes` are left; for 0: to the last byte.
+  // Fills the disk except for `free_bytes`.
   void Fill(int64_t free_bytes) const {
     const std::string page(4096, 'x');
     std::ofstream file(filler_, std::ios::binary | std::ios::app);
@@ -76,7 +77,7 @@ class ChaosDiskTest : public ::testing::Test {
     }
   }
 
-  // Jobs run while `free_bytes` are left for some seconds.
+  // Runs jobs while `free_bytes` are left for some seconds.
   struct Outcome {
     int failed = 0, refused = 0, lost_attempts = 0;
   };
@@ -110,7 +111,7 @@ void ExpectAnAnswer(TestClient& client, const std::string& job) {
   EXPECT_TRUE(status.ok()) << status.error_message();
 }
 
-// A write may be refused, for its reason and at once.
+// A write succeeds or is refused at once with the reason.
 void ExpectRoomOrRefusal(const grpc::Status& status) {
   if (status.ok()) return;
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << status.error_message();
@@ -128,7 +129,7 @@ grpc::Status TryCreate(TestClient& client, const v1::JobSpec& spec, std::string*
   return status;
 }
 
-// Ends in its state, whole or for want of space.
+// The job ends in its state: complete, or failed for lack of space.
 bool EndsWhole(TestClient& client, const std::string& name, const std::string& undisturbed) {
   const v1::Job job = client.WaitFinished(name);
   if (job.state() == v1::Job::STATE_SUCCEEDED) {
@@ -171,7 +172,7 @@ ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib,
   for (int i = 0; i < jobs_; ++i) names.push_back(submit());
   SleepMs(1000);
   for (int i = 0; i < 60; ++i) {
-    Fill(free_bytes);  // what is freed meanwhile is taken at once
+    Fill(free_bytes);  // fills space that is freed meanwhile
     ExpectAnAnswer(client, names[static_cast<size_t>(i) % names.size()]);
     if (i % 10 == 0) {
       const grpc::Status status = TryCreate(client, ScriptedSpec(scene, "steps=1", 100 + i));
@@ -203,20 +204,20 @@ ChaosDiskTest::Outcome ChaosDiskTest::Endure(const std::string& reserve_mib,
   return outcome;
 }
 
-TEST_F(ChaosDiskTest, BelowTheReserveJobsFailByItsNameAndTheStoreGoesOn) {
-  // The store itself has room: its log grows to 4 MiB before it is folded into the database.
+TEST_F(ChaosDiskTest, JobsFailBelowReserveAndStoreStaysWritable) {
+  // The store has room: its log grows to 4 MiB before a checkpoint.
   const Outcome outcome = Endure("12", "0", 8 << 20);
   EXPECT_GT(outcome.failed, 0) << "the disk was never full: the test proves nothing";
   EXPECT_EQ(outcome.lost_attempts, 0);
 }
 
-TEST_F(ChaosDiskTest, BelowTheMarkNothingIsBegunAndNothingFails) {
+TEST_F(ChaosDiskTest, StartsNoJobWhenSpaceIsLow) {
   const Outcome outcome = Endure("1", "6", 4 << 20);
   EXPECT_EQ(outcome.failed, 0);
   EXPECT_GT(outcome.refused, 0) << "the mark was never reached: the test proves nothing";
 }
 
-TEST_F(ChaosDiskTest, WithoutALastByteJobsWaitOrFailAndReadsAreAnswered) {
+TEST_F(ChaosDiskTest, FullDiskDelaysJobsAndAnswersReads) {
   const Outcome outcome = Endure("0", "0", 0);
   EXPECT_GT(outcome.failed + outcome.lost_attempts + outcome.refused, 0)
       << "the disk was never full: the test proves nothing";
@@ -228,7 +229,7 @@ class LargeDiskTest : public ChaosDiskTest {
   int64_t Free() const { return static_cast<int64_t>(fs::space(disk_).available); }
 };
 
-// As large as a request takes, of paths that share no byte with others'.
+// Largest possible scene, with paths of its own.
 v1::CreateSceneRequest LargeScene(int number) {
   v1::CreateSceneRequest request;
   for (int i = 0; i < 2100; ++i) {
@@ -251,7 +252,7 @@ grpc::Status Answer(Stub& stub,
   return (stub.*method)(&context, request, response);
 }
 
-TEST_F(LargeDiskTest, RowsLeaveTheReserveAndCanBeDeletedOnADiskWithoutALastByte) {
+TEST_F(LargeDiskTest, RowsKeepReserveAndCanBeDeletedOnFullDisk) {
   constexpr int64_t kReserve = 40 << 20, kLow = 60 << 20;
   ChaosService service(scratch_.path(), {"--reserve-mib", "40", "--low-space-mib", "60"});
   TestClient& client = service.client();
@@ -279,7 +280,7 @@ TEST_F(LargeDiskTest, RowsLeaveTheReserveAndCanBeDeletedOnADiskWithoutALastByte)
   EXPECT_EQ(testing::ReasonOfStatus(TryCreate(client, ScriptedSpec(photos.name(), "steps=1", 2))),
             "STORAGE_FULL");
 
-  // Without the space that the store's log has taken already.
+  // Without the space that the log of the store has already.
   SqliteDatabase(disk_ / "jobs.db", SqliteAccess::kWrite).Run("pragma wal_checkpoint(truncate)");
   Fill(0);
   v1::DeleteSceneRequest remove;
@@ -299,14 +300,14 @@ TEST_F(LargeDiskTest, RowsLeaveTheReserveAndCanBeDeletedOnADiskWithoutALastByte)
     status = Answer(*client.scenes, &Scenes::DeleteScene, remove, &removed);
     EXPECT_TRUE(status.ok()) << scene << ": " << status.error_message();
   }
-  // The database gives back what they took, with the filler still there.
+  // The database returns their space while the filler remains.
   const auto wanted = static_cast<int64_t>(scenes.size()) << 20;
   for (int i = 0; i < 400 && Free() < wanted; ++i) SleepMs(50);
   EXPECT_GE(Free(), wanted);
   fs::remove(filler_);
   for (int i = 0; i < 400 && (!fs::exists(ballast) || Free() < kLow); ++i) SleepMs(50);
   EXPECT_TRUE(fs::exists(ballast)) << "there is room for it again";
-  // The mark is left some seconds after there is a tenth more.
+  // The hold ends some seconds after a tenth more is free.
   std::string last;
   for (int i = 0; i < 200; ++i) {
     status = TryCreate(client, ScriptedSpec(photos.name(), "steps=1", 3), &last);

@@ -1,6 +1,6 @@
-// Clients that reach the service over a network that cuts, delays and swallows, while workers and
-// servers are killed: whoever goes on gets what he asked for, once. COLOR3D_CHAOS_JOBS and _SEED;
-// label "chaos".
+// Clients reach the service over a network that cuts, delays and drops data, while workers and
+// servers are killed: clients that retry get each result, once. COLOR3D_CHAOS_JOBS and _SEED; label
+// "chaos".
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +32,7 @@ constexpr int kClients = 8;
 constexpr int64_t kPhotoBytes = 900'000;
 constexpr char kScript[] = "steps=8,ms=150";
 
-// A photo of its own for every job: what follows the PNG's end is nobody's business.
+// A different photo for each job: bytes after the end of a PNG are ignored.
 std::string PhotoOf(int job) {
   std::string bytes = testing::TinyPng();
   Random random(static_cast<uint64_t>(job) + 1);
@@ -42,14 +42,13 @@ std::string PhotoOf(int job) {
   return bytes;
 }
 
-// What a user does, by the client library, whatever becomes of the connection.
+// A user of the client library who retries after each lost connection.
 class User {
  public:
   User(const std::string& address, const fs::path& folder)
       : folder_(folder), connection_({.address = address}, never_) {}
 
-  // Uploads a scene, submits a job twice over, watches it and takes what is there to take. Throws
-  // where it does not get it.
+  // Uploads a scene, submits a job twice, watches it and downloads its results. Throws on failure.
   void Do(int number) {
     const UploadFile photo = Write(PhotoOf(number));
     client::UploadMissing(connection_, {photo}, [](int64_t, int64_t) {});
@@ -92,7 +91,7 @@ class User {
   std::string Create(const v1::CreateJobRequest& request) {
     return connection_.Call(&v1::JobService::Stub::CreateJob, connection_.jobs(), request).name();
   }
-  // DownloadBlob compares the bytes with the digest.
+  // DownloadBlob verifies the digest.
   void Take(const FileDigest& digest) {
     client::DownloadBlob(connection_, digest, folder_ / digest.sha256, [](int64_t) {});
     fs::remove(folder_ / digest.sha256);
@@ -103,7 +102,7 @@ class User {
   Connection connection_;
 };
 
-// A connection is given up after four seconds, which a restarting server may take: try again.
+// A connection attempt ends after four seconds, which a restarting server may need: retried.
 std::unique_ptr<User> Come(const std::string& address, const fs::path& folder) {
   for (int tries = 0;; ++tries) {
     try {
@@ -126,14 +125,14 @@ std::string DescribeFates(const std::vector<std::unique_ptr<CuttingProxy>>& prox
   return text;
 }
 
-TEST(ChaosNetworkTest, ClientsEndWithEveryResultThroughABadNetwork) {
+TEST(ChaosNetworkTest, ClientsGetAllResultsThroughBadNetwork) {
   const ScratchFolder scratch;
   const int jobs = static_cast<int>(FromEnvironment("COLOR3D_CHAOS_JOBS", 100));
   const uint64_t seed = ChaosSeed();
   Random random(seed);
   const auto begun = std::chrono::steady_clock::now();
   ChaosService service(scratch.path());
-  // One each: gRPC shares connections to one address within a process.
+  // One proxy each: gRPC shares connections to one address within a process.
   std::vector<std::unique_ptr<CuttingProxy>> proxies;
   const auto follow = [&] {
     for (const auto& proxy : proxies) proxy->SetTarget(service.server().address());

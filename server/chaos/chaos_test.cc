@@ -1,5 +1,5 @@
-// Jobs on one data folder while workers and servers are killed, frozen and told to end.
-// COLOR3D_CHAOS_JOBS, _FAULTS and _SEED say how many and how; label "chaos".
+// Jobs on one data folder while workers and servers are killed, frozen and terminated. Parameters:
+// COLOR3D_CHAOS_JOBS, _FAULTS and _SEED. Label "chaos".
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using testing::ResultOf;
 using testing::ScriptedSpec;
 using testing::SleepMs;
 
-constexpr char kScript[] = "steps=8,ms=150";  // every job outlives its lease of one second
+constexpr char kScript[] = "steps=8,ms=150";  // each job takes longer than its lease of one second
 constexpr int kSubmittedFirst = 20;
 constexpr int kLongestWaitS = 300;
 
@@ -34,7 +34,7 @@ class Submitter {
   explicit Submitter(ChaosService& service)
       : service_(service), scene_(service.client().MakeScene().name()) {}
   void Submit() {
-    const int seed = static_cast<int>(names_.size()) + 1;  // no two jobs are equal work
+    const int seed = static_cast<int>(names_.size()) + 1;  // distinct work for each job
     names_.push_back(service_.client().Create(ScriptedSpec(scene_, kScript, seed)).name());
   }
   const std::vector<std::string>& names() const { return names_; }
@@ -45,7 +45,7 @@ class Submitter {
   std::vector<std::string> names_;
 };
 
-// Failures, one a line.
+// Returns failures, one per line.
 std::vector<std::string> Endure(ChaosService& service, const Budget& budget) {
   Random random(ChaosSeed());
   const auto begun = std::chrono::steady_clock::now();
@@ -58,7 +58,7 @@ std::vector<std::string> Endure(ChaosService& service, const Budget& budget) {
   while (service.faults() < budget.faults) {
     SleepMs(100 + static_cast<int>(random.NextBelow(600)));
     service.Disturb(random, budget.kinds);
-    // So that there is work to disturb until the end.
+    // Keeps work to disturb until the end.
     const int64_t due =
         kSubmittedFirst + (budget.submissions - kSubmittedFirst) * service.faults() / budget.faults;
     while (submitted() < std::min(due, budget.submissions)) jobs.Submit();
@@ -84,7 +84,7 @@ std::vector<std::string> Endure(ChaosService& service, const Budget& budget) {
   return problems;
 }
 
-TEST(ChaosTest, EveryJobEndsAsUndisturbedAndEveryEffectIsThereOnce) {
+TEST(ChaosTest, JobsEndAsUndisturbedWithEffectsOnce) {
   const ScratchFolder scratch;
   ChaosService service(scratch.path());
   Budget budget;
@@ -94,9 +94,8 @@ TEST(ChaosTest, EveryJobEndsAsUndisturbedAndEveryEffectIsThereOnce) {
   EXPECT_GT(service.RepeatedSteps(), 0) << "nothing was ever taken over: the test proves nothing";
 }
 
-// The control: with workers that write whatever has become of their lease, the same must be seen to
-// go wrong.
-TEST(ChaosTest, WithoutTheFenceEffectsAreThereTwice) {
+// Negative control: with workers that ignore their lease, the same scenario must fail.
+TEST(ChaosTest, EffectsAreDoubledWithoutFence) {
   const ScratchFolder scratch;
   ChaosService service(scratch.path(), {"--worker-program", COLOR3D_UNFENCED_WORKER});
   const Budget budget{40, 12, {Fault::kWorkerFrozen}};

@@ -1,5 +1,5 @@
-// A server that is kept busy for long must not grow: jobs, uploads, downloads, watches that come
-// and go, calls that are given up, live pictures. COLOR3D_SOAK_SECONDS (3600); label "soak".
+// A server under load must not grow: jobs, uploads, downloads, watches, abandoned calls, live
+// pictures. COLOR3D_SOAK_SECONDS: duration (3600). Label "soak".
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -25,12 +25,12 @@ using testing::SleepMs;
 using testing::TestClient;
 
 constexpr int kSamples = 400;
-constexpr int64_t kFlatAfterS = 300;  // a server that has just begun still fills its caches
+constexpr int64_t kFlatAfterS = 300;  // a new server still fills its caches
 constexpr double kAllowanceMib = 4.0, kFirstAllowanceMib = 24.0;
 constexpr size_t kKeptJobs = 200;  // older ones are deleted
 constexpr size_t kUploadBytes = 20'000;
 
-// Clients, each on a thread of its own, until the end of the test.
+// Clients on separate threads until the end of the test.
 class Busy {
  public:
   Busy(ServerProcess& server, const std::string& scene) : server_(server), scene_(scene) {
@@ -42,7 +42,7 @@ class Busy {
     Repeat(50, [this](TestClient& client, Random& random) { GiveUp(client, random); });
     Repeat(500, [this](TestClient& client, Random&) { ColorPicture(client); });
   }
-  // Failures.
+  // Returns failures.
   std::vector<std::string> End() {
     is_over_ = true;
     for (std::thread& thread : threads_) thread.join();
@@ -58,7 +58,7 @@ class Busy {
  private:
   using Deed = std::function<void(TestClient&, Random&)>;
 
-  // About every `pause_ms`; every hundred times on a connection of its own.
+  // About every `pause_ms`; each hundredth time on a new connection.
   void Repeat(int pause_ms, const Deed& deed) {
     threads_.emplace_back([this, pause_ms, deed, seed = threads_.size()] {
       Random random(seed);
@@ -112,7 +112,7 @@ class Busy {
     ++transfers_;
   }
 
-  // Some see the end, most go before.
+  // Some watches see the end of the job, most are cancelled.
   void Watch(TestClient& client, Random& random) {
     v1::WatchJobsRequest request;
     request.add_names(AnyJob(random));
@@ -127,7 +127,7 @@ class Busy {
     ++watches_;
   }
 
-  // Calls without time, and an upload that is left in the middle.
+  // Calls with an expired deadline, and an upload that is abandoned.
   void GiveUp(TestClient& client, Random& random) {
     grpc::ClientContext listing;
     listing.set_deadline(std::chrono::system_clock::now() + milliseconds(random.NextBelow(3)));

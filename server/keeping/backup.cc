@@ -32,7 +32,7 @@ bool IsEmptyOrNone(const fs::path& folder) {
 
 enum class Copy { kWhole, kMissing, kDamaged };
 
-// The digest is taken of the copy, so that what was read and what was written are both checked.
+// The digest of the copy verifies both reading and writing.
 Copy CopyBlob(const fs::path& from, const std::string& sha256, const fs::path& part) {
   std::error_code error;
   fs::copy_file(from, part, fs::copy_options::overwrite_existing, error);
@@ -55,14 +55,15 @@ Copy CopyBlob(const fs::path& from, const std::string& sha256, const fs::path& p
 
 enum class Kept { kGood, kDamaged, kNone };
 
-// What an earlier backup has of the blob. What it does not give is not good.
+// State of the blob in an earlier backup; damaged on read errors.
 Kept CheckCopy(const BlobStore& copy, const std::string& sha256) {
   const std::optional<StoredBlob> blob = copy.Look(sha256);
   if (!blob) return Kept::kNone;
   return IsIntact(copy, blob->digest) ? Kept::kGood : Kept::kDamaged;
 }
 
-// Blobs that the copied store names. It drops checkpoints that could not be copied.
+// Copies the blobs referenced by the copied store, which drops checkpoints that could not be
+// copied.
 CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const DataPaths& to) {
   SqliteJobStore store(copied_store, StoreRole::kWorker, SystemClocks());
   const FileBlobStore source(from.Blobs());
@@ -92,7 +93,7 @@ CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const D
       result.bytes += size;
       continue;
     }
-    // Nobody takes it for good.
+    // Prevents its use.
     if (kept == Kept::kDamaged) target.SetAside(sha256);
     DropCheckpoint(copied_store, sha256);
     if (!store.IsReferenced(sha256)) continue;
@@ -107,12 +108,12 @@ CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const D
   return result;
 }
 
-// The store last: what is named is there when its names are.
+// The store is published last, after all blobs that it names.
 CopiedBlobs CopyWhole(const DataPaths& from, const DataPaths& to) {
   const fs::path part = to.root / "jobs.db.part";
   CopyStore(from.Store(), part);
   const CopiedBlobs result = CopyAll(part, from, to);
-  // Looking into it has left a log beside it, which is empty.
+  // Reading the store has left an empty log beside it.
   std::error_code error;
   for (const char* log : {"-wal", "-shm"}) fs::remove(part.string() + log, error);
   PublishFile(part, to.Store());
@@ -123,7 +124,7 @@ void MakePrivate(const fs::path& folder) {
   std::error_code error, unknown;
   if (!fs::create_directories(folder, error) && !fs::is_directory(folder, unknown)) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot create {}: {}; name another folder, or change who may write there",
+                "cannot create {}: {}; name another folder, or change its permissions",
                 folder.string(),
                 error.message());
   }

@@ -1,4 +1,4 @@
-// Copies of a data folder that can be served in its place.
+// Backup and restoration of data folders. Stateless.
 #pragma once
 
 #include <cstdint>
@@ -10,28 +10,28 @@ namespace color3d {
 
 struct CopiedBlobs {
   int64_t copied = 0;
-  int64_t kept = 0;    // there already, from an earlier copy
-  int64_t mended = 0;  // of those copied: damaged in the earlier copy
+  int64_t kept = 0;    // copied earlier
+  int64_t mended = 0;  // copied because the earlier copy was damaged
   int64_t bytes = 0;
-  std::vector<std::string> missing, damaged;  // digests that jobs or scenes name; not in the copy
-  // "DIGEST: REASON": whether they are there and good is not known; not in the copy.
+  std::vector<std::string> missing, damaged;  // referenced by jobs or scenes; not in the copy
+  // "DIGEST: REASON" of blobs that cannot be read; not in the copy.
   std::vector<std::string> unreadable;
-  int64_t awaited = 0;  // not uploaded yet, for scenes that are not committed
+  int64_t awaited = 0;  // not uploaded yet, of uncommitted scenes
 
   bool IsWhole() const { return missing.empty() && damaged.empty() && unreadable.empty(); }
 };
 
-// Everything that jobs and scenes name, as it is at one moment; a server may run meanwhile. Into an
-// empty folder, or over an earlier backup, of which blobs that are there are read and compared with
-// their digest, and copied again only where they are damaged. The store is replaced last: a backup
-// that was cut off is the earlier one still. Blobs that are missing or damaged are left out and
-// listed; a job whose checkpoint was one, or was replaced meanwhile, begins anew in the copy. What
-// a scene that is not committed still waits for is no fault. Throws Error: kFailedPrecondition
-// where there is no store of this release or `target` is none of ours.
+// Copies a snapshot of the store and all referenced blobs to an empty folder or over an earlier
+// backup; a server may run meanwhile. Blobs of an earlier backup are verified and copied again only
+// if damaged. The store is replaced last, so an interrupted backup remains the earlier one. Missing
+// and damaged blobs are listed; jobs whose checkpoint is missing or was replaced meanwhile start
+// over in the copy. Blobs that uncommitted scenes still expect are no faults. Throws
+// Error{kFailedPrecondition} if there is no store of this release or `target` is neither empty nor
+// a backup.
 CopiedBlobs BackUp(const std::filesystem::path& data_folder, const std::filesystem::path& target);
 
-// A backup as a fresh data folder. Every blob is read and compared with its digest. As BackUp, and
-// throws kFailedPrecondition unless `data_folder` is empty or not there.
+// Copies a backup to a new data folder and verifies all blobs. Like BackUp; throws
+// kFailedPrecondition unless `data_folder` is empty or does not exist.
 CopiedBlobs Restore(const std::filesystem::path& backup, const std::filesystem::path& data_folder);
 
 }  // namespace color3d

@@ -20,7 +20,7 @@ FsckResult Fsck(const fs::path& data_folder,
   const DataFolderLock lock(paths);
   FsckResult result;
   result.store_problems = StoreProblems(paths.Store());
-  if (!result.store_problems.empty()) return result;  // what it names cannot be believed
+  if (!result.store_problems.empty()) return result;  // its references are unreliable
   SqliteJobStore store(paths.Store(), StoreRole::kWorker, SystemClocks());
   std::set<std::string> named = store.ReferencedBlobs();
   FileBlobStore blobs(paths.Blobs());
@@ -43,7 +43,7 @@ FsckResult Fsck(const fs::path& data_folder,
   };
   const std::vector<std::string> unlisted = blobs.ForEach(check);
   result.unreadable.insert(result.unreadable.end(), unlisted.begin(), unlisted.end());
-  // What no folder has told of is looked for by its name.
+  // Referenced blobs that the scan did not find are looked up by name.
   const std::set<std::string> awaited = store.AwaitedBlobs();
   for (const std::string& sha256 : std::vector<std::string>(named.begin(), named.end())) {
     try {

@@ -13,7 +13,7 @@ namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 
-// A data folder with one scene, one job and its result.
+// Data folder with a scene, a job and its result.
 class KeepingTest : public ::testing::Test {
  protected:
   KeepingTest() {
@@ -105,7 +105,7 @@ TEST_F(KeepingTest, BackupLeavesOutAndListsDamagedBlobs) {
   EXPECT_EQ(ResultIn(fresh_, later), "later");
 }
 
-// The photos of a declared scene were never sent: nothing is lost.
+// The photos of an uncommitted scene were never uploaded: nothing is lost.
 TEST_F(KeepingTest, AbandonedUploadsAreNoFault) {
   SceneRecord abandoned;
   abandoned.name = "scenes/abandoned";
@@ -137,7 +137,7 @@ TEST_F(KeepingTest, SecondBackupReadsEarlierBlobsAgain) {
   EXPECT_EQ(ReadFile(copy), "photo");
   EXPECT_TRUE(Restore(backup_, fresh_).IsWhole());
 
-  // Where the original is gone as well it is said, and nobody finds the bad bytes there.
+  // If the original is missing, too, it is reported and the bad copy is removed.
   fs::permissions(copy, fs::perms::owner_all);
   std::ofstream(copy, std::ios::binary) << "phot!";
   blobs_.Remove(photo_.sha256);
@@ -218,7 +218,7 @@ TEST_F(KeepingTest, FsckFindsAndRepairsFaults) {
   EXPECT_EQ(ReasonThrown([&] { Check(paths_.root); }), "FAILED_PRECONDITION") << "a server runs";
 }
 
-TEST_F(KeepingTest, FsckSeesADamagedStore) {
+TEST_F(KeepingTest, FsckReportsDamagedStore) {
   store_.reset();
   std::error_code error;
   fs::remove(paths_.Store().string() + "-wal", error);

@@ -89,26 +89,36 @@ class Sampled : public prometheus::Collectable {
     }
   }
 
-  static MetricFamily& Add(std::vector<MetricFamily>* families,
-                           const char* name,
-                           const char* help,
-                           MetricType type,
-                           double value) {
+  static void Add(std::vector<MetricFamily>* families,
+                  const char* name,
+                  const char* help,
+                  MetricType type,
+                  double value) {
     families->push_back({name, help, type, {Value(type, value)}});
-    return families->back();
+  }
+  // Adds a gauge with one value for each value of a label.
+  static void AddByLabel(std::vector<MetricFamily>* families,
+                         const char* name,
+                         const char* help,
+                         const char* label,
+                         std::initializer_list<std::pair<const char*, int64_t>> values) {
+    MetricFamily family{name, help, MetricType::Gauge, {}};
+    for (const auto& [text, value] : values) {
+      family.metric.push_back(
+          Value(MetricType::Gauge, static_cast<double>(value), {{label, text}}));
+    }
+    families->push_back(std::move(family));
   }
 
   void AddQueue(std::vector<MetricFamily>* families) const {
     const JobCounts counts = store_.CountJobs();
-    MetricFamily jobs{"color3d_jobs", "Number of unfinished jobs.", MetricType::Gauge, {}};
-    for (const auto& [state, count] :
-         std::vector<std::pair<std::string, int64_t>>{{"blocked", counts.blocked},
-                                                      {"queued", counts.queued - counts.blocked},
-                                                      {"running", counts.running}}) {
-      jobs.metric.push_back(
-          Value(MetricType::Gauge, static_cast<double>(count), {{"state", state}}));
-    }
-    families->push_back(std::move(jobs));
+    AddByLabel(families,
+               "color3d_jobs",
+               "Number of unfinished jobs.",
+               "state",
+               {{"blocked", counts.blocked},
+                {"queued", counts.queued - counts.blocked},
+                {"running", counts.running}});
     const int64_t now = SystemClock()();
     const int64_t oldest = counts.oldest_queued_ms;
     Add(families,
@@ -122,24 +132,23 @@ class Sampled : public prometheus::Collectable {
         MetricType::Gauge,
         static_cast<double>(counts.notifications));
     const std::set<Hold> holds = store_.Holds();
-    MetricFamily held{
-        "color3d_queue_held", "1 if no job is started, by reason.", MetricType::Gauge, {}};
-    held.metric.push_back(
-        Value(MetricType::Gauge, holds.contains(Hold::kPaused), {{"reason", "paused"}}));
-    held.metric.push_back(
-        Value(MetricType::Gauge, holds.contains(Hold::kStorage), {{"reason", "storage"}}));
-    families->push_back(std::move(held));
+    AddByLabel(
+        families,
+        "color3d_queue_held",
+        "1 if no job is started, by reason.",
+        "reason",
+        {{"paused", holds.contains(Hold::kPaused)}, {"storage", holds.contains(Hold::kStorage)}});
     int idle = 0, busy = 0, live = 0;
     double silent = 0.0;
     for (const WorkerRecord& worker : store_.ListWorkers()) {
       ++(IsForLivePictures(worker) ? live : worker.job.empty() ? idle : busy);
       silent = std::max(silent, static_cast<double>(now - worker.heartbeat_ms) / 1000.0);
     }
-    MetricFamily workers{"color3d_workers", "Worker processes.", MetricType::Gauge, {}};
-    workers.metric.push_back(Value(MetricType::Gauge, idle, {{"state", "idle"}}));
-    workers.metric.push_back(Value(MetricType::Gauge, busy, {{"state", "busy"}}));
-    workers.metric.push_back(Value(MetricType::Gauge, live, {{"state", "live"}}));
-    families->push_back(std::move(workers));
+    AddByLabel(families,
+               "color3d_workers",
+               "Worker processes.",
+               "state",
+               {{"idle", idle}, {"busy", busy}, {"live", live}});
     Add(families,
         "color3d_worker_silence_seconds",
         "Longest time since the last heartbeat of a worker.",
@@ -149,11 +158,12 @@ class Sampled : public prometheus::Collectable {
 
   void AddServer(std::vector<MetricFamily>* families) const {
     const ServerSample sample = sample_();
-    MetricFamily open{"color3d_open_streams", "Number of open streams.", MetricType::Gauge, {}};
-    open.metric.push_back(Value(MetricType::Gauge, sample.watches, {{"kind", "watch"}}));
-    open.metric.push_back(Value(MetricType::Gauge, sample.downloads, {{"kind", "download"}}));
-    open.metric.push_back(Value(MetricType::Gauge, sample.uploads, {{"kind", "upload"}}));
-    families->push_back(std::move(open));
+    AddByLabel(
+        families,
+        "color3d_open_streams",
+        "Number of open streams.",
+        "kind",
+        {{"watch", sample.watches}, {"download", sample.downloads}, {"upload", sample.uploads}});
     const auto gauge = [&](const char* name, const char* help, double value) {
       Add(families, name, help, MetricType::Gauge, value);
     };
@@ -178,15 +188,11 @@ class Sampled : public prometheus::Collectable {
     gauge("color3d_max_descriptors",
           "Maximum number of open descriptors of the server process.",
           static_cast<double>(DescriptorLimit()));
-    MetricFamily connections{
-        "color3d_connections", "Number of open connections.", MetricType::Gauge, {}};
-    const auto connection = [&](const char* state, int64_t count) {
-      connections.metric.push_back(
-          Value(MetricType::Gauge, static_cast<double>(count), {{"state", state}}));
-    };
-    connection("open", sample.connections);
-    connection("silent", sample.silent_connections);
-    families->push_back(std::move(connections));
+    AddByLabel(families,
+               "color3d_connections",
+               "Number of open connections.",
+               "state",
+               {{"open", sample.connections}, {"silent", sample.silent_connections}});
     gauge("color3d_max_connections",
           "Maximum number of open connections.",
           static_cast<double>(sample.max_connections));

@@ -188,7 +188,7 @@ void Notifier::RecordAnswer(const std::string& url, bool answered) {
 
 void Notifier::RecordOutcome(const Notification& due, const Outcome& outcome) {
   {
-    // Before the store is told, so that it is not sent again if that fails.
+    // Recorded before the store, so that it is not sent again if that fails.
     const MutexLock lock(mutex_);
     remembered_[NotificationKey(due)] = outcome;
   }

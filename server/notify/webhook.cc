@@ -41,7 +41,7 @@ size_t Discard(char*, size_t size, size_t count, void* seen) {
   return *static_cast<size_t*>(seen) > kMaxAnswerBytes ? 0 : size * count;
 }
 
-int StopWhenAsked(void* stop, curl_off_t, curl_off_t, curl_off_t, curl_off_t) {
+int StopOnRequest(void* stop, curl_off_t, curl_off_t, curl_off_t, curl_off_t) {
   return static_cast<const std::atomic<bool>*>(stop)->load() ? 1 : 0;
 }
 
@@ -119,7 +119,7 @@ WebhookAnswer SendWebhook(const WebhookMessage& message,
   curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, Discard);
   curl_easy_setopt(curl, CURLOPT_WRITEDATA, &seen);
   curl_easy_setopt(curl, CURLOPT_NOPROGRESS, 0L);
-  curl_easy_setopt(curl, CURLOPT_XFERINFOFUNCTION, StopWhenAsked);
+  curl_easy_setopt(curl, CURLOPT_XFERINFOFUNCTION, StopOnRequest);
   curl_easy_setopt(curl, CURLOPT_XFERINFODATA, &stop);
   const CURLcode code = curl_easy_perform(curl);
   long status = 0;

@@ -2,22 +2,25 @@
 
 #include <spdlog/spdlog.h>
 
+#include "color3d/v1/admin.grpc.pb.h"
 #include "server/rpc/calls/convert.h"
 #include "server/storage/collector.h"
 
 namespace color3d {
 namespace {
+using grpc::CallbackServerContext;
+using grpc::ServerUnaryReactor;
 
 constexpr int64_t kLeastGraceSeconds = 3600;
 constexpr int64_t kGraceSeconds = 24 * 3600;
 constexpr int kMaxListed = 1000;
 
 template <typename Request, typename Response, typename Body>
-grpc::ServerUnaryReactor* AnswerAdmin(const RpcParts& parts,
-                                      grpc::CallbackServerContext* context,
-                                      const Request* request,
-                                      Response* response,
-                                      Body body) {
+ServerUnaryReactor* AnswerAdmin(const RpcParts& parts,
+                                CallbackServerContext* context,
+                                const Request* request,
+                                Response* response,
+                                Body body) {
   return AnswerUnary(parts, parts.slow, Role::kAdmin, context, request, response, std::move(body));
 }
 
@@ -64,73 +67,73 @@ void CollectNow(const RpcParts& parts,
   response->set_bytes(bytes);
 }
 
+class AdminServiceImpl final : public v1::AdminService::CallbackService {
+ public:
+  explicit AdminServiceImpl(const RpcParts& parts) : parts_(parts) {}
+
+  ServerUnaryReactor* PauseQueue(CallbackServerContext* context,
+                                 const v1::PauseQueueRequest* request,
+                                 v1::PauseQueueResponse* response) override {
+    return AnswerAdmin(parts_, context, request, response, [=, this](const Call& call) {
+      SetPause(parts_, call, true);
+    });
+  }
+
+  ServerUnaryReactor* ResumeQueue(CallbackServerContext* context,
+                                  const v1::ResumeQueueRequest* request,
+                                  v1::ResumeQueueResponse* response) override {
+    return AnswerAdmin(parts_, context, request, response, [=, this](const Call& call) {
+      SetPause(parts_, call, false);
+    });
+  }
+
+  ServerUnaryReactor* Drain(CallbackServerContext* context,
+                            const v1::DrainRequest* request,
+                            v1::DrainResponse* response) override {
+    return AnswerAdmin(parts_, context, request, response, [=, this](const Call& call) {
+      spdlog::warn("{} drains the server", CallerName(call.caller));
+      parts_.drain();
+    });
+  }
+
+  ServerUnaryReactor* KillJob(CallbackServerContext* context,
+                              const v1::KillJobRequest* request,
+                              v1::Job* response) override {
+    return AnswerAdmin(parts_, context, request, response, [=, this](const Call& call) {
+      CheckName(request->name(), "jobs");
+      JobRecord job = parts_.store.Kill(request->name());
+      spdlog::warn("[job={}] killed by {}", job.name, CallerName(call.caller));
+      job.scene = PublicScene(job.scene);
+      *response = ToProto(job);
+    });
+  }
+
+  ServerUnaryReactor* Collect(CallbackServerContext* context,
+                              const v1::CollectRequest* request,
+                              v1::CollectResponse* response) override {
+    return AnswerAdmin(parts_, context, request, response, [=, this](const Call&) {
+      CollectNow(parts_, *request, response);
+    });
+  }
+
+  ServerUnaryReactor* ListProjects(CallbackServerContext* context,
+                                   const v1::ListProjectsRequest* request,
+                                   v1::ListProjectsResponse* response) override {
+    return AnswerAdmin(parts_, context, request, response, [=, this](const Call&) {
+      for (const ProjectRecord& project : parts_.store.ListProjects()) {
+        *response->add_projects() = ToProto(project, parts_.limits);
+      }
+    });
+  }
+
+ private:
+  const RpcParts& parts_;
+};
+
 }  // namespace
 
-grpc::ServerUnaryReactor* AdminServiceImpl::PauseQueue(grpc::CallbackServerContext* context,
-                                                       const v1::PauseQueueRequest* request,
-                                                       v1::PauseQueueResponse* response) {
-  return AnswerAdmin(
-      parts_, context, request, response, [this](const Call& call, const auto&, auto*) {
-        SetPause(parts_, call, true);
-      });
-}
-
-grpc::ServerUnaryReactor* AdminServiceImpl::ResumeQueue(grpc::CallbackServerContext* context,
-                                                        const v1::ResumeQueueRequest* request,
-                                                        v1::ResumeQueueResponse* response) {
-  return AnswerAdmin(
-      parts_, context, request, response, [this](const Call& call, const auto&, auto*) {
-        SetPause(parts_, call, false);
-      });
-}
-
-grpc::ServerUnaryReactor* AdminServiceImpl::Drain(grpc::CallbackServerContext* context,
-                                                  const v1::DrainRequest* request,
-                                                  v1::DrainResponse* response) {
-  return AnswerAdmin(
-      parts_, context, request, response, [this](const Call& call, const auto&, auto*) {
-        spdlog::warn("{} drains the server", CallerName(call.caller));
-        parts_.drain();
-      });
-}
-
-grpc::ServerUnaryReactor* AdminServiceImpl::KillJob(grpc::CallbackServerContext* context,
-                                                    const v1::KillJobRequest* request,
-                                                    v1::Job* response) {
-  return AnswerAdmin(
-      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
-        CheckName(in.name(), "jobs");
-        JobRecord job = parts_.store.Kill(in.name());
-        spdlog::warn("[job={}] killed by {}", job.name, CallerName(call.caller));
-        job.scene = PublicScene(job.scene);
-        *out = ToProto(job);
-      });
-}
-
-grpc::ServerUnaryReactor* AdminServiceImpl::Collect(grpc::CallbackServerContext* context,
-                                                    const v1::CollectRequest* request,
-                                                    v1::CollectResponse* response) {
-  return AnswerAdmin(parts_,
-                     context,
-                     request,
-                     response,
-                     [this](const Call&, const auto& in, v1::CollectResponse* out) {
-                       CollectNow(parts_, in, out);
-                     });
-}
-
-grpc::ServerUnaryReactor* AdminServiceImpl::ListProjects(grpc::CallbackServerContext* context,
-                                                         const v1::ListProjectsRequest* request,
-                                                         v1::ListProjectsResponse* response) {
-  return AnswerAdmin(parts_,
-                     context,
-                     request,
-                     response,
-                     [this](const Call&, const auto&, v1::ListProjectsResponse* out) {
-                       for (const ProjectRecord& project : parts_.store.ListProjects()) {
-                         *out->add_projects() = ToProto(project, parts_.limits);
-                       }
-                     });
+std::unique_ptr<grpc::Service> MakeAdminService(const RpcParts& parts) {
+  return std::make_unique<AdminServiceImpl>(parts);
 }
 
 }  // namespace color3d

@@ -21,7 +21,7 @@ TEST_F(RpcTest, RefusesJobsAndScenesWhenDiskIsNearlyFull) {
   EXPECT_TRUE(CreateStatus(ScriptedSpec(scene, "a")).ok());
 }
 
-// The free space is checked anew for each call, because a few large calls fill a disk quickly.
+// The free space is checked in each call, because a few large calls fill a disk quickly.
 TEST_F(RpcTest, RefusesFirstCallBelowLowSpace) {
   const std::string scene = client_->MakeScene().name();
   RpcServerOptions options;

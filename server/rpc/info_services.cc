@@ -1,5 +1,7 @@
 #include "server/rpc/info_services.h"
 
+#include "color3d/v1/colorizer.grpc.pb.h"
+#include "color3d/v1/server.grpc.pb.h"
 #include "core/base/memory.h"
 #include "core/base/text/utf8.h"
 #include "core/catalogue/stages.h"
@@ -9,6 +11,8 @@
 
 namespace color3d {
 namespace {
+using grpc::CallbackServerContext;
+using grpc::ServerUnaryReactor;
 
 void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
   for (const auto& [name, file] : parts.models.files) {
@@ -16,7 +20,7 @@ void ListModels(const RpcParts& parts, v1::ServerInfo* info) {
     model->set_name(name);
     try {
       const FileDigest digest = parts.digests.Of(file);
-      model->set_kind(LooksLike(file));
+      model->set_kind(GuessModelKind(file));
       model->set_size_bytes(digest.size_bytes);
       model->set_sha256(digest.sha256);
     } catch (const Error& e) {
@@ -65,88 +69,102 @@ bool IsVisibleTo(const Call& call, const std::string& job) {
   }
 }
 
+class ColorizerServiceImpl final : public v1::ColorizerService::CallbackService {
+ public:
+  ColorizerServiceImpl(const RpcParts& parts, ColorizeHub& hub) : parts_(parts), hub_(hub) {}
+
+  ServerUnaryReactor* GetColorizer(CallbackServerContext* context,
+                                   const v1::GetColorizerRequest* request,
+                                   v1::Colorizer* response) override {
+    return AnswerRead(parts_, context, request, response, [=](const Call& call) {
+      CheckName(request->name(), "colorizers");
+      *response =
+          ToProto(call.store.GetColorizer(request->name().substr(request->name().find('/') + 1)));
+    });
+  }
+
+  ServerUnaryReactor* ListColorizers(CallbackServerContext* context,
+                                     const v1::ListColorizersRequest* request,
+                                     v1::ListColorizersResponse* response) override {
+    return AnswerRead(parts_, context, request, response, [=](const Call& call) {
+      if (!request->scene().empty()) CheckName(request->scene(), "scenes");
+      AnswerPage(
+          *request,
+          "colorizers of " + request->scene(),
+          response,
+          [&](int64_t before_id, int limit, bool*) {
+            return call.store.ListColorizers(request->scene(), before_id, limit);
+          },
+          [&](const ColorizerRecord& colorizer) {
+            return Put(ToProto(colorizer), response->add_colorizers());
+          });
+    });
+  }
+
+  grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>* ColorizeImages(
+      CallbackServerContext* context) override {
+    return hub_.Open(context);
+  }
+
+ private:
+  const RpcParts& parts_;
+  ColorizeHub& hub_;
+};
+
+class ServerServiceImpl final : public v1::ServerService::CallbackService {
+ public:
+  explicit ServerServiceImpl(const RpcParts& parts) : parts_(parts) {}
+
+  ServerUnaryReactor* GetServerInfo(CallbackServerContext* context,
+                                    const v1::GetServerInfoRequest* request,
+                                    v1::ServerInfo* response) override {
+    return AnswerUnary(
+        parts_, parts_.slow, Role::kRead, context, request, response, [=, this](const Call& call) {
+          response->set_version(parts_.version);
+          for (const Stage& stage : StageCatalogue()) response->add_job_kinds(stage.kind);
+          v1::Limits* limits = response->mutable_limits();
+          limits->set_max_blob_bytes(parts_.limits.max_blob_bytes);
+          limits->set_max_files_per_scene(parts_.limits.max_files_per_scene);
+          limits->set_max_pixels_per_image(parts_.limits.max_pixels_per_image);
+          limits->set_max_image_side_px(parts_.limits.max_image_side_px);
+          limits->set_max_unfinished_jobs(parts_.limits.max_unfinished_jobs);
+          limits->set_max_chunk_bytes(parts_.limits.max_chunk_bytes);
+          for (const WorkerRecord& worker : parts_.store.ListWorkers()) {
+            v1::WorkerInfo* entry = response->add_workers();
+            entry->set_worker_id(worker.worker_id);
+            entry->set_pid(worker.pid);
+            if (IsVisibleTo(call, worker.job)) entry->set_job(worker.job);
+            entry->set_memory_bytes(worker.memory_bytes);
+            entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
+          }
+          ListPresets(response);
+          ListModels(parts_, response);
+          ListBackends(parts_, response);
+          response->set_draining(parts_.draining.load());
+          response->set_memory_bytes(ResidentMemoryBytes());
+          response->set_disk_free_bytes(parts_.blobs.FreeBytes());
+          const JobCounts counts = parts_.store.CountJobs();
+          response->set_queued_jobs(counts.queued);
+          response->set_running_jobs(counts.running);
+          response->set_project(call.caller.project);
+          response->set_role(RoleName(call.caller.role));
+          *response->mutable_usage() = ToProto(call.store.Usage(), parts_.limits);
+          response->set_waits_for(HoldReason(parts_));
+        });
+  }
+
+ private:
+  const RpcParts& parts_;
+};
+
 }  // namespace
 
-grpc::ServerUnaryReactor* ColorizerServiceImpl::GetColorizer(grpc::CallbackServerContext* context,
-                                                             const v1::GetColorizerRequest* request,
-                                                             v1::Colorizer* response) {
-  return AnswerRead(
-      parts_, context, request, response, [](const Call& call, const auto& in, v1::Colorizer* out) {
-        CheckName(in.name(), "colorizers");
-        *out = ToProto(call.store.GetColorizer(in.name().substr(in.name().find('/') + 1)));
-      });
+std::unique_ptr<grpc::Service> MakeColorizerService(const RpcParts& parts, ColorizeHub& hub) {
+  return std::make_unique<ColorizerServiceImpl>(parts, hub);
 }
 
-grpc::ServerUnaryReactor* ColorizerServiceImpl::ListColorizers(
-    grpc::CallbackServerContext* context,
-    const v1::ListColorizersRequest* request,
-    v1::ListColorizersResponse* response) {
-  return AnswerRead(parts_,
-                    context,
-                    request,
-                    response,
-                    [](const Call& call, const auto& in, v1::ListColorizersResponse* out) {
-                      if (!in.scene().empty()) CheckName(in.scene(), "scenes");
-                      AnswerPage(
-                          in,
-                          "colorizers of " + in.scene(),
-                          out,
-                          [&](int64_t before_id, int limit, bool*) {
-                            return call.store.ListColorizers(in.scene(), before_id, limit);
-                          },
-                          [&](const ColorizerRecord& colorizer) {
-                            return Put(ToProto(colorizer), out->add_colorizers());
-                          });
-                    });
-}
-
-grpc::ServerBidiReactor<v1::ColorizeImagesRequest, v1::ColorizeImagesResponse>*
-ColorizerServiceImpl::ColorizeImages(grpc::CallbackServerContext* context) {
-  return hub_.Open(context);
-}
-
-grpc::ServerUnaryReactor* ServerServiceImpl::GetServerInfo(grpc::CallbackServerContext* context,
-                                                           const v1::GetServerInfoRequest* request,
-                                                           v1::ServerInfo* response) {
-  return AnswerUnary(
-      parts_,
-      parts_.slow,
-      Role::kRead,
-      context,
-      request,
-      response,
-      [this](const Call& call, const auto&, v1::ServerInfo* out) {
-        out->set_version(parts_.version);
-        for (const Stage& stage : StageCatalogue()) out->add_job_kinds(stage.kind);
-        v1::Limits* limits = out->mutable_limits();
-        limits->set_max_blob_bytes(parts_.limits.max_blob_bytes);
-        limits->set_max_files_per_scene(parts_.limits.max_files_per_scene);
-        limits->set_max_pixels_per_image(parts_.limits.max_pixels_per_image);
-        limits->set_max_image_side_px(parts_.limits.max_image_side_px);
-        limits->set_max_unfinished_jobs(parts_.limits.max_unfinished_jobs);
-        limits->set_max_chunk_bytes(parts_.limits.max_chunk_bytes);
-        for (const WorkerRecord& worker : parts_.store.ListWorkers()) {
-          v1::WorkerInfo* entry = out->add_workers();
-          entry->set_worker_id(worker.worker_id);
-          entry->set_pid(worker.pid);
-          if (IsVisibleTo(call, worker.job)) entry->set_job(worker.job);
-          entry->set_memory_bytes(worker.memory_bytes);
-          entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
-        }
-        ListPresets(out);
-        ListModels(parts_, out);
-        ListBackends(parts_, out);
-        out->set_draining(parts_.draining.load());
-        out->set_memory_bytes(ResidentMemoryBytes());
-        out->set_disk_free_bytes(parts_.blobs.FreeBytes());
-        const JobCounts counts = parts_.store.CountJobs();
-        out->set_queued_jobs(counts.queued);
-        out->set_running_jobs(counts.running);
-        out->set_project(call.caller.project);
-        out->set_role(RoleName(call.caller.role));
-        *out->mutable_usage() = ToProto(call.store.Usage(), parts_.limits);
-        out->set_waits_for(HoldReason(parts_));
-      });
+std::unique_ptr<grpc::Service> MakeServerService(const RpcParts& parts) {
+  return std::make_unique<ServerServiceImpl>(parts);
 }
 
 }  // namespace color3d

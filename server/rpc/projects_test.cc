@@ -197,5 +197,11 @@ TEST_F(ProjectsTest, AdminPausesKillsAndCollects) {
   EXPECT_EQ(collected.blobs(), 0);
 }
 
+TEST_F(ProjectsTest, AdminDrainsServer) {
+  EXPECT_FALSE(asked_to_drain_);
+  ASSERT_TRUE(Call(*admin_->admin, &v1::AdminService::Stub::Drain, v1::DrainRequest()).ok());
+  EXPECT_TRUE(asked_to_drain_);
+}
+
 }  // namespace
 }  // namespace color3d::testing

@@ -26,24 +26,6 @@ constexpr int kOtherDescriptors = 128;
 
 }  // namespace
 
-struct RpcServer::Services {
-  Services(const RpcParts& parts, WatchHub& hub, ColorizeHub& colorize_hub)
-      : scenes(parts),
-        blobs(parts),
-        bytes(parts),
-        jobs(parts, hub),
-        colorizers(parts, colorize_hub),
-        server(parts),
-        admin(parts) {}
-  SceneServiceImpl scenes;
-  BlobServiceImpl blobs;
-  ByteStreamServiceImpl bytes;
-  JobServiceImpl jobs;
-  ColorizerServiceImpl colorizers;
-  ServerServiceImpl server;
-  AdminServiceImpl admin;
-};
-
 RpcServer::RpcServer(const RpcServerOptions& options,
                      JobStore& store,
                      BlobStore& blobs,
@@ -91,7 +73,13 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             options.make_room});
   hub_ = std::make_unique<WatchHub>(*parts_, options.watch);
   colorize_hub_ = std::make_unique<ColorizeHub>(*parts_, options.inference, options.live);
-  services_ = std::make_unique<Services>(*parts_, *hub_, *colorize_hub_);
+  services_.push_back(MakeSceneService(*parts_));
+  services_.push_back(MakeBlobService(*parts_));
+  services_.push_back(MakeByteStreamService(*parts_));
+  services_.push_back(MakeJobService(*parts_, *hub_));
+  services_.push_back(MakeColorizerService(*parts_, *colorize_hub_));
+  services_.push_back(MakeServerService(*parts_));
+  services_.push_back(MakeAdminService(*parts_));
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
@@ -112,15 +100,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   quota.Resize(static_cast<size_t>(options.limits.transport_memory_bytes));
   builder.SetResourceQuota(quota);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.limits.max_connection_calls);
-  for (grpc::Service* service : {static_cast<grpc::Service*>(&services_->scenes),
-                                 static_cast<grpc::Service*>(&services_->blobs),
-                                 static_cast<grpc::Service*>(&services_->bytes),
-                                 static_cast<grpc::Service*>(&services_->jobs),
-                                 static_cast<grpc::Service*>(&services_->colorizers),
-                                 static_cast<grpc::Service*>(&services_->server),
-                                 static_cast<grpc::Service*>(&services_->admin)}) {
-    builder.RegisterService(service);
-  }
+  for (const auto& service : services_) builder.RegisterService(service.get());
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
   interceptors.push_back(
       MakeCallWatch(options.on_call,

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "server/net/connection_gate.h"
 #include "server/net/listen_sockets.h"
@@ -16,6 +17,7 @@
 
 namespace grpc {
 class Server;
+class Service;
 namespace experimental {
 class ExternalConnectionAcceptor;
 }
@@ -75,7 +77,6 @@ class RpcServer {
   void Shutdown(std::chrono::milliseconds grace);
 
  private:
-  struct Services;
   void MakeGate(const RpcServerOptions& options);
 
   std::unique_ptr<ListenSockets> sockets_;
@@ -89,7 +90,7 @@ class RpcServer {
   std::unique_ptr<RpcParts> parts_;
   std::unique_ptr<WatchHub> hub_;
   std::unique_ptr<ColorizeHub> colorize_hub_;
-  std::unique_ptr<Services> services_;
+  std::vector<std::unique_ptr<grpc::Service>> services_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<ConnectionGate> gate_;  // notified of calls by the server
   std::unique_ptr<grpc::Server> server_;

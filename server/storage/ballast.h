@@ -1,5 +1,5 @@
-// A file that reserves disk space to be freed later: on a full disk even a deletion needs a few
-// MiB, for the log of the job store. Thread-safe.
+// File that reserves disk space: on a full disk even a deletion needs a few MiB, for the log of the
+// job store. Thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +13,12 @@ namespace color3d {
 
 class Ballast {
  public:
-  // `bytes`: length of the file. A file that an earlier server left is used.
+  // `bytes`: length of the file. Reuses the file of an earlier server.
   Ballast(std::filesystem::path file, int64_t bytes);
 
   int64_t bytes() const { return bytes_; }
   bool IsThere() const;
-  // Makes the whole file or none; returns true if it exists now.
+  // Creates the whole file or none; returns true if it exists now.
   bool Make();
   // Deletes the file; returns true if that freed space.
   bool Release();
@@ -29,7 +29,8 @@ class Ballast {
   mutable Mutex mutex_;  // one call at a time
 };
 
-// How long the ballast of a folder's disk is: 16 MiB, and at most a twentieth of the disk.
+// Returns the length of the ballast for the disk of a folder: 16 MiB, at most a twentieth of the
+// disk.
 int64_t BallastBytes(const std::filesystem::path& folder);
 
 // Calls `body`, which frees space. If the disk is too full for that, calls it again after

@@ -8,7 +8,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StorageTest, BallastTakesSpaceUntilItIsGivenUp) {
+TEST_F(StorageTest, BallastReservesSpaceUntilReleased) {
   const auto file = scratch_.path() / "ballast";
   Ballast ballast(file, 1 << 20);
   EXPECT_FALSE(ballast.IsThere());
@@ -22,7 +22,7 @@ TEST_F(StorageTest, BallastTakesSpaceUntilItIsGivenUp) {
   EXPECT_FALSE(ballast.IsThere());
 }
 
-TEST_F(StorageTest, RetriesDeletionOnceThereIsRoom) {
+TEST_F(StorageTest, RetriesDeletionAfterMakingRoom) {
   int tries = 0, rooms = 0;
   const auto full_at_first = [&] {
     if (++tries == 1) throw ServiceError(ErrorReason::kStorageFull, "full");

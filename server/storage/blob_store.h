@@ -1,5 +1,4 @@
-// Content-addressed bytes: what is stored under a SHA-256 digest never changes. Thread-safe;
-// several processes may share a store.
+// Immutable bytes by SHA-256 digest. Thread-safe; several processes may share a store.
 #pragma once
 
 #include <algorithm>
@@ -19,8 +18,8 @@
 
 namespace color3d {
 
-// Disk space that is promised to something that is still being written. Given back when it is
-// destroyed. Not thread-safe.
+// Disk space reserved for a file that is being written; released by the destructor. Not
+// thread-safe.
 class SpaceReservation {
  public:
   SpaceReservation() = default;
@@ -35,7 +34,7 @@ class SpaceReservation {
     return *this;
   }
 
-  // So many bytes are on the disk now.
+  // Reduces the reservation by bytes that are now on disk.
   void Use(int64_t bytes) {
     const int64_t used = std::min(bytes, bytes_);
     if (total_) *total_ -= used;
@@ -49,63 +48,62 @@ class SpaceReservation {
 
 struct StoredBlob {
   FileDigest digest;
-  int64_t touched_ns = 0;  // changes with every Put and Touch; only equality means something
+  int64_t touched_ns = 0;  // changes with each Put and Touch; compare for equality only
 };
 
 class BlobStore {
  public:
   virtual ~BlobStore() = default;
 
-  // Whether the blob is there with this size; also says that somebody counts on it
-  // (RemoveIfUntouched). As all that look for a blob it throws Error{kUnavailable, BLOB_UNREADABLE}
-  // where the disk does not say whether it is there.
+  // Returns true if the blob is stored with this size, and marks it as used (RemoveIfUntouched).
+  // Like all lookups, throws Error{kUnavailable, BLOB_UNREADABLE} if the disk cannot tell.
   virtual bool Touch(const FileDigest& digest) const = 0;
-  // The blob as it is, without touching it; nothing where it is not there.
+  // Returns the blob without touching it, or nothing if it is not stored.
   virtual std::optional<StoredBlob> Look(const std::string& sha256) const = 0;
-  // Path of a read-only file. Throws Error{kNotFound, BLOB_MISSING}.
+  // Returns the path of a read-only file. Throws Error{kNotFound, BLOB_MISSING}.
   virtual std::filesystem::path Fetch(const std::string& sha256) const = 0;
-  // Good bytes take the place of damaged ones.
+  // Replaces a damaged blob.
   virtual FileDigest PutBytes(std::string_view bytes) = 0;
-  // Moves the file in (same filesystem; the original is gone afterwards).
+  // Moves the file into the store. Requires: same filesystem.
   virtual FileDigest PutFile(const std::filesystem::path& file) = 0;
-  // As PutFile, for a file whose digest the caller has just computed.
+  // Like PutFile, for a file whose digest the caller has just computed.
   virtual void Adopt(const std::filesystem::path& file, const FileDigest& digest) = 0;
   virtual void Remove(const std::string& sha256) = 0;
-  // Reads the blob again, and sets it aside where its bytes are not those of its digest: it is
-  // missing from then on, so that an upload puts good bytes in its place. False where the bytes are
-  // good, as when somebody has put good ones there since they were found damaged.
+  // Rereads the blob and sets it aside if its digest is wrong; it is then missing, so that an
+  // upload can replace it. Returns false if the bytes are good, e.g. replaced since they were found
+  // damaged.
   virtual bool SetAside(const std::string& sha256) = 0;
-  // Blobs that were found damaged, by whomever in this process.
+  // Number of damaged blobs found by this process.
   virtual int64_t damaged() const = 0;
 
-  // Throws Error{kResourceExhausted, STORAGE_FULL} when `bytes` more would not leave the reserve.
+  // Throws Error{kResourceExhausted, STORAGE_FULL} if `bytes` more would not leave the reserve.
   virtual void RequireSpace(int64_t bytes) const = 0;
-  // The same, and keeps them from others of this process until they are used.
+  // The same, and reserves the space within this process.
   virtual SpaceReservation Reserve(int64_t bytes) = 0;
-  // Less what is reserved; not below 0, though more may be promised than there is.
+  // Free space minus reservations, at least 0; reservations may exceed the free space.
   virtual int64_t FreeBytes() const = 0;
 
-  // Every blob, until `visit` returns false. Returns what could not be looked at, "PATH: REASON":
-  // whether there are blobs is not known.
+  // Visits all blobs until `visit` returns false. Returns unreadable paths as "PATH: REASON", which
+  // may contain further blobs.
   virtual std::vector<std::string> ForEach(
       const std::function<bool(const StoredBlob&)>& visit) const = 0;
-  // False when it was touched since, when it is gone, or when somebody uses the store just now.
+  // Returns false if the blob was touched since, does not exist, or the store is in use.
   virtual bool RemoveIfUntouched(const StoredBlob& blob) = 0;
-  // Files that a crash left half-written, and what was set aside, older than `age` at this
-  // call and at the last one; how many.
+  // Removes partial files of crashes and blobs set aside that were older than `age` at this and the
+  // last call. Returns their number.
   virtual int RemoveLeftovers(std::chrono::seconds age) = 0;
 };
 
 struct ListedBlobs {
   std::vector<StoredBlob> blobs;
-  std::vector<std::string> unreadable;  // as BlobStore::ForEach
+  std::vector<std::string> unreadable;  // see BlobStore::ForEach
 };
 
-// All of them, or those that were found until `stop` said so.
+// Lists all blobs, or those found until `stop` returns true.
 ListedBlobs ListBlobs(const BlobStore& blobs, const std::function<bool()>& stop);
 
-// Whether the bytes are those of the digest; not, where the disk does not give them. Throws
-// Error{kNotFound, BLOB_MISSING}; kFailedPrecondition where they may not be read.
+// Returns true if the bytes match the digest, false also on read errors. Throws Error{kNotFound,
+// BLOB_MISSING}, or kFailedPrecondition without permission to read.
 bool IsIntact(const BlobStore& blobs, const FileDigest& digest);
 
 }  // namespace color3d

@@ -16,7 +16,7 @@ std::map<std::string, StoredBlob> Unnamed(ChoreStore& store, const std::vector<S
   return unnamed;
 }
 
-// Candidates that are still what they were.
+// Candidates that have not changed.
 std::vector<StoredBlob> FilterUnnamed(const std::map<std::string, StoredBlob>& unnamed,
                                       const std::vector<BlobCandidate>& candidates) {
   std::vector<StoredBlob> due;
@@ -46,7 +46,7 @@ std::vector<StoredBlob> DueBlobsSoFar(ChoreStore& store,
   return FilterUnnamed(Unnamed(store, blobs), store.AgedCandidates(grace.count()));
 }
 
-// Every caller that stores or looks for a blob touches it before it names it.
+// All callers that store or look up a blob touch it before they name it.
 std::vector<FileDigest> RemoveDue(ChoreStore& store,
                                   BlobStore& blobs,
                                   const std::vector<StoredBlob>& due,

@@ -1,4 +1,4 @@
-// Unreferenced blobs: found in two phases, whose state is in the store, and removed.
+// Removal of unreferenced blobs in two phases, whose state is in the job store. Stateless.
 #pragma once
 
 #include <chrono>
@@ -10,18 +10,19 @@
 
 namespace color3d {
 
-// Blobs of `blobs`, which are all that there are, that nothing names and that were noted so, and
-// untouched since, for the time of grace. Takes note of those that are found for the first time.
+// Returns unreferenced blobs that have been marked and untouched for the grace period, and marks
+// new ones. Requires: `blobs` has all blobs.
 std::vector<StoredBlob> DueBlobs(ChoreStore& store,
                                  const std::vector<StoredBlob>& blobs,
                                  std::chrono::milliseconds grace);
 
-// The same by what was noted before, without another note.
+// The same by the present marks; marks nothing.
 std::vector<StoredBlob> DueBlobsSoFar(ChoreStore& store,
                                       const std::vector<StoredBlob>& blobs,
                                       std::chrono::milliseconds grace);
 
-// Those of `due` that were removed: still unnamed and untouched. `stop` is asked between them.
+// Removes those of `due` that are still unreferenced and untouched, until `stop` returns true.
+// Returns the removed blobs.
 std::vector<FileDigest> RemoveDue(ChoreStore& store,
                                   BlobStore& blobs,
                                   const std::vector<StoredBlob>& due,

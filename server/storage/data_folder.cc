@@ -28,7 +28,7 @@ void PrepareDataFolder(const DataPaths& paths) {
                   folder.string(),
                   error ? error.message() : "it is not a folder");
     }
-    // Scenes are their owner's: the folder is closed to others, and a fresh one to the group, too.
+    // Scenes are private: the folder is closed to others, and a new one also to the group.
     struct stat status {};
     if (folder == paths.root && ::stat(folder.c_str(), &status) == 0) {
       ::chmod(folder.c_str(), is_fresh ? 0700 : status.st_mode & 07770u);

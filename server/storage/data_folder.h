@@ -1,4 +1,4 @@
-// The layout of the server's data directory, and the lock that keeps a second server out of it.
+// Layout of the data folder, and the lock that excludes a second server.
 #pragma once
 
 #include <filesystem>
@@ -19,19 +19,19 @@ struct DataPaths {
   std::filesystem::path JobLogs() const { return Logs() / "jobs"; }
   // Private sockets between the server and its workers.
   std::filesystem::path Sockets() const { return root / "sockets"; }
-  // Given up when the disk is full.
+  // Released when the disk is full.
   std::filesystem::path BallastFile() const { return root / "ballast"; }
   std::filesystem::path Lock() const { return root / "lock"; }
 };
 
-// Creates the folders. Throws Error{kFailedPrecondition} in one line when that is not possible or
-// the folder cannot be written.
+// Creates the folders. Throws Error{kFailedPrecondition} if that fails or the folder is not
+// writable.
 void PrepareDataFolder(const DataPaths& paths);
 
-// Held while a server uses the data directory; released when destroyed or when the process dies.
+// Lock of a server on its data folder; released by the destructor or the end of the process.
 class DataFolderLock {
  public:
-  // Throws Error{kFailedPrecondition} when another process holds it.
+  // Throws Error{kFailedPrecondition} if another process holds it.
   explicit DataFolderLock(const DataPaths& paths);
   ~DataFolderLock();
   DataFolderLock(const DataFolderLock&) = delete;

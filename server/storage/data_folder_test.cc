@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-TEST(DataFolder, SecondServerIsKeptOut) {
+TEST(DataFolder, LocksOutSecondServer) {
   ScratchFolder scratch;
   const DataPaths paths(scratch.path() / "data");
   PrepareDataFolder(paths);
@@ -18,7 +18,7 @@ TEST(DataFolder, SecondServerIsKeptOut) {
   DataFolderLock again(paths);
 }
 
-TEST(DataFolder, OthersDoNotReadIt) {
+TEST(DataFolder, IsPrivateToOwner) {
   ScratchFolder scratch;
   const auto mode = [](const std::filesystem::path& path) {
     struct stat status {};
@@ -35,7 +35,7 @@ TEST(DataFolder, OthersDoNotReadIt) {
   EXPECT_EQ(mode(shared.root), 0770u) << "a group that was let in stays";
 }
 
-TEST(DataFolder, UnusableFolderIsReported) {
+TEST(DataFolder, ReportsUnusableFolder) {
   ScratchFolder scratch;
   WriteFileAtomic(scratch.path() / "file", "x");
   EXPECT_EQ(ReasonThrown([&] { PrepareDataFolder(DataPaths(scratch.path() / "file")); }),

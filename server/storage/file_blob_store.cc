@@ -24,7 +24,7 @@ namespace {
 
 constexpr char kSetAside[] = ".damaged";
 
-// Keeps the sweep from removing a blob between another process's look and its use of it.
+// Prevents the sweep from removing a blob between lookup and use by another process.
 class FolderLock {
  public:
   FolderLock(const fs::path& folder, int operation) {
@@ -43,7 +43,7 @@ class FolderLock {
   bool held_ = false;
 };
 
-// Nothing: there is no such file. Nobody may say so of one that could not be looked at.
+// Returns nothing if there is no such file. Throws if the disk cannot tell.
 std::optional<struct stat> StatusOf(const fs::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) == 0) return status;
@@ -51,8 +51,7 @@ std::optional<struct stat> StatusOf(const fs::path& path) {
   if (error == ENOENT || error == ENOTDIR) return std::nullopt;
   throw ServiceError(
       ErrorReason::kBlobUnreadable,
-      "cannot look at the blob {}: {}; its owner, rights and disk on the server need "
-      "a look",
+      "cannot read the blob {}: {}; check its owner, permissions and disk on the server",
       path.filename().string(),
       std::strerror(error));
 }
@@ -61,7 +60,7 @@ int64_t TouchedNs(const struct stat& status) {
   return static_cast<int64_t>(status.st_mtim.tv_sec) * 1'000'000'000 + status.st_mtim.tv_nsec;
 }
 
-// The clock of files moves by milliseconds: two touches would be one.
+// File times have a resolution of milliseconds: two touches could be equal.
 void TouchFile(const fs::path& path, const struct stat& before) {
   timespec times[2] = {{0, UTIME_OMIT}, {}};
   ::clock_gettime(CLOCK_REALTIME, &times[1]);
@@ -71,7 +70,7 @@ void TouchFile(const fs::path& path, const struct stat& before) {
   ::utimensat(AT_FDCWD, path.c_str(), times, 0);
 }
 
-// Of an open file; nothing where the disk does not give it.
+// Digest of an open file; nothing on read errors.
 std::optional<std::string> DigestOf(int fd) {
   Sha256 hash;
   std::vector<char> buffer(1 << 18);
@@ -158,16 +157,16 @@ void FileBlobStore::ThrowFull(int64_t bytes, int64_t free) const {
   std::error_code error;
   if (!fs::exists(folder_, error)) {
     throw Error(ErrorCode::kUnavailable,
-                "the folder {} is gone; is its disk still there?",
+                "the folder {} does not exist; check that its disk is mounted",
                 folder_.string());
   }
-  throw ServiceError(ErrorReason::kStorageFull,
-                     "{} more bytes do not fit: {} are free on the server's disk and promised to "
-                     "nobody, of which {} are kept in reserve; delete jobs or scenes, or add disk "
-                     "space",
-                     bytes,
-                     free,
-                     options_.reserve_bytes);
+  throw ServiceError(
+      ErrorReason::kStorageFull,
+      "{} more bytes do not fit: {} are free and unreserved on the server's disk, of "
+      "which {} must stay free; delete jobs or scenes, or add disk space",
+      bytes,
+      free,
+      options_.reserve_bytes);
 }
 
 bool FileBlobStore::IsThere(const FileDigest& digest) {
@@ -221,7 +220,7 @@ bool FileBlobStore::SetAside(const std::string& sha256) {
   if (fd < 0) return false;
   const std::shared_ptr<void> closed(nullptr, [fd](void*) { ::close(fd); });
   if (DigestOf(fd) == sha256) return false;
-  // Good bytes come as another file: what was read must be what is there, and what is moved.
+  // A replacement is another file: the file that was read must be the one that is moved.
   struct stat read {};
   if (::fstat(fd, &read) != 0) return false;
   const auto is_read = [&](const fs::path& file) {
@@ -249,7 +248,7 @@ std::vector<std::string> FileBlobStore::ForEach(
         if (!IsSha256Hex(name)) return true;
         try {
           const std::optional<StoredBlob> blob = Look(name);
-          // A file of this name elsewhere is none of ours.
+          // Files of this name in other folders are not blobs.
           return !blob || entry.path() != PathOf(name) || visit(*blob);
         } catch (const Error& e) {
           unknown.push_back(entry.path().string() + ": " + e.what());
@@ -271,7 +270,7 @@ bool FileBlobStore::RemoveIfUntouched(const StoredBlob& blob) {
 int FileBlobStore::RemoveLeftovers(std::chrono::seconds age) {
   int removed = 0;
   stale_.Look(age);
-  // ForEach tells what cannot be read.
+  // ForEach reports unreadable folders.
   WalkFolder(folder_, WalkDepth::kBelow, [&](const fs::directory_entry& entry) {
     const std::string name = entry.path().filename().string();
     const bool is_one = name.ends_with(".part") || name.ends_with(kSetAside);

@@ -1,5 +1,5 @@
-// Blobs as files: blobs/ab/cd/<sha256>, read-only, each written to a temporary file on the same
-// filesystem, synced and renamed.
+// Blobs as read-only files blobs/ab/cd/<sha256>, each written to a temporary file, synced and
+// renamed. Thread-safe.
 #pragma once
 
 #include "server/storage/blob_store.h"
@@ -8,7 +8,7 @@
 namespace color3d {
 
 struct BlobStoreOptions {
-  // Writes are refused (kResourceExhausted, STORAGE_FULL) when less than this would stay free.
+  // Refuses writes (kResourceExhausted, STORAGE_FULL) that would leave less than this free.
   int64_t reserve_bytes = int64_t{256} << 20;
 };
 
@@ -34,12 +34,12 @@ class FileBlobStore : public BlobStore {
   int RemoveLeftovers(std::chrono::seconds age) override;
 
  private:
-  int64_t UnpromisedBytes() const;  // below 0 where more is promised than there is
-  // Returns true if the blob exists and is undamaged. Counts damaged ones.
+  int64_t UnpromisedBytes() const;  // below 0 if more is reserved than free
+  // Returns true if the blob exists and is undamaged. Counts damaged blobs.
   bool IsThere(const FileDigest& digest);
   [[noreturn]] void ThrowFull(int64_t bytes, int64_t free) const;
   std::filesystem::path PathOf(const std::string& sha256) const;
-  // ... with its folder, of which every level is synced.
+  // Creates the folders above the file and syncs each level.
   std::filesystem::path PlaceFor(const std::string& sha256) const;
 
   std::filesystem::path folder_;

@@ -32,7 +32,7 @@ TEST_F(FileBlobStoreTest, BlobsAreNamedByDigestAndReadOnly) {
   EXPECT_EQ(ReasonThrown([&] { blobs_.Fetch("../../etc/passwd"); }), "INVALID_ARGUMENT");
 }
 
-TEST_F(FileBlobStoreTest, FilesAreMovedIn) {
+TEST_F(FileBlobStoreTest, MovesFilesIn) {
   const fs::path file = scratch_.path() / "file";
   WriteFileAtomic(file, "content");
   const FileDigest digest = blobs_.PutFile(file);
@@ -66,7 +66,7 @@ TEST_F(FileBlobStoreTest, RemovesUntouchedBlobsOnly) {
   EXPECT_EQ(stored().size(), 2u);
 }
 
-TEST_F(FileBlobStoreTest, SweepDoesNotWaitForABusyStore) {
+TEST_F(FileBlobStoreTest, SweepDoesNotWaitForBusyStore) {
   const FileDigest digest = blobs_.PutBytes("idle");
   std::optional<StoredBlob> blob;
   blobs_.ForEach([&](const StoredBlob& found) {
@@ -82,7 +82,7 @@ TEST_F(FileBlobStoreTest, SweepDoesNotWaitForABusyStore) {
   EXPECT_FALSE(blobs_.Touch(digest));
 }
 
-TEST_F(FileBlobStoreTest, RemovesLeftoversOfACrash) {
+TEST_F(FileBlobStoreTest, RemovesLeftoversOfCrash) {
   const fs::path folder = scratch_.path() / "blobs" / "ab";
   fs::create_directories(folder);
   for (const char* name : {".x.1.0.part", "y.damaged", "new.part"}) {
@@ -95,7 +95,7 @@ TEST_F(FileBlobStoreTest, RemovesLeftoversOfACrash) {
   EXPECT_TRUE(fs::exists(folder / "new.part"));
 }
 
-// The same number of other bytes, as a failing disk returns them.
+// Other bytes of the same number, as from a failing disk.
 void Damage(const fs::path& blob) {
   ASSERT_EQ(::chmod(blob.c_str(), 0644), 0);
   std::string bytes = ReadFile(blob);
@@ -103,7 +103,7 @@ void Damage(const fs::path& blob) {
   std::ofstream(blob, std::ios::binary) << bytes;
 }
 
-TEST_F(FileBlobStoreTest, GoodBytesTakeThePlaceOfDamagedOnes) {
+TEST_F(FileBlobStoreTest, PutReplacesDamagedBytes) {
   const FileDigest digest = blobs_.PutBytes("some bytes");
   Damage(blobs_.Fetch(digest.sha256));
   EXPECT_FALSE(IsIntact(blobs_, digest));
@@ -121,8 +121,8 @@ TEST_F(FileBlobStoreTest, GoodBytesTakeThePlaceOfDamagedOnes) {
   EXPECT_TRUE(IsIntact(blobs_, digest));
 }
 
-// Good bytes have come since somebody read damaged ones.
-TEST_F(FileBlobStoreTest, WholeBlobsAreNotSetAside) {
+// The damaged blob was replaced after it was read.
+TEST_F(FileBlobStoreTest, SetsAsideDamagedBlobsOnly) {
   const FileDigest digest = blobs_.PutBytes("some bytes");
   Damage(blobs_.Fetch(digest.sha256));
   blobs_.PutBytes("some bytes");
@@ -135,7 +135,7 @@ TEST_F(FileBlobStoreTest, WholeBlobsAreNotSetAside) {
   EXPECT_FALSE(blobs_.SetAside(digest.sha256)) << "gone";
 }
 
-TEST_F(FileBlobStoreTest, EachTouchIsAnother) {
+TEST_F(FileBlobStoreTest, EachTouchChangesTime) {
   const FileDigest digest = blobs_.PutBytes("x");
   std::optional<StoredBlob> before = blobs_.Look(digest.sha256);
   ASSERT_TRUE(before.has_value());
@@ -167,14 +167,14 @@ TEST_F(UnreadableBlobsTest, UnreadableBlobsAreNotMissing) {
   EXPECT_TRUE(blobs_.Touch(lost));
 }
 
-TEST_F(FileBlobStoreTest, ReserveOfFreeSpaceIsKept) {
+TEST_F(FileBlobStoreTest, KeepsReserveOfFreeSpace) {
   FileBlobStore full(scratch_.path() / "full", {int64_t{1} << 60});
   EXPECT_EQ(ReasonThrown([&] { full.PutBytes("x"); }), "STORAGE_FULL");
   UploadStore uploads(scratch_.path() / "uploads2", full, 1000);
   EXPECT_EQ(ReasonThrown([&] { uploads.Open({"u", DigestOf("x")}, 0); }), "STORAGE_FULL");
 }
 
-TEST_F(FileBlobStoreTest, AFolderThatIsGoneIsNoFullDisk) {
+TEST_F(FileBlobStoreTest, MissingFolderIsNotFullDisk) {
   FileBlobStore lost(scratch_.path() / "lost", {0});
   fs::remove_all(scratch_.path() / "lost");
   try {
@@ -182,13 +182,13 @@ TEST_F(FileBlobStoreTest, AFolderThatIsGoneIsNoFullDisk) {
     FAIL() << "there is no folder";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ErrorCode::kUnavailable);
-    EXPECT_NE(std::string(e.what()).find("is gone"), std::string::npos);
+    EXPECT_NE(std::string(e.what()).find("is mounted"), std::string::npos);
   }
 }
 
-TEST_F(FileBlobStoreTest, UploadsSideBySideArePromisedTheirSpace) {
+TEST_F(FileBlobStoreTest, ConcurrentUploadsReserveSpace) {
   const int64_t free = blobs_.FreeBytes();
-  // Leaves room for one and a half of two uploads; what else runs on this disk may move it a
+  // Leaves room for one and a half of two uploads; other programs on this disk may change it a
   // little.
   const int64_t size = int64_t{512} << 20;
   if (free < 2 * size) GTEST_SKIP() << "too little space on this disk";
@@ -198,7 +198,7 @@ TEST_F(FileBlobStoreTest, UploadsSideBySideArePromisedTheirSpace) {
   EXPECT_EQ(ReasonThrown([&] { uploads.Open({"b", {Sha256Hex("b"), size}}, 0); }), "STORAGE_FULL");
   first->Append(0, std::string(1000, 'x'));
   EXPECT_EQ(ReasonThrown([&] { uploads.Open({"b", {Sha256Hex("b"), size}}, 0); }), "STORAGE_FULL");
-  first.reset();  // the client has gone
+  first.reset();  // the client disconnected
   uploads.Open({"b", {Sha256Hex("b"), size}}, 0);
 }
 

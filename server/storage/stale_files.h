@@ -1,6 +1,5 @@
-// Which files have been left alone for long. The clock on the wall may have been set since, so that
-// it is not believed alone: a file is stale when it was old at the last look already, and is
-// unchanged. Not thread-safe.
+// Detects files that have not changed for long. Because the wall clock may jump, a file is stale
+// only if it was already old at the last scan and is unchanged. Not thread-safe.
 #pragma once
 
 #include <sys/stat.h>
@@ -16,7 +15,7 @@ namespace color3d {
 
 class StaleFiles {
  public:
-  // Begins another look at all files.
+  // Begins another scan of all files.
   void Look(std::chrono::seconds age) {
     oldest_ = std::time(nullptr) - age.count();
     before_ = std::exchange(old_, {});

@@ -22,7 +22,7 @@ struct UploadStore::Writer::Session {
   void RequireOwner(uint64_t writer) const COLOR3D_REQUIRES(mutex) {
     if (writer == generation) return;
     throw ServiceError(ErrorReason::kUploadTakenOver,
-                       "another connection goes on with this upload; ask QueryWriteStatus");
+                       "another connection has resumed this upload; call QueryWriteStatus");
   }
 };
 
@@ -59,7 +59,7 @@ std::string OwnerOf(const std::string& part) {
   const int error = errno;
   if (error == ENOSPC || error == EDQUOT) {
     throw ServiceError(ErrorReason::kStorageFull,
-                       "{}: the server's disk is full; what was sent is kept, resume later",
+                       "{}: the server's disk is full; the received bytes are kept: resume later",
                        what);
   }
   throw Error(ErrorCode::kInternal, "{}: {}", what, std::strerror(error));
@@ -125,8 +125,8 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name,
     if (!owned.contains(part) && owned.size() >= kMaxUnfinished) {
       throw ServiceError(
           ErrorReason::kQuotaExceeded,
-          fmt::format("{} uploads of your project are unfinished, which is as many as "
-                      "it may have; finish some, or wait a day until they are removed",
+          fmt::format("your project has {} unfinished uploads, the maximum; finish some, or "
+                      "wait a day until they are removed",
                       owned.size()),
           {{"project:" + name.owner + " unfinished uploads",
             fmt::format("{} of {}", owned.size(), kMaxUnfinished)}});
@@ -151,8 +151,8 @@ std::unique_ptr<UploadStore::Writer> UploadStore::Open(const UploadName& name,
   writer->size_ = status.st_size;
   if (offset != writer->size_) {
     throw ServiceError(ErrorReason::kOffsetMismatch,
-                       "the upload has {} bytes, the write starts at {}; ask QueryWriteStatus and "
-                       "go on from there",
+                       "the upload has {} bytes, the write starts at {}; call QueryWriteStatus "
+                       "and continue from there",
                        writer->size_,
                        offset);
   }
@@ -172,7 +172,7 @@ UploadStore::Writer::~Writer() {
   const auto entry = store_->sessions_.find(key);
   if (entry == store_->sessions_.end() || !entry->second.expired()) return;
   store_->sessions_.erase(entry);
-  // Nothing has come: there is nothing to go on from.
+  // Nothing was written, so nothing can be resumed.
   std::error_code error;
   if (fs::file_size(store_->folder_ / key, error) == 0 && !error) {
     fs::remove(store_->folder_ / key, error);

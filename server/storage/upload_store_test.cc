@@ -8,7 +8,7 @@ namespace color3d {
 namespace {
 using UploadStoreTest = StorageTest;
 
-TEST_F(UploadStoreTest, UploadResumesWhereItStopped) {
+TEST_F(UploadStoreTest, ResumesUploadAtCommittedSize) {
   const UploadName name{"3f0c", DigestOf("hello world")};
   EXPECT_EQ(uploads_.CommittedSize(name), 0);
   {
@@ -29,7 +29,7 @@ TEST_F(UploadStoreTest, UploadResumesWhereItStopped) {
   EXPECT_TRUE(ListFiles(scratch_.path() / "uploads").empty());
 }
 
-TEST_F(UploadStoreTest, WrongBytesAreDropped) {
+TEST_F(UploadStoreTest, DropsUploadWithWrongDigest) {
   const UploadName name{"u", DigestOf("right")};
   auto writer = uploads_.Open(name, 0);
   writer->Append(0, "wrong");
@@ -39,7 +39,7 @@ TEST_F(UploadStoreTest, WrongBytesAreDropped) {
   EXPECT_EQ(uploads_.CommittedSize(name), 0) << "starts afresh";
 }
 
-TEST_F(UploadStoreTest, ReconnectedClientTakesItsUploadOver) {
+TEST_F(UploadStoreTest, ReconnectedClientTakesOverUpload) {
   const UploadName name{"u", DigestOf("abcdef")};
   auto first = uploads_.Open(name, 0);
   first->Append(0, "abc");
@@ -51,7 +51,7 @@ TEST_F(UploadStoreTest, ReconnectedClientTakesItsUploadOver) {
   EXPECT_TRUE(blobs_.Touch(name.digest));
 }
 
-TEST_F(UploadStoreTest, HostileNamesAndSizesAreRefused) {
+TEST_F(UploadStoreTest, RefusesHostileNamesAndSizes) {
   EXPECT_THROW(uploads_.Open({"../../x", DigestOf("a")}, 0), Error);
   EXPECT_THROW(uploads_.Open({"", DigestOf("a")}, 0), Error);
   EXPECT_THROW(uploads_.Open({"u", {"zz", 1}}, 0), Error);
@@ -60,7 +60,7 @@ TEST_F(UploadStoreTest, HostileNamesAndSizesAreRefused) {
   EXPECT_TRUE(ListFiles(scratch_.path() / "uploads").empty());
 }
 
-TEST_F(UploadStoreTest, DeadUploadsAreReaped) {
+TEST_F(UploadStoreTest, RemovesDeadUploads) {
   const UploadName name{"u", DigestOf("abc")};
   uploads_.Open(name, 0)->Append(0, "a");
   EXPECT_EQ(uploads_.ReapOlderThan(std::chrono::hours(24)).uploads, 0);
@@ -73,7 +73,7 @@ TEST_F(UploadStoreTest, DeadUploadsAreReaped) {
   EXPECT_EQ(uploads_.CommittedSize(name), 0);
 }
 
-// What is announced counts while it comes, what is left of it afterwards, also over a restart.
+// Counts the announced size during a write and the size on disk afterwards, also after a restart.
 TEST_F(UploadStoreTest, CountsBytesOfUnfinishedUploads) {
   const UploadName abc{"u1", DigestOf("abc"), "attic"}, de{"u2", DigestOf("de"), "attic"};
   int64_t seen = -1;
@@ -103,7 +103,7 @@ TEST_F(UploadStoreTest, CountsBytesOfUnfinishedUploads) {
   EXPECT_EQ(look(uploads_), 3);
 }
 
-TEST_F(UploadStoreTest, EmptyBlobs) {
+TEST_F(UploadStoreTest, StoresEmptyBlob) {
   const UploadName name{"u", DigestOf("")};
   uploads_.Open(name, 0)->Finish();
   EXPECT_TRUE(blobs_.Touch(name.digest));
@@ -115,7 +115,7 @@ TEST_F(UploadStoreTest, EmptyUploadLeavesNoFile) {
   EXPECT_TRUE(ListFiles(scratch_.path() / "uploads").empty());
 }
 
-TEST_F(UploadStoreTest, UnfinishedUploadsOfAnOwnerAreCounted) {
+TEST_F(UploadStoreTest, LimitsUnfinishedUploadsOfOwner) {
   const FileDigest digest = DigestOf("abc");
   const auto leave = [&](const std::string& owner, int i) {
     uploads_.Open({"u" + std::to_string(i), digest, owner}, 0)->Append(0, "a");
@@ -123,7 +123,7 @@ TEST_F(UploadStoreTest, UnfinishedUploadsOfAnOwnerAreCounted) {
   for (int i = 0; i < 1000; ++i) leave("attic", i);
   EXPECT_EQ(ReasonThrown([&] { leave("attic", 1000); }), "QUOTA_EXCEEDED");
   leave("cellar", 0);
-  uploads_.Open({"u7", digest, "attic"}, 1)->Append(1, "b");  // what is there goes on
+  uploads_.Open({"u7", digest, "attic"}, 1)->Append(1, "b");  // resumes the partial upload
 }
 
 }  // namespace

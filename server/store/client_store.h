@@ -1,5 +1,5 @@
-// The part of the job store that clients call: users through their ProjectStore, operators, and the
-// server's metrics on their behalf (errors and threads: common_store.h).
+// Part of the job store that clients call: users through their ProjectStore, operators, and the
+// metrics of the server. Errors and thread safety: common_store.h.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace color3d {
 
-// Makes a mutating call idempotent: a call with the same id and body returns the result of the
-// first one. An empty id switches this off.
+// Makes a mutating call idempotent: a call with the id and body of an earlier one returns its
+// result. Empty id: not idempotent.
 struct RequestKey {
   std::string method;
   std::string id;
@@ -22,20 +22,20 @@ struct RequestKey {
 
 struct NewJob {
   std::string kind;
-  std::string scene;  // stored; empty: the graph's
+  std::string scene;  // stored name; empty: that of the graph
   std::string spec;
-  std::vector<int> inputs;              // positions in NewGraph::jobs, all smaller than its own
-  std::vector<std::string> input_jobs;  // names of jobs that exist
-  std::vector<std::string> blobs;       // digests that the spec names; kept alive with the job
-  std::string skip_reason;              // not empty: the plan leaves it out
+  std::vector<int> inputs;              // positions in NewGraph::jobs, all below its own
+  std::vector<std::string> input_jobs;  // names of existing jobs
+  std::vector<std::string> blobs;       // digests in the spec; kept as long as the job
+  std::string skip_reason;              // not empty: skipped by the plan
 };
 
-// The submitted job is the last one; all others become its children.
+// The last job is the submitted one; all others become its children.
 struct NewGraph {
   std::string project;
   std::string scene;  // stored
   std::string notify_url;
-  std::string trace;  // of the call that made it, for logs; may be empty
+  std::string trace;  // trace id of the call, for logs; may be empty
   int priority = 100;
   std::vector<NewJob> jobs;
 };
@@ -60,22 +60,22 @@ struct JobFilter {
   std::optional<std::string> project;  // nothing: all
 };
 
-// Maximum memory of a list of jobs.
+// Memory limits of a list of jobs.
 struct ListBudget {
   int64_t bytes = INT64_MAX;       // the list ends with the job that reaches it (MemoryBytes)
-  int64_t spec_bytes = INT64_MAX;  // a longer spec is left empty
+  int64_t spec_bytes = INT64_MAX;  // longer specs are replaced by empty ones
 };
 
-// Reasons to give workers no job.
+// Reasons for giving workers no jobs.
 enum class Hold {
   kPaused,   // by the operator
   kStorage,  // the disk is nearly full
 };
 
-// The place of a waiting job in the queue.
+// Place of a waiting job in the queue.
 struct QueuePlace {
-  int64_t position = 0;   // 1: the next; 0: it does not wait for a worker
-  std::string waits_for;  // empty: for its turn
+  int64_t position = 0;   // 1: next; 0: not waiting for a worker
+  std::string waits_for;  // empty: waits for its turn
 };
 
 enum class EventKind { kState, kProgress };
@@ -89,21 +89,21 @@ struct EventRecord {
   int64_t time_ms = 0;
 };
 
-// The present state of some jobs and the newest revision of the store, read in one transaction.
+// Present state of some jobs and the newest revision, read in one transaction.
 struct JobsSnapshot {
   std::vector<JobRecord> jobs;  // by revision, oldest first; without spec and artifacts
   int64_t revision = 0;
 };
 
-// The requested jobs, as far as the budget goes.
+// Requested jobs within the budget.
 struct LoadedJobs {
   std::vector<JobRecord> jobs;
-  // Number of ids that were looked for; those that are not in `jobs` were deleted.
+  // Number of ids that were looked up; those missing from `jobs` were deleted.
   size_t looked_for = 0;
 };
 
 struct ColorizerRecord {
-  int64_t id = 0;  // of the job, for paging
+  int64_t id = 0;  // id of the job, for paging
   std::string job;
   std::string scene;
   FileDigest digest;
@@ -113,20 +113,20 @@ struct ColorizerRecord {
 struct JobCounts {
   int64_t queued = 0;  // includes blocked
   int64_t running = 0;
-  int64_t blocked = 0;  // wait for inputs
-  // When the first of the jobs that wait for a worker began to wait; 0: none does.
+  int64_t blocked = 0;  // waiting for inputs
+  // Time when the job that has waited longest for a worker began to wait; 0: none waits.
   int64_t oldest_queued_ms = 0;
   int64_t notifications = 0;  // not delivered yet
 };
 
 class ClientStore : public virtual CommonStore {
  public:
-  // Scenes. `record.name` must be set; its id and times are not read. kResourceExhausted
-  // (QUOTA_EXCEEDED) when the project would have more scenes than `limits` allow.
+  // Creates a scene. Requires: `record.name` is set; id and times are ignored. Throws
+  // kResourceExhausted (QUOTA_EXCEEDED) if the project would exceed `limits`.
   virtual SceneRecord CreateScene(const SceneRecord& record,
                                   const RequestKey& request,
                                   const SceneLimits& limits) = 0;
-  // Newest first, ids below `before_id` (0: from the newest); of a project, or of all.
+  // Returns scenes with ids below `before_id` (0: all), newest first, of a project or of all.
   virtual std::vector<SceneRecord> ListScenes(const std::optional<std::string>& project,
                                               int64_t before_id,
                                               int limit) = 0;
@@ -134,72 +134,72 @@ class ClientStore : public virtual CommonStore {
                                     CaptureLayout layout,
                                     int photo_count,
                                     const RequestKey& request) = 0;
-  // `job`: a colorize_key_view job of this scene that has succeeded, or empty to take it back.
-  // kNotFound, kInvalidArgument or kFailedPrecondition otherwise.
+  // Accepts the succeeded colorize_key_view job `job` of this scene; empty: withdraws the
+  // acceptance. Throws kNotFound, kInvalidArgument or kFailedPrecondition for other jobs.
   virtual SceneRecord AcceptKeyColor(const std::string& name,
                                      const std::string& job,
                                      const RequestKey& request) = 0;
-  // Refused while a job of the scene is not finished; its finished jobs stay.
+  // Deletes a scene but not its finished jobs. Refused while a job of the scene is unfinished.
   virtual void DeleteScene(const std::string& name, const RequestKey& request) = 0;
 
   // Jobs.
-  // Creates all jobs of the graph or none. kResourceExhausted (QUEUE_FULL, QUOTA_EXCEEDED) when
-  // more jobs than `limits` allow would wait or run.
+  // Creates all jobs of the graph or none. Throws kResourceExhausted (QUEUE_FULL, QUOTA_EXCEEDED)
+  // if more jobs than `limits` allow would be unfinished.
   virtual JobRecord CreateGraph(const NewGraph& graph,
                                 const RequestKey& request,
                                 const QueueLimits& limits) = 0;
-  // The job made by an earlier equal request: a repeated call skips planning.
+  // Returns the job created by an earlier equal request, so that a repeated call skips planning.
   virtual std::optional<std::string> FindRequest(const RequestKey& request) = 0;
-  // Newest first, ids below `before_id` (0: from the newest).
+  // Returns jobs with ids below `before_id` (0: all), newest first.
   virtual std::vector<JobRecord> ListJobs(const JobFilter& filter,
                                           int64_t before_id,
                                           int limit,
                                           const ListBudget& budget) = 0;
   virtual JobRecord Cancel(const std::string& name, const RequestKey& request) = 0;
-  // Retries the jobs of the graph that failed, were cancelled or were skipped for that.
-  // kFailedPrecondition (INPUT_DELETED) when an input was deleted; full queues as CreateGraph.
+  // Retries all jobs of the graph that failed, were cancelled or were therefore skipped. Throws
+  // kFailedPrecondition (INPUT_DELETED) if an input was deleted, and like CreateGraph.
   virtual JobRecord Retry(const std::string& name,
                           bool from_scratch,
                           const RequestKey& request,
                           const QueueLimits& limits) = 0;
   virtual void Delete(const std::string& name, const RequestKey& request) = 0;
-  // Ends the job and its children as CANCELLED now: later writes of their workers are refused.
+  // Ends the job and its children as CANCELLED at once; later writes of their workers are refused.
   virtual JobRecord Kill(const std::string& name) = 0;
-  // kInvalidArgument for a job that was not submitted.
+  // Throws kInvalidArgument for a child of a submitted job.
   virtual JobRecord Pin(const std::string& name, bool pinned) = 0;
   virtual QueuePlace PlaceInQueue(const JobRecord& job) = 0;
 
   // Events.
   virtual int64_t NewestRevision() = 0;
-  // Of all jobs; oldest first.
+  // Returns events of all jobs, oldest first.
   virtual std::vector<EventRecord> EventsSince(int64_t revision, int limit) = 0;
-  // Of these jobs; oldest first. ServiceError REVISION_COMPACTED when events after `revision` have
-  // been deleted, or when the store never was at `revision`.
+  // Returns events of these jobs, oldest first. Throws REVISION_COMPACTED if events after
+  // `revision` were deleted or the store never reached `revision`.
   virtual std::vector<EventRecord> EventsSince(int64_t revision,
                                                const std::vector<int64_t>& job_ids,
                                                int limit) = 0;
   virtual bool AllFinished(const std::vector<int64_t>& job_ids) = 0;
   virtual JobsSnapshot Snapshot(const std::vector<int64_t>& job_ids) = 0;
-  // In the order of the ids, with artifacts, as far as the budget goes.
+  // Returns jobs with artifacts in the order of the ids, within the budget.
   virtual LoadedJobs LoadJobs(const std::vector<int64_t>& job_ids, const ListBudget& budget) = 0;
-  // The named jobs and their children.
+  // Returns the ids of the named jobs and of their children.
   virtual std::vector<int64_t> ResolveWatch(const std::vector<std::string>& names) = 0;
 
   // Projects.
-  // By name. A project is there once it has had a job or a blob.
+  // Sorted by name. A project exists once it has had a job or a blob.
   virtual std::vector<ProjectRecord> ListProjects() = 0;
   virtual ProjectRecord GetProject(const std::string& name) = 0;
-  // The project may read the blob from now on; it counts for its quota.
+  // Lets the project read the blob, which counts towards its quota.
   virtual void HoldBlob(const std::string& project, const FileDigest& blob) = 0;
-  // The blobs of these that the project may read.
+  // Returns those of these blobs that the project may read.
   virtual std::set<std::string> HeldBlobs(const std::string& project,
                                           const std::vector<std::string>& sha256) = 0;
 
-  // Holds stay over restarts.
+  // Holds survive restarts.
   virtual void SetHold(Hold hold, bool on) = 0;
   virtual std::set<Hold> Holds() = 0;
   virtual JobCounts CountJobs() = 0;
-  // `scene`: stored, or empty; of a project, or of all.
+  // `scene`: stored name; empty: all scenes. No project: all projects.
   virtual std::vector<ColorizerRecord> ListColorizers(const std::optional<std::string>& project,
                                                       const std::string& scene,
                                                       int64_t before_id,

@@ -82,7 +82,7 @@ int64_t MemoryBytes(const JobRecord& job) {
   return static_cast<int64_t>(bytes);
 }
 
-// Measured: rows with their entries in the indexes, and the events of a job's life.
+// Measured: rows with their index entries, and the events of a job.
 int64_t RowBytes(const SceneRecord& scene) {
   int64_t bytes = 512 + static_cast<int64_t>(scene.display_name.size());
   for (const SceneFileRecord& file : scene.files) {

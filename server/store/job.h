@@ -1,4 +1,4 @@
-// The records of the job store: plain values, no behaviour beyond names of states.
+// Records of the job store. Plain values.
 #pragma once
 
 #include <cstdint>
@@ -15,26 +15,26 @@
 
 namespace color3d {
 
-// Milliseconds since the Unix epoch. Injected so that tests own time.
+// Milliseconds since the Unix epoch. Injected, so that tests control time.
 using Clock = std::function<int64_t()>;
 Clock SystemClock();
 
-// Two clocks, milliseconds. By `wall`, since the epoch, go the times that people read, and how long
-// things are kept; it may be set. By `steady`, since the machine was started, go leases and pauses:
-// a clock that jumps ends none. All processes of a machine see the same.
+// Clocks in milliseconds. `wall` (since the epoch) gives displayed times and retention; it may
+// jump. `steady` (since the start of the machine) gives leases and pauses, so that a jump ends none
+// of them. Both are the same for all processes of a machine.
 struct Clocks {
   Clock wall;
   Clock steady;
 };
 Clocks SystemClocks();
-// Changes with every start of the machine: steady times of another one mean nothing.
+// Identifies the present start of the machine: steady times of another start are meaningless.
 std::string BootId();
 
 enum class JobState { kBlocked, kQueued, kRunning, kSucceeded, kFailed, kCancelled, kSkipped };
 
 // "BLOCKED", "QUEUED", ... as stored and as shown to people.
 const char* JobStateName(JobState state);
-// Throws Error{kDataLoss} for a name that is none.
+// Throws Error{kDataLoss} for an unknown name.
 JobState JobStateFromName(std::string_view name);
 inline bool IsFinished(JobState state) {
   return state == JobState::kSucceeded || state == JobState::kFailed ||
@@ -56,9 +56,9 @@ struct ProgressRecord {
   double eta_seconds = -1.0;  // < 0: unknown
 };
 
-// Time and memory of a job over all its attempts, and its warnings.
+// Time, memory and warnings of a job over all attempts.
 struct JobUsage {
-  double seconds = 0.0;  // of computing
+  double seconds = 0.0;  // computing time
   int64_t peak_memory_bytes = 0;
   std::vector<std::string> warnings;
 };
@@ -71,12 +71,12 @@ struct JobError {
 JobError MakeJobError(ErrorReason reason, std::string message);
 
 struct JobRecord {
-  int64_t id = 0;      // grows with creation
+  int64_t id = 0;      // ascending in order of creation
   std::string name;    // "jobs/..."
-  std::string parent;  // name of the submitted job that this one was made for; empty: submitted
+  std::string parent;  // submitted job that this one belongs to; empty: submitted itself
   std::string kind;
   std::string scene;  // "scenes/...", as StoredScene makes it
-  std::string spec;   // opaque bytes of the job's options
+  std::string spec;   // serialized options, opaque to the store
   std::string project;
   JobState state = JobState::kBlocked;
   bool cancel_requested = false;
@@ -89,14 +89,14 @@ struct JobRecord {
   std::vector<ArtifactRecord> artifacts;  // of succeeded jobs
   std::optional<JobError> error;
   std::string skip_reason;
-  bool skipped_by_plan = false;  // at creation; not because an input failed
+  bool skipped_by_plan = false;  // by the plan at creation, not for a failed input
   bool cached = false;
   bool pinned = false;
-  std::string notify_url;  // told when it has ended; empty: nobody
-  std::string trace;       // of the call that made it: 32 hexadecimal digits (W3C), or empty
+  std::string notify_url;  // notified when the job ends; empty: none
+  std::string trace;       // W3C trace id of the call, 32 hexadecimal digits, or empty
   std::optional<FileDigest> checkpoint;
-  int64_t queued_ms = 0;        // waited for a worker, until the present wait began
-  int64_t queued_since_ms = 0;  // 0: does not wait for one
+  int64_t queued_ms = 0;        // time spent waiting for a worker before the present wait
+  int64_t queued_since_ms = 0;  // begin of the present wait; 0: not waiting
   int64_t create_ms = 0;
   int64_t start_ms = 0;  // 0: not yet
   int64_t end_ms = 0;
@@ -105,11 +105,11 @@ struct JobRecord {
   int64_t row_bytes = 0;  // about what its rows take in the database
 };
 
-// About what the record takes in memory.
+// Approximate memory of the record, bytes.
 int64_t MemoryBytes(const JobRecord& job);
 
-// Proof that a worker still owns a running job: every write of a worker names
-// the epoch of its claim, and is refused once another claim has raised it.
+// Proof that a worker owns a running job: each write of a worker names the epoch of its claim, and
+// is refused after another claim.
 struct Lease {
   int64_t job_id = 0;
   int64_t epoch = 0;
@@ -130,14 +130,14 @@ struct SceneRecord {
   SceneState state = SceneState::kUploading;
   CaptureLayout layout = CaptureLayout::kUnknown;
   int photo_count = 0;
-  std::vector<SceneFileRecord> files;  // left empty in lists
+  std::vector<SceneFileRecord> files;  // empty in lists
   int64_t create_ms = 0;
   int64_t commit_ms = 0;
   std::string key_color_job;  // accepted; empty: none
   int64_t row_bytes = 0;      // about what its rows take in the database
 };
 
-// About what a record and the rows that belong to it take in the database, bytes.
+// Approximate size in the database of a record and its dependent rows, bytes.
 int64_t RowBytes(const SceneRecord& scene);
 int64_t RowBytes(const JobRecord& job, size_t inputs, size_t blobs);
 constexpr int64_t kArtifactRowBytes = 300;
@@ -150,24 +150,23 @@ struct WorkerRecord {
   int64_t heartbeat_ms = 0;
 };
 
-// Scenes of different projects may have the same name: a scene of a project is stored under
-// "scenes/ID@PROJECT", one of those without a project as it is named.
+// Scenes of different projects may have the same name: a scene of a project is stored as
+// "scenes/ID@PROJECT", a scene without a project under its own name.
 std::string StoredScene(const std::string& name, const std::string& project);
-// As its owners name it.
+// Returns the name without the project.
 std::string PublicScene(const std::string& stored);
 
 struct ProjectRecord {
-  std::string name;          // empty: of all without a project
-  int64_t stored_bytes = 0;  // of the blobs that it holds
+  std::string name;          // empty: the default project
+  int64_t stored_bytes = 0;  // size of its blobs
   int64_t unfinished_jobs = 0;
-  // About what its scenes, jobs and blobs take in the database, and what files take beyond their
-  // length.
+  // Approximate size of its rows in the database, and overhead of its files on disk.
   int64_t row_bytes = 0;
   int64_t scenes = 0;
   int64_t uncommitted_scenes = 0;
 };
 
-// 16 random lower-case hexadecimal digits, from the system's random source.
+// Returns 16 random lower-case hexadecimal digits from the system's random source.
 std::string NewId();
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
-// All parts of the job store, for the few that need more than one. Others take the narrowest part:
-// ClientStore, WorkerStore or ChoreStore. Thread-safe (common_store.h).
+// All parts of the job store, for callers that need more than one. Other callers take the narrowest
+// part: ClientStore, WorkerStore or ChoreStore. Thread-safe (common_store.h).
 #pragma once
 
 #include "server/store/chore_store.h"

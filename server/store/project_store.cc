@@ -133,7 +133,7 @@ JobRecord ProjectStore::Retry(const std::string& name,
 }
 
 void ProjectStore::Delete(const std::string& name, const RequestKey& request) const {
-  // A repeated call finds what the first one has deleted no more; its request id tells.
+  // A repeated call no longer finds the deleted job, but its request id is known.
   if (!store_->FindRequest(Own(request))) RequireOwn(name);
   store_->Delete(name, Own(request));
 }

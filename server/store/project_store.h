@@ -1,6 +1,6 @@
-// The store as one project sees it: its own scenes, jobs, colorizers, blobs and request ids, under
-// the names that it gave them; what others have is not there (kNotFound). Every call of a client
-// goes through one of these. Cheap to make and to copy; thread-safe as the store.
+// The store as seen by one project: its scenes, jobs, colorizers, blobs and request ids under their
+// public names. Data of other projects does not exist here (kNotFound). All calls of clients go
+// through this class. Cheap to copy; thread-safe like the store.
 #pragma once
 
 #include <set>
@@ -13,13 +13,13 @@ namespace color3d {
 
 class ProjectStore {
  public:
-  // The store must outlive this object. `project` empty: what belongs to none.
+  // The store must outlive this object. Empty `project`: the default project.
   ProjectStore(ClientStore& store, std::string project)
       : store_(&store), project_(std::move(project)) {}
 
   const std::string& project() const { return project_; }
 
-  // As those of ClientStore.
+  // See ClientStore.
   SceneRecord CreateScene(SceneRecord record,
                           const RequestKey& request,
                           const SceneLimits& limits) const;
@@ -41,7 +41,7 @@ class ProjectStore {
                                   int64_t before_id,
                                   int limit,
                                   const ListBudget& budget) const;
-  // With artifacts, in order of creation.
+  // Returns jobs with artifacts, in order of creation.
   std::vector<JobRecord> ListChildren(const std::string& name) const;
   std::vector<JobRecord> GetInputs(const JobRecord& job) const;
   JobRecord Cancel(const std::string& name, const RequestKey& request) const;
@@ -52,13 +52,13 @@ class ProjectStore {
   void Delete(const std::string& name, const RequestKey& request) const;
   JobRecord Pin(const std::string& name, bool pinned) const;
   QueuePlace PlaceInQueue(const JobRecord& job) const { return store_->PlaceInQueue(job); }
-  // As ClientStore::Snapshot, of ids that ResolveWatch gave.
+  // See ClientStore::Snapshot. Requires: the ids are from ResolveWatch.
   JobsSnapshot Snapshot(const std::vector<int64_t>& job_ids) const;
   LoadedJobs LoadJobs(const std::vector<int64_t>& job_ids, const ListBudget& budget) const;
-  // Ids of the named jobs and their children.
+  // Returns the ids of the named jobs and of their children.
   std::vector<int64_t> ResolveWatch(const std::vector<std::string>& names) const;
 
-  // `scene` empty: of all scenes.
+  // Empty `scene`: all scenes.
   std::vector<ColorizerRecord> ListColorizers(const std::string& scene,
                                               int64_t before_id,
                                               int limit) const;
@@ -72,10 +72,10 @@ class ProjectStore {
   ProjectRecord Usage() const { return store_->GetProject(project_); }
 
  private:
-  // Throws JOB_NOT_FOUND for a job of others.
+  // Throws JOB_NOT_FOUND for a job of another project.
   void RequireOwn(const std::string& job) const;
   RequestKey Own(RequestKey request) const;
-  // Throws SCENE_NOT_FOUND for what reads like the stored name of another project's.
+  // Returns the stored name. Throws SCENE_NOT_FOUND for a name that has the form of a stored one.
   std::string Stored(const std::string& scene) const;
 
   ClientStore* store_;

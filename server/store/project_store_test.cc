@@ -32,7 +32,7 @@ class ProjectStoreTest : public JobStoreTest {
   ProjectStore a_{*store_, "a"}, b_{*store_, "b"}, none_{*store_, ""};
 };
 
-TEST_F(ProjectStoreTest, ProjectsSeeOnlyTheirOwn) {
+TEST_F(ProjectStoreTest, ProjectsSeeOnlyTheirJobsAndScenes) {
   const JobRecord job = Create(a_);
   EXPECT_EQ(job.scene, "scenes/house");
   EXPECT_EQ(a_.GetJob(job.name).scene, "scenes/house");
@@ -65,7 +65,7 @@ TEST_F(ProjectStoreTest, ProjectsSeeOnlyTheirOwn) {
   EXPECT_EQ(StateOf(job.name), JobState::kQueued);
 }
 
-TEST_F(ProjectStoreTest, ScenesAndColorizersGoByTheirOwnNames) {
+TEST_F(ProjectStoreTest, ScenesAndColorizersKeepPublicNames) {
   Create(a_);
   const JobRecord job = ClaimOne();
   EXPECT_EQ(store_->GetScene(job.scene).files.size(), 1u) << "as workers look for it";
@@ -74,7 +74,7 @@ TEST_F(ProjectStoreTest, ScenesAndColorizersGoByTheirOwnNames) {
   EXPECT_EQ(a_.GetScene("scenes/house").name, "scenes/house");
 }
 
-TEST_F(ProjectStoreTest, RequestIdsAreTheirOwn) {
+TEST_F(ProjectStoreTest, RequestIdsBelongToProject) {
   const RequestKey key{"CreateJob", "id", "body"};
   const JobRecord of_a = a_.CreateGraph(Graph(), key, kNoLimit);
   const JobRecord of_b = b_.CreateGraph(Graph(), {"CreateJob", "id", "another body"}, kNoLimit);
@@ -116,7 +116,7 @@ TEST_F(ProjectStoreTest, BlobsAreReadableByTheirHolders) {
   EXPECT_EQ(b_.Usage().stored_bytes, 0);
 }
 
-TEST_F(ProjectStoreTest, RowsCountForTheQuota) {
+TEST_F(ProjectStoreTest, RowsCountTowardsQuota) {
   const int64_t before = a_.Usage().row_bytes;
   SceneRecord scene;
   scene.name = "scenes/long";
@@ -168,7 +168,7 @@ TEST_F(ProjectStoreTest, LimitsScenesAndUncommittedScenes) {
   EXPECT_EQ(create(a_, "four"), "nothing");
 }
 
-TEST_F(ProjectStoreTest, OneProjectCannotFillTheQueue) {
+TEST_F(ProjectStoreTest, OneProjectCannotFillQueue) {
   const QueueLimits limits(5, 2);
   Create(a_, limits);
   Create(a_, limits);

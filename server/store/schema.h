@@ -1,12 +1,12 @@
-// Tables of the SQLite job store. Times are milliseconds since the epoch from the injected
-// clock, but for lease_expires_ms and run_after_ms, which are by the steady one.
+// Tables of the SQLite job store. Times are milliseconds since the epoch of the injected wall
+// clock; lease_expires_ms and run_after_ms are of the steady clock.
 #pragma once
 
 namespace color3d {
 
 constexpr int kSchemaVersion = 6;
 
-// Since version 4. A project holds the blobs that it uploaded and that its jobs left.
+// Since version 4. A project holds the blobs that it uploaded and the results of its jobs.
 #define COLOR3D_PROJECT_TABLES                                                                  \
   "create table project(name text primary key, turn integer not null default 0, "               \
   "bytes integer not null default 0) without rowid;"                                            \
@@ -25,8 +25,8 @@ constexpr int kSchemaVersion = 6;
   "age_ms integer not null);"                                                                   \
   "insert into meta values('hold_paused', 0), ('hold_storage', 0), ('expiry_steady_ms', 0);"
 
-// Since version 6: what rows take counts in what a project has (row_bytes), and its scenes are
-// counted. A blob counts a block of the disk besides its length, a request id its row.
+// Since version 6: the size of rows counts towards the usage of a project (row_bytes), and its
+// scenes are counted. A blob counts a disk block beyond its length, a request id its row.
 #define COLOR3D_ACCOUNT(event, sum, name, amount)                                              \
   "create trigger " event " begin insert into project(name, " sum ") values(" name ", " amount \
   ") on conflict(name) do update set " sum "=" sum "+excluded." sum "; end;"
@@ -59,8 +59,8 @@ constexpr int kSchemaVersion = 6;
   COLOR3D_ACCOUNT("request_rows_gone after delete on request_id", "row_bytes",                \
                   COLOR3D_REQUEST_PROJECT("old.id"), "-300")
 
-// Since version 6: with the path in a key, an index held it a second time, and one of 970 bytes
-// took two pages of its own.
+// Since version 6 the path is not part of a key: an index stored it a second time, and a path of
+// 970 bytes took two pages.
 #define COLOR3D_SCENE_FILES                                                            \
   "create table scene_file(scene_file_id integer primary key, "                        \
   "scene_id integer not null references scene on delete cascade, path text not null, " \

@@ -27,10 +27,9 @@ bool SqliteJobStore::IsHeld() {
 
 bool SqliteJobStore::IsFull() {
   try {
-    WriteTransaction transaction(connections_, /*durable=*/false);
-    SqliteDatabase& db = transaction.db();
+    WriteTransaction db(connections_, /*durable=*/false);
     db.Exec("insert into meta values('probe', 0) on conflict(name) do update set value=value+1");
-    transaction.Commit();
+    db.Commit();
     return false;
   } catch (const Error& e) {
     return e.code() == ErrorCode::kResourceExhausted;
@@ -41,74 +40,75 @@ namespace {
 constexpr int kCompactAtOnce = 200;
 }
 
-// In steps, so that nobody waits long for the right to write: along the events, from the oldest to
-// the first that are young.
+// Works in steps from the oldest to the first young event, so that other writers do not wait long.
 void SqliteJobStore::Compact(int64_t events_before_ms, int64_t requests_before_ms) {
   for (std::optional<int64_t> revision = 0; revision;) {
     revision = CompactEvents(*revision, events_before_ms);
   }
-  requests_before_ms = std::min(requests_before_ms, NotedRequestAge(requests_before_ms));
+  requests_before_ms = std::min(requests_before_ms, RecordedRequestAge(requests_before_ms));
   int64_t removed = kCompactAtOnce;
   while (removed == kCompactAtOnce) {
-    WriteTransaction transaction(connections_, /*durable=*/false);
-    SqliteDatabase& db = transaction.db();
+    WriteTransaction db(connections_, /*durable=*/false);
     removed = db.Run(
         "delete from request_id where (method, id) in (select method, id from request_id where "
         "at_ms<? order by at_ms limit ?)",
         requests_before_ms,
         kCompactAtOnce);
-    transaction.Commit();
+    db.Commit();
   }
 }
 
-int64_t SqliteJobStore::NotedRequestAge(int64_t before_ms) {
+int64_t SqliteJobStore::RecordedRequestAge(int64_t before_ms) {
   constexpr int64_t kDayMs = 24 * 3'600'000;
-  WriteTransaction transaction(connections_, /*durable=*/false);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_, /*durable=*/false);
   db.Run("update meta set value=value+? where name='requests_age_ms'",
          ElapsedSinceLast(db, "requests_steady_ms"));
-  SqliteStatement due(db.handle(),
+  SqliteStatement due(db,
                       "select n.value from meta n, meta a where n.name='requests_noted_ms' and "
-                      "a.name='requests_age_ms' and a.value>=?");
-  due.Bind(kDayMs);
+                      "a.name='requests_age_ms' and a.value>=?",
+                      kDayMs);
   int64_t noted = 0;
   if (due.Step()) {
     noted = due.Int(0);
     db.Run("update meta set value=? where name='requests_noted_ms'", before_ms);
     db.Run("update meta set value=0 where name='requests_age_ms'");
   }
-  transaction.Commit();
+  db.Commit();
   return noted;
 }
 
 std::optional<int64_t> SqliteJobStore::CompactEvents(int64_t after, int64_t before_ms) {
   int64_t last = 0;
   {
-    const auto held = connections_.Read();
+    const auto db = connections_.Read();
     SqliteStatement next(
-        (*held).handle(),
+        db,
         "select max(revision), max(old), max(old and ended) from (select "
         "e.revision, e.at_ms<? as old, j.end_ms<>0 as ended from job_event e cross "
         "join job j on j.job_id=e.job_id where e.revision>? order by e.revision "
-        "limit ?)");
-    next.Bind(before_ms, after, kCompactAtOnce);
+        "limit ?)",
+        before_ms,
+        after,
+        kCompactAtOnce);
     next.Step();
     if (next.Int(1) == 0) return std::nullopt;
     last = next.Int(0);
     if (next.Int(2) == 0) return last;
   }
-  WriteTransaction transaction(connections_, /*durable=*/false);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_, /*durable=*/false);
   constexpr char kOld[] =
       " from job_event where revision>? and revision<=? and at_ms<? and "
       "exists(select 1 from job where job.job_id=job_event.job_id and end_ms<>0)";
-  SqliteStatement newest(
-      db.handle(), std::string("select coalesce(max(revision), 0)") + kOld + " and progress=0");
-  newest.Bind(after, last, before_ms);
-  newest.Step();
-  db.Run("update meta set value=max(value, ?) where name='compacted_revision'", newest.Int(0));
+  const int64_t newest =
+      SqliteStatement(db,
+                      std::string("select max(revision)") + kOld + " and progress=0",
+                      after,
+                      last,
+                      before_ms)
+          .NextInt();
+  db.Run("update meta set value=max(value, ?) where name='compacted_revision'", newest);
   db.Run(std::string("delete") + kOld, after, last, before_ms);
-  transaction.Commit();
+  db.Commit();
   return last;
 }
 
@@ -120,64 +120,57 @@ constexpr char kReferences[] =
 }  // namespace
 
 std::set<std::string> SqliteJobStore::ReferencedBlobs() {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(), kReferences);
-  std::set<std::string> digests;
-  while (select.Step()) digests.insert(select.Text(0));
-  return digests;
+  const auto db = connections_.Read();
+  const std::vector<std::string> digests = SqliteStatement(db, kReferences).Texts();
+  return {digests.begin(), digests.end()};
 }
 
 std::set<std::string> SqliteJobStore::AwaitedBlobs() {
-  const auto held = connections_.Read();
-  SqliteStatement select(
-      (*held).handle(),
-      "select f.sha256 from scene_file f join scene s on s.scene_id=f.scene_id where s.active=0 "
-      "except select f.sha256 from scene_file f join scene s on s.scene_id=f.scene_id where "
-      "s.active=1 except select sha256 from artifact except select sha256 from job_blob "
-      "except select checkpoint_sha256 from job where checkpoint_sha256 <> ''");
-  std::set<std::string> digests;
-  while (select.Step()) digests.insert(select.Text(0));
-  return digests;
+  const auto db = connections_.Read();
+  const std::vector<std::string> digests =
+      SqliteStatement(
+          db,
+          "select f.sha256 from scene_file f join scene s on s.scene_id=f.scene_id where "
+          "s.active=0 "
+          "except select f.sha256 from scene_file f join scene s on s.scene_id=f.scene_id where "
+          "s.active=1 except select sha256 from artifact except select sha256 from job_blob "
+          "except select checkpoint_sha256 from job where checkpoint_sha256 <> ''")
+          .Texts();
+  return {digests.begin(), digests.end()};
 }
 
 bool SqliteJobStore::IsReferenced(const std::string& sha256) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   SqliteStatement select(
-      db.handle(),
+      db,
       "select exists(select 1 from artifact where sha256=?1) or "
       "exists(select 1 from scene_file where sha256=?1) or "
       "exists(select 1 from job_blob where sha256=?1) or "
-      "exists(select 1 from job where checkpoint_sha256=?1 and checkpoint_sha256 <> '')");
-  select.Bind(sha256);
+      "exists(select 1 from job where checkpoint_sha256=?1 and checkpoint_sha256 <> '')",
+      sha256);
   select.Step();
   return select.Int(0) != 0;
 }
 
 int64_t SqliteJobStore::ElapsedSinceLast(SqliteDatabase& db, const char* name) {
-  SqliteStatement last(db.handle(), "select value from meta where name=?");
-  last.Bind(name);
-  const int64_t before = last.Step() ? last.Int(0) : 0;
+  const int64_t before = SqliteStatement(db, "select value from meta where name=?", name).NextInt();
   db.Run("update meta set value=max(?, 1) where name=?", SteadyNow(), name);
   return before > 0 ? std::max<int64_t>(SteadyNow() - before, 0) : 0;
 }
 
 namespace {
-std::vector<BlobCandidate> CandidatesOf(SqliteDatabase& db, int64_t grace_ms) {
-  SqliteStatement select(db.handle(),
-                         "select sha256, touched_ns from blob_candidate where age_ms>=?");
-  select.Bind(grace_ms);
-  std::vector<BlobCandidate> candidates;
-  while (select.Step()) candidates.push_back({select.Text(0), select.Int(1)});
-  return candidates;
+std::vector<BlobCandidate> DueCandidates(SqliteDatabase& db, int64_t grace_ms) {
+  return SqliteStatement(
+             db, "select sha256, touched_ns from blob_candidate where age_ms>=?", grace_ms)
+      .All([](const SqliteStatement& row) {
+        return BlobCandidate{row.Text(0), row.Int(1)};
+      });
 }
 }  // namespace
 
 std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobCandidate>& unnamed,
                                                          int64_t grace_ms) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   const int64_t elapsed = ElapsedSinceLast(db, "collected_steady_ms");
   db.Exec("create temp table told(sha256 text primary key, touched_ns integer) without rowid");
   for (const BlobCandidate& blob : unnamed) {
@@ -189,30 +182,27 @@ std::vector<BlobCandidate> SqliteJobStore::AgeCandidates(const std::vector<BlobC
   db.Run("update blob_candidate set age_ms=age_ms+?", elapsed);
   db.Exec("insert or ignore into blob_candidate select sha256, touched_ns, 0 from told");
   db.Exec("drop table told");
-  std::vector<BlobCandidate> due = CandidatesOf(db, grace_ms);
-  transaction.Commit();
+  std::vector<BlobCandidate> due = DueCandidates(db, grace_ms);
+  db.Commit();
   return due;
 }
 
 std::vector<BlobCandidate> SqliteJobStore::AgedCandidates(int64_t grace_ms) {
-  return CandidatesOf(*connections_.Read(), grace_ms);
+  return DueCandidates(connections_.Read(), grace_ms);
 }
 
-// In steps whose log is short: on a disk that is nearly full there is no room for a long one.
-int64_t SqliteJobStore::GiveBackSpace(int64_t keep_bytes) {
+// Works in steps with a short log: a nearly full disk has no room for a long one.
+int64_t SqliteJobStore::ReturnFreeSpace(int64_t keep_bytes) {
   constexpr int64_t kPagesAtOnce = 500;
-  const SqliteConnections::Writer held(connections_);
-  SqliteDatabase& db = *held;
-  const auto number = [&](const char* pragma) {
-    SqliteStatement select(db.handle(), pragma);
-    return select.Step() ? select.Int(0) : 0;
-  };
+  const SqliteConnections::Writer writer(connections_);
+  SqliteDatabase& db = *writer;
+  const auto number = [&](const char* pragma) { return SqliteStatement(db, pragma).NextInt(); };
   const int64_t page_bytes = number("pragma page_size");
   const int64_t keep = keep_bytes / page_bytes;
   int64_t free = number("pragma freelist_count");
   for (int step = 0; step < 4 && free > keep; ++step) {
     db.Run(fmt::format("pragma incremental_vacuum({})", std::min(kPagesAtOnce, free - keep)));
-    // The file is cut where its log is folded into it; whoever reads meanwhile delays that.
+    // The checkpoint truncates the file; concurrent readers delay it.
     db.Run("pragma wal_checkpoint(passive)");
     free = number("pragma freelist_count");
   }

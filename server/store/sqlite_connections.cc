@@ -14,7 +14,7 @@ constexpr int kMaxReaders = 4;
 SqliteConnections::SqliteConnections(const std::filesystem::path& file)
     : file_(file), writer_(file, SqliteAccess::kWrite) {}
 
-std::unique_ptr<SqliteDatabase> SqliteConnections::TakeReader() {
+std::unique_ptr<SqliteDatabase> SqliteConnections::AcquireReader() {
   const MutexLock lock(reading_);
   while (idle_readers_.empty() && readers_ >= kMaxReaders) reader_is_back_.Wait(reading_);
   if (idle_readers_.empty()) {
@@ -27,7 +27,7 @@ std::unique_ptr<SqliteDatabase> SqliteConnections::TakeReader() {
   return reader;
 }
 
-void SqliteConnections::PutBack(std::unique_ptr<SqliteDatabase> reader) {
+void SqliteConnections::ReleaseReader(std::unique_ptr<SqliteDatabase> reader) {
   {
     const MutexLock lock(reading_);
     idle_readers_.push_back(std::move(reader));
@@ -43,11 +43,11 @@ SqliteConnections::Writer::Writer(SqliteConnections& connections) COLOR3D_NO_THR
 SqliteConnections::Writer::~Writer() COLOR3D_NO_THREAD_SAFETY_ANALYSIS = default;
 
 SqliteConnections::Reader::Reader(SqliteConnections& connections)
-    : connections_(connections), db_(connections.TakeReader()) {
+    : connections_(connections), db_(connections.AcquireReader()) {
   try {
     db_->Exec("begin");
   } catch (...) {
-    connections_.PutBack(std::move(db_));
+    connections_.ReleaseReader(std::move(db_));
     throw;
   }
 }
@@ -58,7 +58,7 @@ SqliteConnections::Reader::~Reader() {
   } catch (const Error&) {
     // SQLite has ended the transaction by itself (I/O error).
   }
-  connections_.PutBack(std::move(db_));
+  connections_.ReleaseReader(std::move(db_));
 }
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
-// Connections of one process to the store: one that writes, and some that read beside it, so that
-// no read waits for a write or for a disk. Thread-safe.
+// Connections of one process to the store: one writer and several readers, so that no read waits
+// for a write or for the disk. Thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -27,26 +27,26 @@ class SqliteConnections {
     MutexLock lock_;
     SqliteDatabase& db_;
   };
-  // All that is read through it is of one moment.
+  // A read transaction: all reads see one state of the store.
   class Reader {
    public:
     explicit Reader(SqliteConnections& connections);
     ~Reader();
     Reader(const Reader&) = delete;
     Reader& operator=(const Reader&) = delete;
-    SqliteDatabase& operator*() const { return *db_; }
+    operator SqliteDatabase&() const { return *db_; }  // NOLINT: stands for the connection
 
    private:
     SqliteConnections& connections_;
     std::unique_ptr<SqliteDatabase> db_;
   };
 
-  // Waits while all readers are in use. A thread that has one must not ask for another.
+  // Waits while all readers are in use. Requires: the thread holds no other reader.
   Reader Read() { return Reader(*this); }
 
  private:
-  std::unique_ptr<SqliteDatabase> TakeReader();
-  void PutBack(std::unique_ptr<SqliteDatabase> reader);
+  std::unique_ptr<SqliteDatabase> AcquireReader();
+  void ReleaseReader(std::unique_ptr<SqliteDatabase> reader);
 
   const std::filesystem::path file_;
   Mutex writing_;
@@ -54,7 +54,7 @@ class SqliteConnections {
   Mutex reading_;
   CondVar reader_is_back_;
   std::vector<std::unique_ptr<SqliteDatabase>> idle_readers_ COLOR3D_GUARDED_BY(reading_);
-  int readers_ COLOR3D_GUARDED_BY(reading_) = 0;  // with those in use
+  int readers_ COLOR3D_GUARDED_BY(reading_) = 0;  // idle and in use
 };
 
 // A transaction of the writing connection, from construction to destruction; rolled back unless
@@ -63,7 +63,12 @@ class WriteTransaction {
  public:
   explicit WriteTransaction(SqliteConnections& connections, bool durable = true)
       : writer_(connections), transaction_(*writer_, durable) {}
-  SqliteDatabase& db() const { return *writer_; }
+  operator SqliteDatabase&() const { return *writer_; }  // NOLINT: stands for the connection
+  template <typename... Values>
+  int64_t Run(std::string_view sql, const Values&... values) {
+    return (*writer_).Run(sql, values...);
+  }
+  void Exec(const char* sql) { (*writer_).Exec(sql); }
   void Commit() { transaction_.Commit(); }
 
  private:

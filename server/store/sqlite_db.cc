@@ -36,7 +36,7 @@ std::atomic<int64_t> g_steps{0};
                          "{}; restore jobs.db from a backup or start with a fresh --data-dir",
                          text);
     default:
-      // The log's index says of a full disk that it cannot grow.
+      // On a full disk the index of the log cannot grow: SQLITE_IOERR_SHMSIZE.
       if (db != nullptr && (sqlite3_system_errno(db) == ENOSPC || code == SQLITE_IOERR_SHMSIZE)) {
         throw ServiceError(ErrorReason::kStorageFull, "{}; free some disk space", text);
       }
@@ -46,10 +46,10 @@ std::atomic<int64_t> g_steps{0};
 
 }  // namespace
 
-SqliteStatement::SqliteStatement(sqlite3* db, std::string_view sql) : db_(db) {
+SqliteStatement::SqliteStatement(SqliteDatabase& db, std::string_view sql) : db_(db.handle()) {
   const int code =
-      sqlite3_prepare_v2(db, sql.data(), static_cast<int>(sql.size()), &statement_, nullptr);
-  if (code != SQLITE_OK) ThrowSqlite(db, code, "cannot prepare a statement");
+      sqlite3_prepare_v2(db_, sql.data(), static_cast<int>(sql.size()), &statement_, nullptr);
+  if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot prepare a statement");
 }
 
 SqliteStatement::~SqliteStatement() {
@@ -88,6 +88,10 @@ void SqliteStatement::Run() {
   }
 }
 
+std::vector<std::string> SqliteStatement::Texts() {
+  return All([](const SqliteStatement& row) { return row.Text(0); });
+}
+
 int64_t SqliteStatement::Int(int column) const { return sqlite3_column_int64(statement_, column); }
 
 double SqliteStatement::Double(int column) const {
@@ -101,21 +105,21 @@ std::string SqliteStatement::Text(int column) const {
 }
 
 SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess access) {
-  // Otherwise all connections count their memory under one lock.
+  // Without memory statistics, connections do not share a lock.
   static const int uncounted = sqlite3_config(SQLITE_CONFIG_MEMSTATUS, 0);
   static_cast<void>(uncounted);
   const bool writes = access == SqliteAccess::kWrite;
-  // A reader opens for writing, too: without the right to write it could not share the log's index.
+  // Readers open the file for writing, too: sharing the index of the log requires it.
   const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | (writes ? SQLITE_OPEN_CREATE : 0);
   const int code = sqlite3_open_v2(path.c_str(), &db_, flags, nullptr);
   try {
     if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot open " + path.string());
     sqlite3_extended_result_codes(db_, 1);
     SetBusyTimeout(std::chrono::seconds(10));
-    // Files for large statements would lie where a worker that is locked in may not write.
+    // A sandboxed worker may not write temporary files.
     Exec("pragma temp_store=MEMORY");
     if (writes) {
-      // Of a fresh file, so that GiveBackSpace can make it shorter. Said of another it would write.
+      // ReturnFreeSpace requires incremental vacuum. On an existing file this pragma would write.
       if (IsEmpty()) Exec(kShrinkable);
       Exec("pragma journal_size_limit=4194304");
       Exec("pragma journal_mode=WAL");
@@ -133,7 +137,7 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess a
 SqliteDatabase::~SqliteDatabase() { sqlite3_close(db_); }
 
 bool SqliteDatabase::IsEmpty() {
-  SqliteStatement pages(db_, "pragma page_count");
+  SqliteStatement pages(*this, "pragma page_count");
   return !pages.Step() || pages.Int(0) == 0;
 }
 
@@ -187,7 +191,7 @@ SqliteTransaction::~SqliteTransaction() {
   try {
     if (!durable_) db_.Exec("pragma synchronous=FULL");
   } catch (const Error&) {
-    // Cannot happen outside a transaction; the next commit would merely be less durable.
+    // Impossible outside a transaction; the next commit would merely be less durable.
   }
 }
 

@@ -7,15 +7,25 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 struct sqlite3;
 struct sqlite3_stmt;
 
 namespace color3d {
 
+class SqliteDatabase;
+
 class SqliteStatement {
  public:
-  SqliteStatement(sqlite3* db, std::string_view sql);
+  SqliteStatement(SqliteDatabase& db, std::string_view sql);
+  // Binds the first parameters.
+  template <typename... Values>
+  SqliteStatement(SqliteDatabase& db, std::string_view sql, const Values&... values)
+      : SqliteStatement(db, sql) {
+    Bind(values...);
+  }
   ~SqliteStatement();
   SqliteStatement(const SqliteStatement&) = delete;
   SqliteStatement& operator=(const SqliteStatement&) = delete;
@@ -26,10 +36,21 @@ class SqliteStatement {
     (BindOne(values), ...);
     return *this;
   }
-  // True when there is a row; throws on errors.
+  // Moves to the next row; returns false if there is none. Throws on errors.
   bool Step();
   // Steps through all rows; for statements whose rows do not matter.
   void Run();
+  // Returns the first column of the next row, or 0 if there is none.
+  int64_t NextInt() { return Step() ? Int(0) : 0; }
+  // Returns read(row) for each of the remaining rows.
+  template <typename Read>
+  auto All(const Read& read) {
+    std::vector<std::invoke_result_t<Read, const SqliteStatement&>> rows;
+    while (Step()) rows.push_back(read(*this));
+    return rows;
+  }
+  // Returns the first column of the remaining rows.
+  std::vector<std::string> Texts();
 
   int64_t Int(int column) const;
   double Double(int column) const;
@@ -53,32 +74,30 @@ enum class SqliteAccess { kRead, kWrite };
 
 class SqliteDatabase {
  public:
-  // WAL, synchronous=FULL, foreign keys on, busy time-out 10 s. To write: creates the file when
-  // there is none.
+  // Uses WAL, synchronous=FULL, foreign keys and a busy time-out of 10 s. kWrite creates the file
+  // if there is none.
   SqliteDatabase(const std::filesystem::path& path, SqliteAccess access);
   ~SqliteDatabase();
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
-  // How long a statement waits for others that write.
+  // Maximum time that a statement waits for other writers.
   void SetBusyTimeout(std::chrono::milliseconds timeout);
   void Exec(const char* sql);
-  // Writes the whole file again, without what is free in it; nothing changes when it throws. What
-  // it needs meanwhile lies in `temporary`. Not while other threads use any database.
+  // Rewrites the file without its free pages (vacuum), with temporary files in `temporary`. Changes
+  // nothing if it throws. Requires: no other thread uses any database.
   void Rebuild(const std::filesystem::path& temporary);
-  // Prepares, binds and runs to the end; returns the number of rows changed.
+  // Prepares, binds and runs a statement; returns the number of changed rows.
   template <typename... Values>
   int64_t Run(std::string_view sql, const Values&... values) {
-    SqliteStatement statement(db_, sql);
-    statement.Bind(values...);
-    statement.Run();
+    SqliteStatement(*this, sql, values...).Run();
     return Changes();
   }
   sqlite3* handle() { return db_; }
   int64_t LastInsertId() const;
   int64_t Changes() const;
-  // Of SQLite's virtual machine, for all statements of all databases that have ended so far: what
-  // they cost, whatever the machine.
+  // Number of steps of SQLite's virtual machine in all finished statements of all databases: their
+  // cost, independent of the machine.
   static int64_t Steps();
 
  private:
@@ -88,7 +107,7 @@ class SqliteDatabase {
 };
 
 // BEGIN IMMEDIATE ... COMMIT; rolled back unless committed. `durable`: synced to disk when Commit
-// returns; otherwise a power failure (not a crash of ours) may lose it.
+// returns; otherwise a power failure (not a crash of the process) may lose it.
 class SqliteTransaction {
  public:
   explicit SqliteTransaction(SqliteDatabase& db, bool durable = true);

@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-// Maximum length of a progress message: it may quote a user's file.
+// Maximum length of a progress message, which may quote a user's file.
 constexpr size_t kMaxMessageBytes = 1000;
 
 ServiceError LeaseLost(const Lease& lease) {
@@ -23,7 +23,7 @@ ServiceError LeaseLost(const Lease& lease) {
                       lease.epoch);
 }
 
-#ifdef COLOR3D_FENCE_OFF  // what the chaos suite must notice
+#ifdef COLOR3D_FENCE_OFF  // to be noticed by the chaos suite
 constexpr char kHeld[] = "where job_id=? and ?<>0";
 #else
 constexpr char kHeld[] = "where job_id=? and lease_epoch=? and state='RUNNING'";
@@ -35,8 +35,8 @@ bool IsRetryable(ErrorCode code) {
 
 }  // namespace
 
-void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
-  SqliteStatement server(db.handle(), "select version from server");
+void SqliteJobStore::RequireServerVersion(SqliteDatabase& db) const {
+  SqliteStatement server(db, "select version from server");
   if (server.Step() && server.Text(0) != options_.program_version) {
     throw ServiceError(ErrorReason::kWorkerVersion,
                        "this worker is of version '{}', the server of '{}'; start workers of the "
@@ -44,8 +44,8 @@ void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
                        options_.program_version,
                        server.Text(0));
   }
-  // Builds of one release may differ in that, too.
-  SqliteStatement schema(db.handle(), "select version from schema_version");
+  // Builds of one release may differ in the schema, too.
+  SqliteStatement schema(db, "select version from schema_version");
   if (schema.Step() && schema.Int(0) != kSchemaVersion) {
     throw ServiceError(ErrorReason::kWorkerVersion,
                        "this worker's job store has version {}, the server's version {}; start "
@@ -56,7 +56,7 @@ void SqliteJobStore::RequireServersVersion(SqliteDatabase& db) const {
 }
 
 std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_t lease_ms) {
-  // A project that has just had a turn comes after all others of the same priority.
+  // The project whose turn was last comes after all others of the same priority.
   constexpr char kNext[] =
       "select job_id from job left join project on project.name=job.project "
       "where state='QUEUED' and run_after_ms<=? and not exists(select 1 from job r where "
@@ -65,21 +65,16 @@ std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_
       "value<>0) "
       "order by priority, coalesce(turn, 0), job_id limit 1";
   {  // An idle worker only reads.
-    const auto held = connections_.Read();
-    RequireServersVersion(*held);
-    SqliteStatement peek((*held).handle(), kNext);
-    peek.Bind(SteadyNow());
-    if (!peek.Step()) return std::nullopt;
+    const auto db = connections_.Read();
+    RequireServerVersion(db);
+    if (!SqliteStatement(db, kNext, SteadyNow()).Step()) return std::nullopt;
   }
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
-  RequireServersVersion(db);
-  SqliteStatement next(db.handle(), kNext);
-  next.Bind(SteadyNow());
-  if (!next.Step()) return std::nullopt;
-  const int64_t id = next.Int(0);
+  WriteTransaction db(connections_);
+  RequireServerVersion(db);
+  const int64_t id = SqliteStatement(db, kNext, SteadyNow()).NextInt();
+  if (id == 0) return std::nullopt;
   JobRecord job = BeginAttempt(db, id, worker, lease_ms);
-  transaction.Commit();
+  db.Commit();
   return job;
 }
 
@@ -88,7 +83,7 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
     int64_t lease_ms,
     const std::string& kind,
     const std::function<bool(const JobRecord&)>& accept) {
-  // The jobs of one project do not keep out another's, nor those of one submitted job.
+  // Neither a project nor a submitted job keeps out the jobs of another.
   constexpr char kCandidates[] =
       "where state='QUEUED' and kind=?1 and run_after_ms<=?2 and lost_attempts=0 and not exists("
       "select 1 from job o where o.state='QUEUED' and o.kind<>?1 and o.run_after_ms<=?2 and "
@@ -100,22 +95,20 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
       "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
       "limit 16";
   const auto choose = [&](SqliteDatabase& db) -> std::optional<int64_t> {
-    RequireServersVersion(db);
-    SqliteStatement select(db.handle(), SelectJob(kCandidates));
-    select.Bind(kind, SteadyNow());
+    RequireServerVersion(db);
+    SqliteStatement select(db, SelectJob(kCandidates), kind, SteadyNow());
     while (select.Step()) {
       const JobRecord job = JobFromRow(select);
       if (accept(job)) return job.id;
     }
     return std::nullopt;
   };
-  if (!choose(*connections_.Read())) return std::nullopt;
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  if (!choose(connections_.Read())) return std::nullopt;
+  WriteTransaction db(connections_);
   const std::optional<int64_t> id = choose(db);
   if (!id) return std::nullopt;
   JobRecord job = BeginAttempt(db, *id, worker, lease_ms);
-  transaction.Commit();
+  db.Commit();
   return job;
 }
 
@@ -147,19 +140,17 @@ JobRecord SqliteJobStore::BeginAttempt(SqliteDatabase& db,
 }
 
 std::vector<JobRecord> SqliteJobStore::GetInputs(int64_t job_id) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   SqliteStatement select(
-      db.handle(),
+      db,
       SelectJob("where job_id in (select input_id from job_dependency where job_id=?) "
-                "order by job_id"));
-  select.Bind(job_id);
+                "order by job_id"),
+      job_id);
   return ReadJobs(db, select);
 }
 
 JobRecord SqliteJobStore::RequireLease(SqliteDatabase& db, const Lease& lease) {
-  SqliteStatement select(db.handle(), SelectJob(kHeld));
-  select.Bind(lease.job_id, lease.epoch);
+  SqliteStatement select(db, SelectJob(kHeld), lease.job_id, lease.epoch);
   if (!select.Step()) throw LeaseLost(lease);
   return JobFromRow(select);
 }
@@ -168,8 +159,7 @@ HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
                                          const ProgressRecord& progress,
                                          const JobUsage& usage,
                                          int64_t lease_ms) {
-  WriteTransaction transaction(connections_, /*durable=*/false);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_, /*durable=*/false);
   const JobRecord before = RequireLease(db, lease);
   const std::string message = CleanUtf8(progress.message, kMaxMessageBytes);
   db.Run(
@@ -189,26 +179,24 @@ HeartbeatReply SqliteJobStore::Heartbeat(const Lease& lease,
   const bool moved = before.progress.step != progress.step || before.progress.message != message ||
                      before.progress.error_value != progress.error_value;
   if (moved) AddEvent(db, lease.job_id, /*progress=*/true);
-  transaction.Commit();
+  db.Commit();
   return {before.cancel_requested};
 }
 
 HeartbeatReply SqliteJobStore::Peek(const Lease& lease) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   return {RequireLease(db, lease).cancel_requested};
 }
 
 std::optional<FileDigest> SqliteJobStore::SetCheckpoint(const Lease& lease,
                                                         const FileDigest& blob) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   const JobRecord before = RequireLease(db, lease);
   db.Run("update job set checkpoint_sha256=?, checkpoint_bytes=? where job_id=?",
          blob.sha256,
          blob.size_bytes,
          lease.job_id);
-  transaction.Commit();
+  db.Commit();
   return before.checkpoint;
 }
 
@@ -231,13 +219,14 @@ void SqliteJobStore::StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsa
 }
 
 bool SqliteJobStore::JoinEqual(const Lease& lease, const std::string& stage_key) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   const JobRecord job = RequireLease(db, lease);
-  SqliteStatement other(db.handle(),
-                        "select 1 from job where running_key=? and running_key<>'' and job_id<>?");
-  other.Bind(stage_key, lease.job_id);
-  const bool joins = other.Step();
+  const bool joins =
+      SqliteStatement(db,
+                      "select 1 from job where running_key=? and running_key<>'' and job_id<>?",
+                      stage_key,
+                      lease.job_id)
+          .Step();
   if (joins) FinishAttempt(db, lease, "JOINED");
   if (joins && job.cancel_requested) {
     EndCancelled(db, job.id);
@@ -249,13 +238,12 @@ bool SqliteJobStore::JoinEqual(const Lease& lease, const std::string& stage_key)
   } else {
     db.Run("update job set running_key=? where job_id=?", stage_key, lease.job_id);
   }
-  transaction.Commit();
+  db.Commit();
   return joins;
 }
 
 void SqliteJobStore::Publish(const Lease& lease, const Publication& publication) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   RequireLease(db, lease);
   for (const ArtifactRecord& artifact : publication.artifacts) {
     db.Run("insert into artifact values(?,?,?,?,?)",
@@ -280,10 +268,10 @@ void SqliteJobStore::Publish(const Lease& lease, const Publication& publication)
   FinishAttempt(db, lease, "SUCCEEDED");
   SetState(db, lease.job_id, JobState::kSucceeded);
   QueueReadyDependants(db, lease.job_id);
-  transaction.Commit();
+  db.Commit();
 }
 
-// Back to the queue, later each time.
+// Requeues the job with growing delays.
 void SqliteJobStore::Requeue(SqliteDatabase& db, const JobRecord& job, bool count_as_lost) {
   const int doublings = std::clamp(job.attempt - 1, 0, 10);
   db.Run("update job set run_after_ms=?, lost_attempts=lost_attempts+? where job_id=?",
@@ -294,8 +282,7 @@ void SqliteJobStore::Requeue(SqliteDatabase& db, const JobRecord& job, bool coun
 }
 
 void SqliteJobStore::Fail(const Lease& lease, const JobError& error, const JobUsage& usage) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   const JobRecord job = RequireLease(db, lease);
   StoreUsage(db, lease.job_id, usage);
   FinishAttempt(db, lease, ErrorCodeName(error.code));
@@ -306,12 +293,11 @@ void SqliteJobStore::Fail(const Lease& lease, const JobError& error, const JobUs
   } else {
     EndFailed(db, job.id, error);
   }
-  transaction.Commit();
+  db.Commit();
 }
 
 void SqliteJobStore::Release(const Lease& lease, const JobUsage& usage) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   const JobRecord job = RequireLease(db, lease);
   StoreUsage(db, lease.job_id, usage);
   FinishAttempt(db, lease, "RELEASED");
@@ -321,17 +307,16 @@ void SqliteJobStore::Release(const Lease& lease, const JobUsage& usage) {
     db.Run("update job set attempt=attempt-1, run_after_ms=0 where job_id=?", job.id);
     SetState(db, job.id, JobState::kQueued);
   }
-  transaction.Commit();
+  db.Commit();
 }
 
 std::optional<JobRecord> SqliteJobStore::FindStage(const std::string& stage_key) {
   if (stage_key.empty()) return std::nullopt;
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(),
+  const auto db = connections_.Read();
+  SqliteStatement select(db,
                          SelectJob("where stage_key=? and stage_key<>'' and state='SUCCEEDED' "
-                                   "order by job_id desc limit 1"));
-  select.Bind(stage_key);
+                                   "order by job_id desc limit 1"),
+                         stage_key);
   if (!select.Step()) return std::nullopt;
   JobRecord job = JobFromRow(select);
   job.artifacts = LoadArtifacts(db, job.id);
@@ -341,19 +326,12 @@ std::optional<JobRecord> SqliteJobStore::FindStage(const std::string& stage_key)
 int SqliteJobStore::ReapExpired() {
   constexpr char kExpired[] = "where state='RUNNING' and lease_expires_ms<=? limit 50";
   {
-    const auto held = connections_.Read();
-    SqliteStatement peek((*held).handle(), SelectJob(kExpired));
-    peek.Bind(SteadyNow());
-    if (!peek.Step()) return 0;
+    const auto db = connections_.Read();
+    if (!SqliteStatement(db, SelectJob(kExpired), SteadyNow()).Step()) return 0;
   }
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
-  std::vector<JobRecord> expired;
-  {
-    SqliteStatement select(db.handle(), SelectJob(kExpired));
-    select.Bind(SteadyNow());
-    while (select.Step()) expired.push_back(JobFromRow(select));
-  }
+  WriteTransaction db(connections_);
+  const std::vector<JobRecord> expired =
+      SqliteStatement(db, SelectJob(kExpired), SteadyNow()).All(JobFromRow);
   for (const JobRecord& job : expired) {
     FinishAttempt(db, {job.id, job.lease_epoch}, "LOST");
     if (job.cancel_requested) {
@@ -372,20 +350,19 @@ int SqliteJobStore::ReapExpired() {
                           job.worker)));
     }
   }
-  transaction.Commit();
+  db.Commit();
   return static_cast<int>(expired.size());
 }
 
-std::vector<std::string> SqliteJobStore::ExpireLeasesOf(const std::string& worker) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
-  std::vector<std::string> names;
-  SqliteStatement update(db.handle(),
-                         "update job set lease_expires_ms=0 where state='RUNNING' and "
-                         "lease_owner=? returning name");
-  update.Bind(worker);
-  while (update.Step()) names.push_back(update.Text(0));
-  transaction.Commit();
+std::vector<std::string> SqliteJobStore::ExpireLeases(const std::string& worker) {
+  WriteTransaction db(connections_);
+  std::vector<std::string> names =
+      SqliteStatement(db,
+                      "update job set lease_expires_ms=0 where state='RUNNING' and "
+                      "lease_owner=? returning name",
+                      worker)
+          .Texts();
+  db.Commit();
   return names;
 }
 

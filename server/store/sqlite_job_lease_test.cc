@@ -13,7 +13,7 @@ namespace color3d {
 namespace {
 using SqliteJobLeaseTest = JobStoreTest;
 
-TEST_F(SqliteJobLeaseTest, RefusesWritesWithAnOldEpoch) {
+TEST_F(SqliteJobLeaseTest, RefusesWritesWithOldEpoch) {
   const JobRecord job = CreateSingle();
   const JobRecord zombie = ClaimOne("first");
   now_ += kLease + 1;
@@ -36,7 +36,7 @@ TEST_F(SqliteJobLeaseTest, RefusesWritesWithAnOldEpoch) {
   EXPECT_EQ(ReasonThrown([&] { Succeed(second, "again"); }), "LEASE_LOST") << "only once";
 }
 
-TEST_F(SqliteJobLeaseTest, HeartbeatKeepsTheLease) {
+TEST_F(SqliteJobLeaseTest, HeartbeatExtendsLease) {
   CreateSingle();
   const JobRecord job = ClaimOne();
   for (int i = 0; i < 5; ++i) {
@@ -51,7 +51,7 @@ TEST_F(SqliteJobLeaseTest, HeartbeatKeepsTheLease) {
   EXPECT_EQ(running.usage.warnings, std::vector<std::string>{"warned"});
 }
 
-TEST_F(SqliteJobLeaseTest, PoisonJobStopsAfterItsAttempts) {
+TEST_F(SqliteJobLeaseTest, PoisonJobStopsAfterMaxAttempts) {
   const JobRecord job = CreateSingle();
   for (int attempt = 1; attempt <= 3; ++attempt) {
     EXPECT_EQ(ClaimOne().attempt, attempt);
@@ -75,14 +75,14 @@ TEST_F(SqliteJobLeaseTest, RetriesTransientErrorsOnly) {
   EXPECT_EQ(StateOf(job.name), JobState::kFailed);
 }
 
-TEST_F(SqliteJobLeaseTest, DrainDoesNotCountTheAttempt) {
+TEST_F(SqliteJobLeaseTest, DrainDoesNotCountAttempt) {
   const JobRecord job = CreateSingle();
   for (int i = 0; i < 5; ++i) store_->Release(LeaseOf(ClaimOne()), {});
   EXPECT_EQ(StateOf(job.name), JobState::kQueued);
   EXPECT_EQ(ClaimOne().attempt, 1);
 }
 
-TEST_F(SqliteJobLeaseTest, CheckpointSurvivesTheAttempt) {
+TEST_F(SqliteJobLeaseTest, CheckpointSurvivesAttempt) {
   CreateSingle();
   const JobRecord first = ClaimOne();
   EXPECT_FALSE(store_->SetCheckpoint(LeaseOf(first), {Sha256Hex("1"), 10}));
@@ -106,7 +106,7 @@ TEST_F(SqliteJobLeaseTest, CrashAfterCancelDoesNotResurrect) {
   EXPECT_EQ(StateOf(job.name), JobState::kCancelled);
 }
 
-TEST_F(SqliteJobLeaseTest, DrainOfACancelledJobEndsIt) {
+TEST_F(SqliteJobLeaseTest, DrainEndsCancelledJob) {
   const JobRecord job = CreateSingle();
   const JobRecord running = ClaimOne();
   store_->Cancel(job.name, {});
@@ -114,7 +114,7 @@ TEST_F(SqliteJobLeaseTest, DrainOfACancelledJobEndsIt) {
   EXPECT_EQ(StateOf(job.name), JobState::kCancelled);
 }
 
-TEST_F(SqliteJobLeaseTest, PriorityThenAge) {
+TEST_F(SqliteJobLeaseTest, ClaimsByPriorityThenAge) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("a")};
@@ -127,7 +127,7 @@ TEST_F(SqliteJobLeaseTest, PriorityThenAge) {
 
 const auto kAnyJob = [](const JobRecord&) { return true; };
 
-TEST_F(SqliteJobLeaseTest, JobsOfABatchTakeTurnsBetweenSubmittedJobs) {
+TEST_F(SqliteJobLeaseTest, BatchTakesTurnsBetweenSubmittedJobs) {
   const JobRecord many = store_->CreateGraph(PersonalizeJobs(5), {}, kNoLimit);
   const JobRecord few = store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
   EXPECT_EQ(ClaimOne().parent, many.name);
@@ -141,7 +141,7 @@ TEST_F(SqliteJobLeaseTest, JobsOfABatchTakeTurnsBetweenSubmittedJobs) {
       store_->ClaimForBatch("w", kLease, "personalize", [](const JobRecord&) { return false; }));
 }
 
-TEST_F(SqliteJobLeaseTest, JobsOfABatchTakeTurnsBetweenProjects) {
+TEST_F(SqliteJobLeaseTest, BatchTakesTurnsBetweenProjects) {
   NewGraph graph = PersonalizeJobs(1);
   graph.project = "a";
   for (int i = 0; i < 10; ++i) store_->CreateGraph(graph, {}, kNoLimit);
@@ -153,7 +153,7 @@ TEST_F(SqliteJobLeaseTest, JobsOfABatchTakeTurnsBetweenProjects) {
   EXPECT_EQ(next->project, "b");
 }
 
-TEST_F(SqliteJobLeaseTest, JobsOfABatchDoNotOvertakeOtherKinds) {
+TEST_F(SqliteJobLeaseTest, BatchDoesNotOvertakeOtherKinds) {
   store_->CreateGraph(PersonalizeJobs(2), {}, kNoLimit);
   ClaimOne();
   const JobRecord other = CreateSingle();
@@ -164,7 +164,7 @@ TEST_F(SqliteJobLeaseTest, JobsOfABatchDoNotOvertakeOtherKinds) {
   EXPECT_TRUE(store_->ClaimForBatch("w", kLease, "personalize", kAnyJob));
 }
 
-TEST_F(SqliteJobLeaseTest, JobsThatLostAWorkerAreNotBatched) {
+TEST_F(SqliteJobLeaseTest, JobsThatLostWorkerAreNotBatched) {
   store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
   ClaimOne();
   now_ += kLease + 1;
@@ -174,7 +174,7 @@ TEST_F(SqliteJobLeaseTest, JobsThatLostAWorkerAreNotBatched) {
   EXPECT_EQ(ClaimOne().attempt, 2);
 }
 
-TEST_F(SqliteJobLeaseTest, TwoStoresNeverClaimTheSameJob) {
+TEST_F(SqliteJobLeaseTest, TwoStoresNeverClaimSameJob) {
   constexpr int kJobs = 60;
   for (int i = 0; i < kJobs; ++i) CreateSingle();
   std::atomic<int> claims{0};
@@ -208,7 +208,7 @@ TEST_F(SqliteJobLeaseTest, StageCacheFindsSucceededJobsByKey) {
   EXPECT_FALSE(store_->FindStage(""));
 }
 
-// No file can be opened while one is there.
+// Prevents opening of files during its lifetime.
 class NoFurtherFiles {
  public:
   NoFurtherFiles() {
@@ -227,7 +227,7 @@ class NoFurtherFiles {
   rlimit before_ = {};
 };
 
-// A worker that is locked in may not write where SQLite would put them.
+// A sandboxed worker may not write the temporary files of SQLite.
 TEST_F(SqliteJobLeaseTest, PublishesManyArtifactsWithoutTemporaryFiles) {
   for (const char* film : {"first", "second"}) {
     CreateSingle();
@@ -245,13 +245,13 @@ TEST_F(SqliteJobLeaseTest, PublishesManyArtifactsWithoutTemporaryFiles) {
   }
 }
 
-TEST_F(SqliteJobLeaseTest, DeadWorkersLoseTheirLeasesAtOnce) {
+TEST_F(SqliteJobLeaseTest, DeadWorkersLoseLeasesAtOnce) {
   const JobRecord job = CreateSingle();
   ClaimOne("worker-1-77");
   store_->UpdateWorker({"worker-1-77", 77, job.name, 5, 0});
   ASSERT_EQ(store_->ListWorkers().size(), 1u);
-  EXPECT_TRUE(store_->ExpireLeasesOf("worker-2-78").empty());
-  EXPECT_EQ(store_->ExpireLeasesOf("worker-1-77"), std::vector<std::string>{job.name});
+  EXPECT_TRUE(store_->ExpireLeases("worker-2-78").empty());
+  EXPECT_EQ(store_->ExpireLeases("worker-1-77"), std::vector<std::string>{job.name});
   EXPECT_EQ(store_->ReapExpired(), 1);
   EXPECT_EQ(StateOf(job.name), JobState::kQueued);
 }

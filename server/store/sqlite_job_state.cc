@@ -1,5 +1,5 @@
-// The job state machine: creation, cancelling, retrying, and what the end of one job means for
-// those that depend on it.
+// State machine of jobs: creation, cancellation, retries, and effects of a job's end on its
+// dependants.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@
 namespace color3d {
 namespace {
 
-// All that wait for a job that failed repeat what it says.
+// Maximum length of an error message, which all dependants repeat.
 constexpr size_t kMaxErrorBytes = 4000;
 
 ServiceError WrongState(const JobRecord& job, const std::string& remedy) {
@@ -63,23 +63,22 @@ void SqliteJobStore::SetState(SqliteDatabase& db, int64_t job_id, JobState state
 }
 
 bool SqliteJobStore::InputsAreReady(SqliteDatabase& db, int64_t job_id) {
-  SqliteStatement waiting(
-      db.handle(),
-      "select 1 from job_dependency d join job i on i.job_id=d.input_id where d.job_id=? and "
-      "not (i.state='SUCCEEDED' or (i.state='SKIPPED' and i.skipped_by_plan=1)) limit 1");
-  waiting.Bind(job_id);
-  return !waiting.Step();
+  return !SqliteStatement(
+              db,
+              "select 1 from job_dependency d join job i on i.job_id=d.input_id where d.job_id=? "
+              "and "
+              "not (i.state='SUCCEEDED' or (i.state='SKIPPED' and i.skipped_by_plan=1)) limit 1",
+              job_id)
+              .Step();
 }
 
 void SqliteJobStore::QueueReadyDependants(SqliteDatabase& db, int64_t job_id) {
-  std::vector<int64_t> dependants;
-  {
-    SqliteStatement select(db.handle(),
-                           "select d.job_id from job_dependency d join job j on j.job_id=d.job_id "
-                           "where d.input_id=? and j.state='BLOCKED' order by d.job_id");
-    select.Bind(job_id);
-    while (select.Step()) dependants.push_back(select.Int(0));
-  }
+  const auto dependants =
+      SqliteStatement(db,
+                      "select d.job_id from job_dependency d join job j on j.job_id=d.job_id "
+                      "where d.input_id=? and j.state='BLOCKED' order by d.job_id",
+                      job_id)
+          .All([](const SqliteStatement& row) { return row.Int(0); });
   for (const int64_t dependant : dependants) {
     if (InputsAreReady(db, dependant)) SetState(db, dependant, JobState::kQueued);
   }
@@ -100,8 +99,8 @@ void SqliteJobStore::EndCancelled(SqliteDatabase& db, int64_t job_id) {
   PropagateEnd(db, JobById(db, job_id));
 }
 
-// Everything that waits for `cause`, directly or not, can never run: the submitted job of the same
-// graph ends as `cause` did, all others are skipped.
+// Direct and indirect dependants of `cause` can never run: the submitted job of the same graph ends
+// like `cause`, all others are skipped.
 void SqliteJobStore::PropagateEnd(SqliteDatabase& db, const JobRecord& cause) {
   const bool failed = cause.state == JobState::kFailed;
   const std::string why =
@@ -110,16 +109,13 @@ void SqliteJobStore::PropagateEnd(SqliteDatabase& db, const JobRecord& cause) {
   while (!ended.empty()) {
     const JobRecord from = ended.front();
     ended.pop_front();
-    std::vector<JobRecord> waiting;
-    {
-      SqliteStatement select(
-          db.handle(),
-          SelectJobWithoutSpec(
-              "where state='BLOCKED' and job_id in "
-              "(select job_id from job_dependency where input_id=?) order by job_id"));
-      select.Bind(from.id);
-      while (select.Step()) waiting.push_back(JobFromRow(select));
-    }
+    const std::vector<JobRecord> waiting =
+        SqliteStatement(db,
+                        SelectJobWithoutSpec(
+                            "where state='BLOCKED' and job_id in "
+                            "(select job_id from job_dependency where input_id=?) order by job_id"),
+                        from.id)
+            .All(JobFromRow);
     for (const JobRecord& job : waiting) {
       if (job.name != from.parent) {
         db.Run("update job set skip_reason=? where job_id=?", "input " + cause.name + why, job.id);
@@ -202,8 +198,7 @@ void SqliteJobStore::RequireRoom(SqliteDatabase& db,
                                  int64_t jobs,
                                  const QueueLimits& limits) {
   SqliteStatement unfinished(
-      db.handle(), "select count(*), coalesce(sum(project=?), 0) from job where end_ms=0");
-  unfinished.Bind(project);
+      db, "select count(*), coalesce(sum(project=?), 0) from job where end_ms=0", project);
   unfinished.Step();
   if (unfinished.Int(0) + jobs > limits.all) {
     throw ServiceError(ErrorReason::kQueueFull,
@@ -228,8 +223,7 @@ void SqliteJobStore::RequireRoom(SqliteDatabase& db,
 JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
                                       const RequestKey& request,
                                       const QueueLimits& limits) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   std::set<std::string> scenes = {graph.scene};
   for (const NewJob& job : graph.jobs) {
@@ -244,20 +238,19 @@ JobRecord SqliteJobStore::CreateGraph(const NewGraph& graph,
   for (size_t i = 0; i < graph.jobs.size(); ++i) InsertJob(db, graph, i, names, &ids);
   RecordRequest(db, request, names.back());
   JobRecord root = RequireJob(db, names.back());
-  transaction.Commit();
+  db.Commit();
   return root;
 }
 
 JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& request) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   // The submitted job first: its children then find it finished and leave it alone.
   const std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
   const auto is_left_alone = [](const JobRecord& job) {
     return IsFinished(job.state) || job.cancel_requested;
   };
-  // Asked again it changes nothing either: nothing is written down.
+  // Nothing is recorded, because a repeated call changes nothing either.
   if (std::ranges::all_of(graph, is_left_alone)) return graph.back();
   for (auto it = graph.rbegin(); it != graph.rend(); ++it) {
     const JobRecord job = JobById(db, it->id);
@@ -276,13 +269,12 @@ JobRecord SqliteJobStore::Cancel(const std::string& name, const RequestKey& requ
   }
   RecordRequest(db, request, name);
   JobRecord result = RequireJob(db, name);
-  transaction.Commit();
+  db.Commit();
   return result;
 }
 
 JobRecord SqliteJobStore::Kill(const std::string& name) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   std::vector<JobRecord> graph = GraphOf(db, RequireJob(db, name));
   // The submitted job first: its children then find it finished and leave it alone.
   std::ranges::reverse(graph);
@@ -296,38 +288,36 @@ JobRecord SqliteJobStore::Kill(const std::string& name) {
   }
   for (const int64_t id : killed) PropagateEnd(db, JobById(db, id));
   JobRecord result = RequireJob(db, name);
-  transaction.Commit();
+  db.Commit();
   return result;
 }
 
 JobRecord SqliteJobStore::Pin(const std::string& name, bool pinned) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   const JobRecord job = RequireJob(db, name);
   if (!job.parent.empty()) {
-    throw InvalidArgument("{} is a stage of {}; pin that", name, job.parent);
+    throw InvalidArgument("{0} is a stage of {1}; pin {1}", name, job.parent);
   }
   db.Run("update job set pinned=? where job_id=?", pinned, job.id);
   JobRecord result = RequireJob(db, name);
-  transaction.Commit();
+  db.Commit();
   return result;
 }
 
 void SqliteJobStore::ResetForRetry(SqliteDatabase& db, const JobRecord& job, bool from_scratch) {
-  SqliteStatement lost(db.handle(), "select lost_input from job where job_id=?");
-  lost.Bind(job.id);
+  SqliteStatement lost(db, "select lost_input from job where job_id=?", job.id);
   if (lost.Step() && !lost.Text(0).empty()) {
     throw ServiceError(ErrorReason::kInputDeleted,
-                       "{} reads results of {}, which was deleted; submit the work anew",
+                       "{} reads results of {}, which was deleted; submit the job again",
                        job.name,
                        lost.Text(0));
   }
   SqliteStatement bad(
-      db.handle(),
+      db,
       SelectJob("where job_id in (select input_id from job_dependency where job_id=?) and "
                 "(state in('FAILED','CANCELLED') or (state='SKIPPED' and skipped_by_plan=0)) "
-                "limit 1"));
-  bad.Bind(job.id);
+                "limit 1"),
+      job.id);
   if (bad.Step()) {
     throw WrongState(JobFromRow(bad), "retry it before " + job.name + ", which reads its results");
   }
@@ -351,8 +341,7 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
                                 bool from_scratch,
                                 const RequestKey& request,
                                 const QueueLimits& limits) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireJob(db, *resource);
   const JobRecord job = RequireJob(db, name);
   if (!CanBeRetried(job)) throw WrongState(job, "only failed or cancelled jobs can be retried");
@@ -361,24 +350,23 @@ JobRecord SqliteJobStore::Retry(const std::string& name,
   const std::vector<JobRecord> graph = GraphOf(db, root);
   for (const JobRecord& member : graph) {
     if (member.state == JobState::kRunning && member.cancel_requested) {
-      throw WrongState(member, "it is about to stop; retry when it is cancelled");
+      throw WrongState(member, "it is being cancelled; retry when it has stopped");
     }
   }
   const auto retried = std::count_if(graph.begin(), graph.end(), CanBeRetried);
   RequireRoom(db, root.project, retried, limits);
-  // In order of creation, so that inputs are reset before those that read them.
+  // In order of creation, so that inputs are reset before their dependants.
   for (const JobRecord& member : graph) {
     if (CanBeRetried(member)) ResetForRetry(db, member, from_scratch);
   }
   RecordRequest(db, request, name);
   JobRecord result = RequireJob(db, name);
-  transaction.Commit();
+  db.Commit();
   return result;
 }
 
 void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (CheckRequest(db, request)) return;
   const JobRecord root = RequireJob(db, name);
   std::vector<int64_t> ids;
@@ -388,7 +376,7 @@ void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) 
   }
   const std::string list = JoinIds(ids);
   SqliteStatement reader(
-      db.handle(),
+      db,
       SelectJob("where end_ms=0 and job_id in (select job_id from job_dependency where input_id in "
                 "(" +
                 list + ")) limit 1"));
@@ -399,23 +387,21 @@ void SqliteJobStore::Delete(const std::string& name, const RequestKey& request) 
       "update scene set key_color_job='' where key_color_job in (select name from job where job_id "
       "in (" +
       list + "))");
-  // A reader that failed may be retried; without this input it would be other work.
+  // A failed dependant must not be retried without this input.
   db.Run(
       "update job set lost_input=(select i.name from job_dependency d join job i on "
       "i.job_id=d.input_id where d.job_id=job.job_id and d.input_id in (" +
       list + ") limit 1) where job_id in (select job_id from job_dependency where input_id in (" +
       list + "))");
-  std::vector<std::string> blobs;
-  {
-    SqliteStatement named(db.handle(),
-                          "select sha256 from artifact where job_id in (" + list +
-                              ") union select sha256 from job_blob where job_id in (" + list + ")");
-    while (named.Step()) blobs.push_back(named.Text(0));
-  }
+  const std::vector<std::string> blobs =
+      SqliteStatement(db,
+                      "select sha256 from artifact where job_id in (" + list +
+                          ") union select sha256 from job_blob where job_id in (" + list + ")")
+          .Texts();
   db.Run("delete from job where job_id in (" + list + ")");
   ReleaseHoldings(db, root.project, blobs);
   RecordRequest(db, request, name);
-  transaction.Commit();
+  db.Commit();
 }
 
 }  // namespace color3d

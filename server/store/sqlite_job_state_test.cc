@@ -8,7 +8,7 @@ namespace {
 using SqliteJobStateTest = JobStoreTest;
 using ::testing::HasSubstr;
 
-TEST_F(SqliteJobStateTest, GraphRunsInOrderOfItsEdges) {
+TEST_F(SqliteJobStateTest, GraphRunsInOrderOfEdges) {
   const JobRecord root = CreateDiamond();
   EXPECT_EQ(root.state, JobState::kBlocked);
   EXPECT_EQ(root.kind, "root");
@@ -47,7 +47,7 @@ TEST_F(SqliteJobStateTest, PlannedSkipsCountAsSatisfied) {
   EXPECT_EQ(ClaimOne().name, root.name);
 }
 
-TEST_F(SqliteJobStateTest, FailureSkipsDependantsAndFailsTheSubmittedJob) {
+TEST_F(SqliteJobStateTest, FailureSkipsDependantsAndFailsRoot) {
   const JobRecord root = CreateDiamond();
   Succeed(ClaimOne());
   const JobRecord left = ClaimOne();
@@ -60,7 +60,7 @@ TEST_F(SqliteJobStateTest, FailureSkipsDependantsAndFailsTheSubmittedJob) {
   EXPECT_THAT(failed.error->message, HasSubstr("it broke"));
   EXPECT_EQ(Child(root, "right").state, JobState::kQueued) << "independent work goes on";
 
-  // A job of its own that reads the failed one is skipped, with the reason.
+  // A separate job that reads the failed one is skipped, with the reason.
   const JobRecord second = CreateDiamond();
   NewGraph reader;
   reader.scene = "scenes/test";
@@ -74,7 +74,7 @@ TEST_F(SqliteJobStateTest, FailureSkipsDependantsAndFailsTheSubmittedJob) {
   EXPECT_THAT(store_->GetJob(own.name).skip_reason, HasSubstr("failed: it broke"));
 }
 
-TEST_F(SqliteJobStateTest, CancelQueuedAtOnceAndRunningAtItsNextHeartbeat) {
+TEST_F(SqliteJobStateTest, CancelsQueuedAtOnceAndRunningAtHeartbeat) {
   const JobRecord root = CreateDiamond();
   const JobRecord import = ClaimOne();
   EXPECT_EQ(store_->Cancel(root.name, {}).state, JobState::kCancelled);
@@ -88,7 +88,7 @@ TEST_F(SqliteJobStateTest, CancelQueuedAtOnceAndRunningAtItsNextHeartbeat) {
   EXPECT_EQ(store_->Cancel(root.name, {}).state, JobState::kCancelled) << "idempotent";
 }
 
-TEST_F(SqliteJobStateTest, CancellingAChildEndsItsGraph) {
+TEST_F(SqliteJobStateTest, CancelledChildEndsGraph) {
   const JobRecord root = CreateDiamond();
   store_->Cancel(Child(root, "left").name, {});
   EXPECT_EQ(StateOf(root.name), JobState::kCancelled);
@@ -126,7 +126,7 @@ TEST_F(SqliteJobStateTest, RetryRequeuesFailedJobsAndKeepsPlannedSkips) {
   EXPECT_EQ(StateOf(root.name), JobState::kSucceeded);
 }
 
-TEST_F(SqliteJobStateTest, RetryFromScratchForgetsTheCheckpoint) {
+TEST_F(SqliteJobStateTest, RetryFromScratchDropsCheckpoint) {
   const JobRecord job = CreateSingle();
   const JobRecord running = ClaimOne();
   store_->SetCheckpoint(LeaseOf(running), {Sha256Hex("c"), 1});
@@ -144,7 +144,7 @@ TEST_F(SqliteJobStateTest, QueueLimitCountsWholeGraphs) {
   EXPECT_EQ(store_->ListJobs({}, 0, 100, {}).size(), 2u) << "all of a graph or nothing";
 }
 
-TEST_F(SqliteJobStateTest, GraphOfAnInactiveSceneIsRefused) {
+TEST_F(SqliteJobStateTest, RefusesGraphOfInactiveScene) {
   SceneRecord scene;
   scene.name = "scenes/open";
   store_->CreateScene(scene, {}, {});
@@ -170,7 +170,7 @@ TEST_F(SqliteJobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
   EXPECT_EQ(children[1].scene, "scenes/other");
 }
 
-TEST_F(SqliteJobStateTest, RetryNeedsTheInputsOfTheJob) {
+TEST_F(SqliteJobStateTest, RetryRequiresInputs) {
   const JobRecord input = CreateSingle();
   Succeed(ClaimOne());
   NewGraph graph;
@@ -185,7 +185,7 @@ TEST_F(SqliteJobStateTest, RetryNeedsTheInputsOfTheJob) {
   EXPECT_EQ(StateOf(reader.name), JobState::kFailed);
 }
 
-TEST_F(SqliteJobStateTest, RetryObeysTheQueueLimit) {
+TEST_F(SqliteJobStateTest, RetryObeysQueueLimit) {
   const JobRecord root = CreateDiamond();
   FailWith(ClaimOne(), ErrorCode::kInternal);
   EXPECT_EQ(ReasonThrown([&] { store_->Retry(root.name, false, {}, 3); }), "QUEUE_FULL");

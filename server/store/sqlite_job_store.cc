@@ -1,5 +1,5 @@
-// Opening, reading and idempotency. The state machine is in sqlite_job_state.cc, what workers call
-// in sqlite_job_lease.cc, scenes and colorizers in sqlite_scene.cc, chores in sqlite_chores.cc.
+// Opening, reading and idempotency. State machine: sqlite_job_state.cc; calls of workers:
+// sqlite_job_lease.cc; scenes and colorizers: sqlite_scene.cc; chores: sqlite_chores.cc.
 #include "server/store/sqlite_job_store.h"
 
 #include <utility>
@@ -40,8 +40,7 @@ ServiceError JobNotFound(const std::string& name) {
 }  // namespace
 
 std::optional<JobRecord> SqliteJobStore::FindJob(SqliteDatabase& db, const std::string& name) {
-  SqliteStatement select(db.handle(), SelectJob("where name=?"));
-  select.Bind(name);
+  SqliteStatement select(db, SelectJob("where name=?"), name);
   if (!select.Step()) return std::nullopt;
   JobRecord job = JobFromRow(select);
   job.artifacts = LoadArtifacts(db, job.id);
@@ -55,8 +54,7 @@ JobRecord SqliteJobStore::RequireJob(SqliteDatabase& db, const std::string& name
 }
 
 JobRecord SqliteJobStore::JobById(SqliteDatabase& db, int64_t job_id) {
-  SqliteStatement select(db.handle(), SelectJob("where job_id=?"));
-  select.Bind(job_id);
+  SqliteStatement select(db, SelectJob("where job_id=?"), job_id);
   if (!select.Step()) {
     throw Error(ErrorCode::kNotFound, "job {} was deleted", job_id);
   }
@@ -66,15 +64,13 @@ JobRecord SqliteJobStore::JobById(SqliteDatabase& db, int64_t job_id) {
 }
 
 std::vector<ArtifactRecord> SqliteJobStore::LoadArtifacts(SqliteDatabase& db, int64_t job_id) {
-  SqliteStatement select(
-      db.handle(),
-      "select name, sha256, size_bytes, media_type from artifact where job_id=? order by name");
-  select.Bind(job_id);
-  std::vector<ArtifactRecord> artifacts;
-  while (select.Step()) {
-    artifacts.push_back({select.Text(0), {select.Text(1), select.Int(2)}, select.Text(3)});
-  }
-  return artifacts;
+  return SqliteStatement(db,
+                         "select name, sha256, size_bytes, media_type from artifact where job_id=? "
+                         "order by name",
+                         job_id)
+      .All([](const SqliteStatement& row) {
+        return ArtifactRecord{row.Text(0), {row.Text(1), row.Int(2)}, row.Text(3)};
+      });
 }
 
 std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteDatabase& db,
@@ -93,17 +89,15 @@ std::vector<JobRecord> SqliteJobStore::ReadJobs(SqliteDatabase& db,
 }
 
 std::vector<JobRecord> SqliteJobStore::GraphOf(SqliteDatabase& db, const JobRecord& root) {
-  std::vector<JobRecord> jobs;
-  SqliteStatement select(db.handle(), SelectJobWithoutSpec("where parent=? order by job_id"));
-  select.Bind(root.name);
-  while (select.Step()) jobs.push_back(JobFromRow(select));
+  std::vector<JobRecord> jobs =
+      SqliteStatement(db, SelectJobWithoutSpec("where parent=? order by job_id"), root.name)
+          .All(JobFromRow);
   jobs.push_back(root);
   return jobs;
 }
 
 JobRecord SqliteJobStore::GetJob(const std::string& name) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   return RequireJob(db, name);
 }
 
@@ -111,16 +105,16 @@ std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
                                                 int64_t before_id,
                                                 int limit,
                                                 const ListBudget& budget) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   std::string tail = "where job_id < ?";
   if (!filter.parent.empty()) tail += " and parent=?";
   if (!filter.scene.empty()) tail += " and scene=?";
-  // A parent or a scene has few jobs, a project many: its index is for those who ask for all.
+  // A parent or scene has few jobs and a project many, so the index of projects is used only
+  // without a parent and scene.
   const bool is_narrow = !filter.parent.empty() || !filter.scene.empty();
   if (filter.project) tail += is_narrow ? " and +project=?" : " and project=?";
-  SqliteStatement select(db.handle(), SelectJob(tail + " order by job_id desc limit ?"));
-  select.Bind(before_id > 0 ? before_id : INT64_MAX);
+  SqliteStatement select(
+      db, SelectJob(tail + " order by job_id desc limit ?"), before_id > 0 ? before_id : INT64_MAX);
   if (!filter.parent.empty()) select.Bind(filter.parent);
   if (!filter.scene.empty()) select.Bind(filter.scene);
   if (filter.project) select.Bind(*filter.project);
@@ -129,19 +123,18 @@ std::vector<JobRecord> SqliteJobStore::ListJobs(const JobFilter& filter,
 }
 
 std::vector<JobRecord> SqliteJobStore::ListChildren(const std::string& name) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(), SelectJob("where parent=? order by job_id"));
-  select.Bind(name);
+  const auto db = connections_.Read();
+  SqliteStatement select(db, SelectJob("where parent=? order by job_id"), name);
   return ReadJobs(db, select);
 }
 
 std::optional<std::string> SqliteJobStore::CheckRequest(SqliteDatabase& db,
                                                         const RequestKey& request) {
   if (request.id.empty()) return std::nullopt;
-  SqliteStatement select(db.handle(),
-                         "select body_sha256, resource from request_id where method=? and id=?");
-  select.Bind(request.method, request.id);
+  SqliteStatement select(db,
+                         "select body_sha256, resource from request_id where method=? and id=?",
+                         request.method,
+                         request.id);
   if (!select.Step()) return std::nullopt;
   if (select.Text(0) != request.body_sha256) {
     throw ServiceError(ErrorReason::kRequestIdReused,
@@ -165,54 +158,44 @@ void SqliteJobStore::RecordRequest(SqliteDatabase& db,
 }
 
 std::optional<std::string> SqliteJobStore::FindRequest(const RequestKey& request) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   return CheckRequest(db, request);
 }
 
 int64_t SqliteJobStore::NewestRevision() {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   // Not max(revision): the newest event may have been deleted with its job.
-  SqliteStatement select(db.handle(), "select seq from sqlite_sequence where name='job_event'");
-  return select.Step() ? select.Int(0) : 0;
+  return SqliteStatement(db, "select seq from sqlite_sequence where name='job_event'").NextInt();
 }
 
 namespace {
 
-std::vector<EventRecord> ReadEvents(SqliteStatement& select) {
-  std::vector<EventRecord> events;
-  while (select.Step()) {
-    EventRecord event;
-    event.revision = select.Int(0);
-    event.job_id = select.Int(1);
-    event.kind = select.Int(2) != 0 ? EventKind::kProgress : EventKind::kState;
-    event.state = JobStateFromName(select.Text(3));
-    event.attempt = static_cast<int>(select.Int(4));
-    event.time_ms = select.Int(5);
-    events.push_back(event);
-  }
-  return events;
+EventRecord EventFromRow(const SqliteStatement& row) {
+  return {row.Int(0),
+          row.Int(1),
+          row.Int(2) != 0 ? EventKind::kProgress : EventKind::kState,
+          JobStateFromName(row.Text(3)),
+          static_cast<int>(row.Int(4)),
+          row.Int(5)};
 }
 
 }  // namespace
 
 std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision, int limit) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(),
+  const auto db = connections_.Read();
+  return SqliteStatement(db,
                          "select revision, job_id, progress, state, attempt, at_ms from job_event "
-                         "where revision > ? order by revision limit ?");
-  select.Bind(revision, limit);
-  return ReadEvents(select);
+                         "where revision > ? order by revision limit ?",
+                         revision,
+                         limit)
+      .All(EventFromRow);
 }
 
 std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision,
                                                      const std::vector<int64_t>& job_ids,
                                                      int limit) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement bounds(db.handle(),
+  const auto db = connections_.Read();
+  SqliteStatement bounds(db,
                          "select (select value from meta where name='compacted_revision'), "
                          "coalesce((select seq from sqlite_sequence where name='job_event'), 0)");
   bounds.Step();
@@ -224,44 +207,41 @@ std::vector<EventRecord> SqliteJobStore::EventsSince(int64_t revision,
                        bounds.Int(0),
                        bounds.Int(1));
   }
-  SqliteStatement select(db.handle(),
+  return SqliteStatement(db,
                          "select revision, job_id, progress, state, attempt, at_ms from job_event "
                          "where job_id in (" +
-                             JoinIds(job_ids) + ") and revision > ? order by revision limit ?");
-  select.Bind(revision, limit);
-  return ReadEvents(select);
+                             JoinIds(job_ids) + ") and revision > ? order by revision limit ?",
+                         revision,
+                         limit)
+      .All(EventFromRow);
 }
 
 bool SqliteJobStore::AllFinished(const std::vector<int64_t>& job_ids) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(
-      db.handle(),
-      "select 1 from job where end_ms=0 and job_id in (" + JoinIds(job_ids) + ") limit 1");
-  return !select.Step();
+  const auto db = connections_.Read();
+  return !SqliteStatement(
+              db,
+              "select 1 from job where end_ms=0 and job_id in (" + JoinIds(job_ids) + ") limit 1")
+              .Step();
 }
 
 JobsSnapshot SqliteJobStore::Snapshot(const std::vector<int64_t>& job_ids) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   JobsSnapshot snapshot;
-  SqliteStatement sequence(db.handle(), "select seq from sqlite_sequence where name='job_event'");
-  if (sequence.Step()) snapshot.revision = sequence.Int(0);
-  SqliteStatement select(
-      db.handle(),
-      SelectJobWithoutSpec("where job_id in (" + JoinIds(job_ids) + ") order by revision"));
-  while (select.Step()) snapshot.jobs.push_back(JobFromRow(select));
+  snapshot.revision =
+      SqliteStatement(db, "select seq from sqlite_sequence where name='job_event'").NextInt();
+  snapshot.jobs =
+      SqliteStatement(
+          db, SelectJobWithoutSpec("where job_id in (" + JoinIds(job_ids) + ") order by revision"))
+          .All(JobFromRow);
   return snapshot;
 }
 
 LoadedJobs SqliteJobStore::LoadJobs(const std::vector<int64_t>& job_ids, const ListBudget& budget) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   LoadedJobs loaded;
   int64_t bytes = 0;
   for (; loaded.looked_for < job_ids.size() && bytes < budget.bytes; ++loaded.looked_for) {
-    SqliteStatement select(db.handle(), SelectJob("where job_id=?"));
-    select.Bind(job_ids[loaded.looked_for]);
+    SqliteStatement select(db, SelectJob("where job_id=?"), job_ids[loaded.looked_for]);
     for (JobRecord& job : ReadJobs(db, select, budget)) {
       bytes += MemoryBytes(job);
       loaded.jobs.push_back(std::move(job));
@@ -271,12 +251,10 @@ LoadedJobs SqliteJobStore::LoadJobs(const std::vector<int64_t>& job_ids, const L
 }
 
 std::vector<int64_t> SqliteJobStore::ResolveWatch(const std::vector<std::string>& names) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   std::set<int64_t> ids;
   for (const std::string& name : names) {
-    SqliteStatement select(db.handle(), "select job_id from job where name=?1 or parent=?1");
-    select.Bind(name);
+    SqliteStatement select(db, "select job_id from job where name=?1 or parent=?1", name);
     if (!select.Step()) throw JobNotFound(name);
     do {
       ids.insert(select.Int(0));
@@ -286,10 +264,9 @@ std::vector<int64_t> SqliteJobStore::ResolveWatch(const std::vector<std::string>
 }
 
 JobCounts SqliteJobStore::CountJobs() {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   SqliteStatement select(
-      db.handle(),
+      db,
       "select coalesce(sum(state in('QUEUED','BLOCKED')),0), coalesce(sum(state='RUNNING'),0), "
       "coalesce(sum(state='BLOCKED'),0), "
       "coalesce(min(case when queued_since_ms>0 then queued_since_ms end),0), "
@@ -299,8 +276,7 @@ JobCounts SqliteJobStore::CountJobs() {
 }
 
 void SqliteJobStore::UpdateWorker(const WorkerRecord& worker) {
-  WriteTransaction transaction(connections_, /*durable=*/false);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_, /*durable=*/false);
   db.Run(
       "insert into worker values(?,?,?,?,?) on conflict(worker_id) do update set "
       "pid=excluded.pid, job=excluded.job, memory_bytes=excluded.memory_bytes, "
@@ -310,37 +286,30 @@ void SqliteJobStore::UpdateWorker(const WorkerRecord& worker) {
       worker.job,
       worker.memory_bytes,
       Now());
-  transaction.Commit();
+  db.Commit();
 }
 
 void SqliteJobStore::RemoveWorker(const std::string& worker_id) {
-  WriteTransaction transaction(connections_, /*durable=*/false);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_, /*durable=*/false);
   db.Run("delete from worker where worker_id=?", worker_id);
-  transaction.Commit();
+  db.Commit();
 }
 
 std::vector<WorkerRecord> SqliteJobStore::ListWorkers() {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(
-      db.handle(),
-      "select worker_id, pid, job, memory_bytes, heartbeat_ms from worker order by worker_id");
-  std::vector<WorkerRecord> workers;
-  while (select.Step()) {
-    workers.push_back(
-        {select.Text(0), select.Int(1), select.Text(2), select.Int(3), select.Int(4)});
-  }
-  return workers;
+  const auto db = connections_.Read();
+  return SqliteStatement(db,
+                         "select worker_id, pid, job, memory_bytes, heartbeat_ms from worker order "
+                         "by worker_id")
+      .All([](const SqliteStatement& row) {
+        return WorkerRecord{row.Text(0), row.Int(1), row.Text(2), row.Int(3), row.Int(4)};
+      });
 }
 
 int64_t SqliteJobStore::RunningEpoch(const std::string& job_name) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  SqliteStatement select(db.handle(),
-                         "select lease_epoch from job where name=? and state='RUNNING'");
-  select.Bind(job_name);
-  return select.Step() ? select.Int(0) : 0;
+  const auto db = connections_.Read();
+  return SqliteStatement(
+             db, "select lease_epoch from job where name=? and state='RUNNING'", job_name)
+      .NextInt();
 }
 
 }  // namespace color3d

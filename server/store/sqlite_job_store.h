@@ -1,5 +1,5 @@
-// The job store in one SQLite file (WAL), which several processes of one host may share. Reads wait
-// for nothing; writes of one process wait for each other, and for those of other processes.
+// Job store in one SQLite file (WAL), shared by processes of one host. Thread-safe. Reads do not
+// wait; writes wait for each other, also across processes.
 #pragma once
 
 #include <filesystem>
@@ -15,17 +15,17 @@ namespace color3d {
 
 struct StoreOptions {
   int max_attempts = 3;
-  // First delay before a failed or lost attempt is tried again; doubles with each attempt.
+  // Delay before the first retry of a failed or lost attempt; doubles with each attempt.
   int64_t retry_backoff_ms = 2'000;
-  // The version of this program. A worker of another version than the server's is given no job.
+  // Version of this program. Workers get jobs only from a server of the same version.
   std::string program_version;
-  // Leases of another start of the machine have ended when a server opens the store.
+  // When a server opens the store, leases of other starts of the machine end.
   std::string boot_id = BootId();
 };
 
 class SqliteJobStore : public JobStore {
  public:
-  // Throws as PrepareStore.
+  // Throws like PrepareStore.
   SqliteJobStore(const std::filesystem::path& file,
                  StoreRole role,
                  Clocks clocks,
@@ -88,7 +88,7 @@ class SqliteJobStore : public JobStore {
   std::optional<JobRecord> FindStage(const std::string& stage_key) override;
 
   int ReapExpired() override;
-  std::vector<std::string> ExpireLeasesOf(const std::string& worker) override;
+  std::vector<std::string> ExpireLeases(const std::string& worker) override;
   bool IsHeld() override;
   bool IsFull() override;
   void UpdateWorker(const WorkerRecord& worker) override;
@@ -137,7 +137,7 @@ class SqliteJobStore : public JobStore {
                                            int64_t grace_ms) override;
   std::vector<BlobCandidate> AgedCandidates(int64_t grace_ms) override;
   int64_t RunningEpoch(const std::string& job_name) override;
-  int64_t GiveBackSpace(int64_t keep_bytes) override;
+  int64_t ReturnFreeSpace(int64_t keep_bytes) override;
 
  private:
   // Reading (sqlite_job_store.cc).
@@ -145,29 +145,29 @@ class SqliteJobStore : public JobStore {
   JobRecord RequireJob(SqliteDatabase& db, const std::string& name);
   JobRecord JobById(SqliteDatabase& db, int64_t job_id);
   std::vector<ArtifactRecord> LoadArtifacts(SqliteDatabase& db, int64_t job_id);
-  // The rows of a SelectJob statement, with artifacts, as far as the budget goes.
+  // Reads the rows of a SelectJob statement, with artifacts, within the budget.
   std::vector<JobRecord> ReadJobs(SqliteDatabase& db,
                                   SqliteStatement& select,
                                   const ListBudget& budget = {});
-  // The children, without spec and artifacts, then the job itself.
+  // Returns the children, without spec and artifacts, then the job itself.
   std::vector<JobRecord> GraphOf(SqliteDatabase& db, const JobRecord& root);
   SceneRecord RequireScene(SqliteDatabase& db, const std::string& name, bool with_files);
 
-  // Idempotency: the resource of an earlier equal request. Throws REQUEST_ID_REUSED.
+  // Returns the resource of an earlier equal request. Throws REQUEST_ID_REUSED.
   std::optional<std::string> CheckRequest(SqliteDatabase& db, const RequestKey& request);
   void RecordRequest(SqliteDatabase& db, const RequestKey& request, const std::string& resource);
 
-  // Deletes those of the next events after this revision that are of finished jobs and from before
-  // this time.
-  // How far it came; nothing: they are all younger.
+  // Deletes, of the next events after this revision, those of finished jobs that are older than
+  // this time. Returns the last revision examined; nothing if all events are younger.
   std::optional<int64_t> CompactEvents(int64_t after, int64_t before_ms);
 
-  // From before when request ids may go, as it was noted a day ago by the steady clock: a clock
-  // that jumps makes none old. 0: that day is not over; then takes note of `before_ms`.
-  int64_t NotedRequestAge(int64_t before_ms);
+  // Returns the time before which request ids may be deleted, as recorded a day ago by the steady
+  // clock, so that a clock jump expires none; 0 if the day is not over. Records `before_ms` for the
+  // next day.
+  int64_t RecordedRequestAge(int64_t before_ms);
 
   // Throws WORKER_VERSION.
-  void RequireServersVersion(SqliteDatabase& db) const;
+  void RequireServerVersion(SqliteDatabase& db) const;
 
   // State machine (sqlite_job_state.cc).
   void AddEvent(SqliteDatabase& db, int64_t job_id, bool progress);
@@ -200,9 +200,10 @@ class SqliteJobStore : public JobStore {
                            const SceneLimits& limits);
   void ResetForRetry(SqliteDatabase& db, const JobRecord& job, bool from_scratch);
   void StoreUsage(SqliteDatabase& db, int64_t job_id, const JobUsage& usage);
-  // Steady time since the last call of this name; 0 at the first one after a start of the machine.
+  // Returns the steady time since the last call with this name; 0 at the first call after a start
+  // of the machine.
   int64_t ElapsedSinceLast(SqliteDatabase& db, const char* name);
-  // The project gives up those of these blobs that none of its jobs and scenes names.
+  // Releases those of these blobs that no job or scene of the project names.
   void ReleaseHoldings(SqliteDatabase& db,
                        const std::string& project,
                        const std::vector<std::string>& sha256);

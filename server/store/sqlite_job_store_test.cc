@@ -28,7 +28,7 @@ TEST_F(SqliteJobStoreTest, RequestIdMakesCallsIdempotent) {
   EXPECT_EQ(store_->Retry(first.name, false, retry, kNoLimit).state, JobState::kFailed);
 }
 
-TEST_F(SqliteJobStoreTest, EqualRequestsAtOnceMakeOneJob) {
+TEST_F(SqliteJobStoreTest, ConcurrentEqualRequestsCreateOneJob) {
   SqliteJobStore other(File(), StoreRole::kWorker, TestClocks());
   const RequestKey key{"CreateJob", "same", "body"};
   NewGraph graph;
@@ -53,18 +53,12 @@ TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
   store_.reset();
   Open();
   EXPECT_EQ(Child(root, "import").state, JobState::kRunning);
-  Succeed(import);  // the worker lived on
+  Succeed(import);  // the worker survived
   EXPECT_EQ(Child(root, "left").state, JobState::kQueued);
   EXPECT_GT(store_->NewestRevision(), 0);
 }
 
-TEST_F(SqliteJobStoreTest, NewerSchemaIsRefused) {
-  store_.reset();
-  SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=99");
-  EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_VERSION");
-}
-
-TEST_F(SqliteJobStoreTest, GarbageFileIsReportedNotCrashed) {
+TEST_F(SqliteJobStoreTest, ReportsGarbageFile) {
   store_.reset();
   std::filesystem::remove(scratch_.path() / "jobs.db-wal");
   WriteFileAtomic(scratch_.path() / "jobs.db", std::string(4096, 'x'));
@@ -93,7 +87,7 @@ TEST_F(SqliteJobStoreTest, EventsResumeAndCoalesceProgress) {
   EXPECT_GT(later[0].revision, events[2].revision);
 }
 
-TEST_F(SqliteJobStoreTest, CompactedRevisionsAreReported) {
+TEST_F(SqliteJobStoreTest, ReportsCompactedRevisions) {
   const JobRecord job = CreateSingle();
   const std::vector<int64_t> ids = store_->ResolveWatch({job.name});
   Succeed(ClaimOne());
@@ -105,7 +99,7 @@ TEST_F(SqliteJobStoreTest, CompactedRevisionsAreReported) {
   EXPECT_EQ(store_->NewestRevision(), newest);
 }
 
-TEST_F(SqliteJobStoreTest, RequestIdsOutliveAClockThatJumps) {
+TEST_F(SqliteJobStoreTest, RequestIdsSurviveClockJump) {
   constexpr int64_t kDay = 24 * 3600 * 1000, kKept = 7 * kDay;
   const RequestKey key{"CreateJob", "id", "body"};
   CreateDiamond(key);
@@ -126,7 +120,7 @@ TEST_F(SqliteJobStoreTest, RequestIdsOutliveAClockThatJumps) {
   EXPECT_FALSE(sweep(3));
 }
 
-TEST_F(SqliteJobStoreTest, DeleteTakesChildrenAndRefusesWhatIsInUse) {
+TEST_F(SqliteJobStoreTest, DeletesChildrenAndRefusesJobsInUse) {
   const JobRecord root = CreateDiamond();
   EXPECT_EQ(ReasonThrown([&] { store_->Delete(root.name, {}); }), "WRONG_STATE");
   EXPECT_EQ(ReasonThrown([&] { store_->DeleteScene("scenes/test", {}); }), "SCENE_IN_USE");
@@ -163,7 +157,7 @@ TEST_F(SqliteJobStoreTest, ListsArePagedNewestFirst) {
   EXPECT_TRUE(store_->ListJobs({"", "scenes/other"}, 0, 10, {}).empty());
 }
 
-TEST_F(SqliteJobStoreTest, ListsKeepToTheirBudgetAlsoWithLongRowsOfOlderReleases) {
+TEST_F(SqliteJobStoreTest, ListsKeepBudgetWithLongRows) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("a")};

@@ -7,7 +7,7 @@ namespace color3d {
 namespace {
 using QueueTest = JobStoreTest;
 
-TEST_F(QueueTest, HeldQueueGivesNoJobAndTellsTheReason) {
+TEST_F(QueueTest, HeldQueueGivesNoJobAndReason) {
   const JobRecord job = CreateSingle();
   store_->UpdateWorker({"w", 1, "", 0, 0});
   for (const Hold hold : {Hold::kPaused, Hold::kStorage}) {
@@ -23,10 +23,10 @@ TEST_F(QueueTest, HeldQueueGivesNoJobAndTellsTheReason) {
   EXPECT_EQ(ClaimOne().name, job.name);
 }
 
-TEST_F(QueueTest, WaitingJobHasAPlaceAndATime) {
+TEST_F(QueueTest, WaitingJobHasPlaceAndTime) {
   const JobRecord first = CreateSingle(), second = CreateSingle();
   const JobRecord root = CreateDiamond();
-  EXPECT_EQ(store_->PlaceInQueue(first).waits_for, "a worker: none runs");
+  EXPECT_EQ(store_->PlaceInQueue(first).waits_for, "a worker; none is running");
   store_->UpdateWorker({"w", 1, "", 0, 0});
   EXPECT_EQ(store_->PlaceInQueue(first).position, 1);
   EXPECT_EQ(store_->PlaceInQueue(second).position, 2);
@@ -36,7 +36,7 @@ TEST_F(QueueTest, WaitingJobHasAPlaceAndATime) {
   FailWith(ClaimOne(), ErrorCode::kUnavailable);
   const JobRecord waiting = store_->GetJob(first.name);
   EXPECT_EQ(waiting.queued_ms, 700);
-  EXPECT_EQ(store_->PlaceInQueue(waiting).waits_for, "its next try, in 1 s");
+  EXPECT_EQ(store_->PlaceInQueue(waiting).waits_for, "its next attempt, in 1 s");
   wall_ += 300;
   now_ += 1000;
   const JobRecord running = ClaimOne();
@@ -45,7 +45,7 @@ TEST_F(QueueTest, WaitingJobHasAPlaceAndATime) {
   EXPECT_EQ(store_->PlaceInQueue(second).position, 1);
 }
 
-TEST_F(QueueTest, EqualWorkIsDoneOnce) {
+TEST_F(QueueTest, RunsEqualWorkOnce) {
   CreateSingle();
   CreateSingle();
   store_->UpdateWorker({"w", 1, "", 0, 0});
@@ -63,7 +63,7 @@ TEST_F(QueueTest, EqualWorkIsDoneOnce) {
   EXPECT_FALSE(store_->JoinEqual(LeaseOf(again), "key")) << "nobody else does it now";
 }
 
-TEST_F(QueueTest, WaitingJobRunsWhenTheEqualJobFails) {
+TEST_F(QueueTest, WaitingJobRunsWhenEqualJobFails) {
   for (const char* end : {"fails", "is lost", "is cancelled", "is killed"}) {
     SCOPED_TRACE(end);
     const JobRecord first = CreateSingle(), second = CreateSingle();
@@ -100,7 +100,7 @@ TEST_F(QueueTest, CancelledJobDoesNotWaitForEqualWork) {
       << "the retry is another wish";
 }
 
-TEST_F(QueueTest, AKilledJobEndsAtOnce) {
+TEST_F(QueueTest, KilledJobEndsAtOnce) {
   const JobRecord root = CreateDiamond();
   const JobRecord running = ClaimOne();
   EXPECT_EQ(store_->Kill(root.name).state, JobState::kCancelled);

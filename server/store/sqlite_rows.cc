@@ -10,8 +10,8 @@ namespace {
 
 constexpr size_t kMaxLinesBytes = 64 << 10;
 
-// The columns of a table and where a record keeps their values: the one list that reading and
-// inserting follow. The id comes first; the database gives it.
+// Columns of a table and the members of a record that hold their values, for reading and inserting.
+// The first is the id, which the database assigns.
 template <typename Visit>
 void VisitColumns(JobRecord& job, Visit&& visit) {
   JobError error = job.error.value_or(JobError{});
@@ -88,7 +88,7 @@ void Read(const SqliteStatement& row, int column, T* value) {
     *value = row.Double(column);
   } else if constexpr (std::is_same_v<T, bool>) {
     *value = row.Int(column) != 0;
-  } else {  // integers, and enumerations stored as such
+  } else {  // integers and enumerations
     *value = static_cast<T>(row.Int(column));
   }
 }
@@ -125,9 +125,9 @@ Record RecordFromRow(const SqliteStatement& row) {
 template <typename Record>
 int64_t InsertRow(SqliteDatabase& db, const char* table, Record record) {
   static const std::vector<std::string> names = ColumnNames<Record>();
-  const auto inserted = names.begin() + 1;  // all but the id
+  const auto inserted = names.begin() + 1;  // all except the id
   const std::vector<const char*> places(names.size() - 1, "?");
-  SqliteStatement insert(db.handle(),
+  SqliteStatement insert(db,
                          fmt::format("insert into {}({}) values({})",
                                      table,
                                      fmt::join(inserted, names.end(), ", "),

@@ -9,12 +9,12 @@
 
 namespace color3d {
 
-// "select <columns> from job <tail>", and such a row as a record (without artifacts).
+// Returns "select <columns> from job <tail>"; JobFromRow reads its rows, without artifacts.
 std::string SelectJob(const std::string& tail);
-// The same with an empty spec.
+// The same with empty specs.
 std::string SelectJobWithoutSpec(const std::string& tail);
 JobRecord JobFromRow(const SqliteStatement& row);
-// A new row with all of the record but its id; returns the id.
+// Inserts the record except for its id; returns the new id.
 int64_t InsertJobRow(SqliteDatabase& db, const JobRecord& job);
 
 // The same for scenes (without files).
@@ -22,11 +22,11 @@ std::string SelectScene(const std::string& tail);
 SceneRecord SceneFromRow(const SqliteStatement& row);
 int64_t InsertSceneRow(SqliteDatabase& db, const SceneRecord& scene);
 
-// Warnings are single lines, stored joined by newlines; beyond 64 KiB they are left out.
+// Warnings are stored as lines of one text; those beyond 64 KiB are dropped.
 std::string JoinLines(const std::vector<std::string>& lines);
 std::vector<std::string> SplitLines(const std::string& text);
 
-// "1,2,3": ids are our own integers, so building SQL from them is safe.
+// Returns "1,2,3" for SQL; safe, because ids are integers of the store.
 std::string JoinIds(const std::vector<int64_t>& ids);
 
 }  // namespace color3d

@@ -12,28 +12,27 @@ namespace color3d {
 SceneRecord SqliteJobStore::RequireScene(SqliteDatabase& db,
                                          const std::string& name,
                                          bool with_files) {
-  SqliteStatement select(db.handle(), SelectScene("where name=?"));
-  select.Bind(name);
+  SqliteStatement select(db, SelectScene("where name=?"), name);
   if (!select.Step()) {
     throw ServiceError(ErrorReason::kSceneNotFound, "there is no scene '{}'", PublicScene(name));
   }
   SceneRecord scene = SceneFromRow(select);
   if (!with_files) return scene;
-  SqliteStatement files(
-      db.handle(),
-      "select path, sha256, size_bytes from scene_file where scene_id=? order by path");
-  files.Bind(scene.id);
-  while (files.Step()) {
-    scene.files.push_back({files.Text(0), {files.Text(1), files.Int(2)}});
-  }
+  scene.files =
+      SqliteStatement(
+          db,
+          "select path, sha256, size_bytes from scene_file where scene_id=? order by path",
+          scene.id)
+          .All([](const SqliteStatement& row) {
+            return SceneFileRecord{row.Text(0), {row.Text(1), row.Int(2)}};
+          });
   return scene;
 }
 
 void SqliteJobStore::RequireRoomForScene(SqliteDatabase& db,
                                          const std::string& project,
                                          const SceneLimits& limits) {
-  SqliteStatement select(db.handle(), "select scenes, uncommitted from project where name=?");
-  select.Bind(project);
+  SqliteStatement select(db, "select scenes, uncommitted from project where name=?", project);
   if (!select.Step()) return;
   const auto refuse = [&](const char* what, int64_t count, int64_t most, const char* remedy) {
     throw ServiceError(
@@ -43,7 +42,7 @@ void SqliteJobStore::RequireRoomForScene(SqliteDatabase& db,
         {{"project:" + project + " scenes", fmt::format("{} of {}", count, most)}});
   };
   if (select.Int(0) >= limits.all) {
-    refuse("scenes", select.Int(0), limits.all, "delete scenes that you need no more");
+    refuse("scenes", select.Int(0), limits.all, "delete unneeded scenes");
   }
   if (select.Int(1) >= limits.uncommitted) {
     refuse("scenes that are not committed",
@@ -56,12 +55,9 @@ void SqliteJobStore::RequireRoomForScene(SqliteDatabase& db,
 SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record,
                                         const RequestKey& request,
                                         const SceneLimits& limits) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
-  SqliteStatement existing(db.handle(), "select 1 from scene where name=?");
-  existing.Bind(record.name);
-  if (existing.Step()) {
+  if (SqliteStatement(db, "select 1 from scene where name=?", record.name).Step()) {
     throw ServiceError(ErrorReason::kSceneExists,
                        "the scene '{}' exists; choose another scene_id",
                        PublicScene(record.name));
@@ -83,41 +79,37 @@ SceneRecord SqliteJobStore::CreateScene(const SceneRecord& record,
   }
   RecordRequest(db, request, record.name);
   SceneRecord scene = RequireScene(db, record.name, true);
-  transaction.Commit();
+  db.Commit();
   return scene;
 }
 
 SceneRecord SqliteJobStore::GetScene(const std::string& name) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   return RequireScene(db, name, true);
 }
 
 std::vector<SceneRecord> SqliteJobStore::ListScenes(const std::optional<std::string>& project,
                                                     int64_t before_id,
                                                     int limit) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   std::string tail = "where scene_id < ?";
   if (project) tail += " and project=?";
-  SqliteStatement select(db.handle(), SelectScene(tail + " order by scene_id desc limit ?"));
-  select.Bind(before_id > 0 ? before_id : INT64_MAX);
+  SqliteStatement select(db,
+                         SelectScene(tail + " order by scene_id desc limit ?"),
+                         before_id > 0 ? before_id : INT64_MAX);
   if (project) select.Bind(*project);
   select.Bind(limit);
-  std::vector<SceneRecord> scenes;
-  while (select.Step()) scenes.push_back(SceneFromRow(select));
-  return scenes;
+  return select.All(SceneFromRow);
 }
 
 SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
                                           CaptureLayout layout,
                                           int photo_count,
                                           const RequestKey& request) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
   RequireScene(db, name, false);
-  // Activating twice changes nothing: the scene is immutable.
+  // A second activation changes nothing: the scene is immutable.
   db.Run(
       "update scene set active=1, layout=?, photo_count=?, commit_ms=? where name=? and "
       "active=0",
@@ -127,15 +119,14 @@ SceneRecord SqliteJobStore::ActivateScene(const std::string& name,
       name);
   RecordRequest(db, request, name);
   SceneRecord scene = RequireScene(db, name, true);
-  transaction.Commit();
+  db.Commit();
   return scene;
 }
 
 SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
                                            const std::string& job,
                                            const RequestKey& request) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (const auto resource = CheckRequest(db, request)) return RequireScene(db, *resource, true);
   RequireScene(db, name, false);
   if (!job.empty()) {
@@ -158,38 +149,33 @@ SceneRecord SqliteJobStore::AcceptKeyColor(const std::string& name,
   db.Run("update scene set key_color_job=? where name=?", job, name);
   RecordRequest(db, request, name);
   SceneRecord scene = RequireScene(db, name, true);
-  transaction.Commit();
+  db.Commit();
   return scene;
 }
 
 void SqliteJobStore::DeleteScene(const std::string& name, const RequestKey& request) {
-  WriteTransaction transaction(connections_);
-  SqliteDatabase& db = transaction.db();
+  WriteTransaction db(connections_);
   if (CheckRequest(db, request)) return;
   const SceneRecord scene = RequireScene(db, name, false);
-  SqliteStatement busy(db.handle(), "select name from job where scene=? and end_ms=0 limit 1");
-  busy.Bind(name);
+  SqliteStatement busy(db, "select name from job where scene=? and end_ms=0 limit 1", name);
   if (busy.Step()) {
     throw ServiceError(ErrorReason::kSceneInUse,
                        "{} of the scene '{}' is not finished; cancel it or wait for it",
                        busy.Text(0),
                        PublicScene(name));
   }
-  std::vector<std::string> files;
-  {
-    SqliteStatement select(db.handle(), "select sha256 from scene_file where scene_id=?");
-    select.Bind(scene.id);
-    while (select.Step()) files.push_back(select.Text(0));
-  }
+  const std::vector<std::string> files =
+      SqliteStatement(db, "select sha256 from scene_file where scene_id=?", scene.id).Texts();
   db.Run("delete from scene where scene_id=?", scene.id);
   ReleaseHoldings(db, scene.project, files);
   RecordRequest(db, request, name);
-  transaction.Commit();
+  db.Commit();
 }
 
 namespace {
 
-// That the artifact is a colorizer of the project (?2, unless ?1) and the scene (?3, unless empty).
+// Condition: the artifact is a colorizer of the project (?2, unless ?1) and scene (?3, unless
+// empty).
 std::string IsColorizer(const char* artifact, const char* job) {
   return fmt::format(
       "{0}.name='{2}' and {1}.kind='{3}' and {1}.state='SUCCEEDED' and (?1 or {1}.project=?2) and "
@@ -209,43 +195,46 @@ ColorizerRecord ColorizerFromRow(const SqliteStatement& row) {
 
 }  // namespace
 
-// Equal files made by several jobs (cached runs) are one colorizer: that of the oldest job.
+// Equal files of several jobs (cached runs) are one colorizer: that of the oldest job.
 std::vector<ColorizerRecord> SqliteJobStore::ListColorizers(
     const std::optional<std::string>& project,
     const std::string& scene,
     int64_t before_id,
     int limit) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
-  // From what there is least of: the scene's jobs, or all colorizers, the newest first.
+  const auto db = connections_.Read();
+  // Scans the smaller set: the jobs of the scene, or all colorizers, newest first.
   const std::string walk = scene.empty()
                                ? "from artifact a cross join job j on j.job_id=a.job_id where "
                                : "from job j cross join artifact a on a.job_id=j.job_id where "
                                  "j.scene=?3 and ";
-  SqliteStatement select(db.handle(),
+  return SqliteStatement(db,
                          kColorizerColumns + walk + IsColorizer("a", "j") +
                              " and j.job_id<?4 and not exists(select 1 from artifact older indexed "
                              "by artifact_blob cross "
                              "join job o on o.job_id=older.job_id where older.sha256=a.sha256 and "
                              "older.job_id<a.job_id and " +
                              IsColorizer("older", "o") + ") order by " +
-                             (scene.empty() ? "a" : "j") + ".job_id desc limit ?5");
-  select.Bind(!project, project.value_or(""), scene, before_id > 0 ? before_id : INT64_MAX, limit);
-  std::vector<ColorizerRecord> colorizers;
-  while (select.Step()) colorizers.push_back(ColorizerFromRow(select));
-  return colorizers;
+                             (scene.empty() ? "a" : "j") + ".job_id desc limit ?5",
+                         !project,
+                         project.value_or(""),
+                         scene,
+                         before_id > 0 ? before_id : INT64_MAX,
+                         limit)
+      .All(ColorizerFromRow);
 }
 
 ColorizerRecord SqliteJobStore::GetColorizer(const std::optional<std::string>& project,
                                              const std::string& sha256) {
-  const auto held = connections_.Read();
-  SqliteDatabase& db = *held;
+  const auto db = connections_.Read();
   SqliteStatement select(
-      db.handle(),
+      db,
       kColorizerColumns + ("from artifact a indexed by artifact_blob cross join job j on "
                            "j.job_id=a.job_id where a.sha256=?4 and " +
-                           IsColorizer("a", "j") + " order by a.job_id limit 1"));
-  select.Bind(!project, project.value_or(""), "", sha256);
+                           IsColorizer("a", "j") + " order by a.job_id limit 1"),
+      !project,
+      project.value_or(""),
+      "",
+      sha256);
   if (!select.Step()) {
     throw ServiceError(
         ErrorReason::kColorizerNotFound, "there is no colorizer 'colorizers/{}'", sha256);

@@ -6,7 +6,7 @@ namespace color3d {
 namespace {
 using SqliteSceneTest = JobStoreTest;
 
-TEST_F(SqliteSceneTest, OnlyAColoredKeyViewOfTheSceneIsAccepted) {
+TEST_F(SqliteSceneTest, AcceptsOnlyColoredKeyViewOfScene) {
   SceneRecord other;
   other.name = "scenes/other";
   store_->CreateScene(other, {}, {});

@@ -1,4 +1,4 @@
-// The store's file as a whole.
+// Operations on the whole file of the store.
 #pragma once
 
 #include <filesystem>
@@ -7,17 +7,18 @@
 
 namespace color3d {
 
-// Throws Error{kFailedPrecondition} that names the folder when there is none.
+// Throws Error{kFailedPrecondition} with the folder if the file does not exist.
 void RequireStore(const std::filesystem::path& file);
 
-// All of it as it is at one moment, compact and without a log beside it; others may write
-// meanwhile. `copy` is replaced. Throws Error as opening a store does.
+// Writes a compact snapshot without a log file to `copy`, replacing it; other processes may write
+// meanwhile. Throws like opening a store.
 void CopyStore(const std::filesystem::path& file, const std::filesystem::path& copy);
 
-// Jobs of the store, which nobody uses, that would go on from this checkpoint begin anew.
+// Removes this checkpoint from all jobs, which then start over. Requires: no process uses the
+// store.
 void DropCheckpoint(const std::filesystem::path& file, const std::string& sha256);
 
-// Faults of the file in SQLite's words, at most 20.
+// Returns at most 20 faults of the file, as reported by SQLite.
 std::vector<std::string> StoreProblems(const std::filesystem::path& file);
 
 }  // namespace color3d

@@ -18,12 +18,13 @@ namespace {
 
 constexpr int64_t kSpareBytes = int64_t{16} << 20;
 
-// Nothing: the file has no tables.
+// Returns nothing if the file has no tables.
 std::optional<int64_t> VersionOf(SqliteDatabase& db) {
-  SqliteStatement table(db.handle(),
-                        "select 1 from sqlite_master where type='table' and name='schema_version'");
-  if (!table.Step()) return std::nullopt;
-  SqliteStatement version(db.handle(), "select version from schema_version");
+  if (!SqliteStatement(db,
+                       "select 1 from sqlite_master where type='table' and name='schema_version'")
+           .Step())
+    return std::nullopt;
+  SqliteStatement version(db, "select version from schema_version");
   return version.Step() ? std::optional(version.Int(0)) : std::nullopt;
 }
 
@@ -35,7 +36,7 @@ ServiceError WrongVersion(int64_t version, const char* remedy) {
                       remedy);
 }
 
-// A whole copy, or none.
+// Writes a complete copy or none.
 void KeepCopy(const fs::path& file, int64_t version) {
   const fs::path copy = file.string() + ".v" + std::to_string(version);
   const fs::path unfinished = copy.string() + ".part";
@@ -55,13 +56,10 @@ void Migrate(SqliteDatabase& db) {
   spdlog::info("the job store was brought from version {} to {}", from, kSchemaVersion);
 }
 
-// A store of before version 6 keeps what deleted rows leave free, for ever. Building it anew takes
-// twice its length on the disk; where that is not free it is done at another start.
-void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
-  const auto number = [&](const char* pragma) {
-    SqliteStatement select(db.handle(), pragma);
-    return select.Step() ? select.Int(0) : 0;
-  };
+// Stores created before version 6 never return the space of deleted rows. Rebuilding takes twice
+// the size of the file; without that space it is left to a later start.
+void EnableSpaceReturn(const fs::path& file, SqliteDatabase& db) {
+  const auto number = [&](const char* pragma) { return SqliteStatement(db, pragma).NextInt(); };
   if (number("pragma auto_vacuum") != 0) return;
   const int64_t bytes =
       (number("pragma page_count") - number("pragma freelist_count")) * number("pragma page_size");
@@ -86,25 +84,25 @@ void MakeShrinkable(const fs::path& file, SqliteDatabase& db) {
 void MakeTables(SqliteDatabase& db) {
   SqliteTransaction transaction(db);
   db.Exec("create table if not exists schema_version(version integer not null)");
-  if (VersionOf(db)) return;  // another store of this process was faster
+  if (VersionOf(db)) return;  // another store object of this process was faster
   db.Exec(kSchema);
   db.Run("insert into schema_version values(?)", kSchemaVersion);
   transaction.Commit();
 }
 
 bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
-  SqliteStatement same(db.handle(), "select 1 from server where version=? and boot_id=?");
-  same.Bind(identity.program_version, identity.boot_id);
-  return same.Step();
+  return SqliteStatement(db,
+                         "select 1 from server where version=? and boot_id=?",
+                         identity.program_version,
+                         identity.boot_id)
+      .Step();
 }
 
-// Writes nothing where nothing has changed: on a full disk the server still answers those who read.
+// Writes nothing if nothing has changed, so that the server can still answer reads on a full disk.
 void RecordServerIdentity(SqliteDatabase& db, const ServerIdentity& identity) {
   if (IsKnown(db, identity)) return;
   SqliteTransaction transaction(db);
-  SqliteStatement before(db.handle(), "select 1 from server where boot_id=?");
-  before.Bind(identity.boot_id);
-  if (!before.Step()) {
+  if (!SqliteStatement(db, "select 1 from server where boot_id=?", identity.boot_id).Step()) {
     db.Exec("update job set lease_expires_ms=0 where state='RUNNING'");
     db.Exec(
         "update meta set value=0 where name in('collected_steady_ms', "
@@ -132,12 +130,11 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
   if (role == StoreRole::kWorker) {
     if (!version) {
       throw ServiceError(ErrorReason::kStoreNotReady,
-                         "{} has no tables; start color3d-server serve, which makes them",
+                         "{} has no tables; start color3d-server serve, which creates them",
                          file.string());
     }
     if (*version < kSchemaVersion) {
-      throw WrongVersion(
-          *version, "the server that runs is of an older release than this worker: restart it");
+      throw WrongVersion(*version, "the running server is older than this worker: restart it");
     }
     return;
   }
@@ -147,7 +144,7 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
     KeepCopy(file, *version);
     Migrate(db);
   }
-  MakeShrinkable(file, db);
+  EnableSpaceReturn(file, db);
   RecordServerIdentity(db, identity);
 }
 

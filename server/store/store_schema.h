@@ -1,5 +1,5 @@
-// Who may make and change the tables of the store's file. The schema belongs to the server: workers
-// only look whether they understand it.
+// Creation and migration of the tables of the store. Only the server changes the schema; workers
+// check its version. Stateless.
 #pragma once
 
 #include <filesystem>
@@ -8,21 +8,20 @@
 namespace color3d {
 
 enum class StoreRole {
-  kServer,  // makes the tables, brings older ones up to date, says what version of the program it
-            // is
+  kServer,  // creates and migrates the tables, records its version
   kWorker,
 };
 
 struct ServerIdentity {
   std::string program_version;
-  std::string boot_id;  // of the machine's present start
+  std::string boot_id;  // present start of the machine
 };
 
-// Before the file is used. The server keeps a copy of an older file beside it, FILE.v<version>,
-// before it changes the tables; leases and pauses of another start of the machine end then. Throws
-// Error{kFailedPrecondition}: STORE_VERSION for a file of a newer program, or of an older one when
-// a worker opens it; STORE_NOT_READY for one without tables when a worker opens it.
-// kResourceExhausted when there is no room for the copy.
+// Must be called before the file is used. The server copies an older file to FILE.v<version> before
+// it migrates the tables, and ends leases and pauses of other starts of the machine. Throws
+// Error{kFailedPrecondition}: STORE_VERSION for a file of a newer program, or of an older one if
+// opened by a worker; STORE_NOT_READY for a file without tables if opened by a worker. Throws
+// kResourceExhausted if there is no room for the copy.
 void PrepareStore(const std::filesystem::path& file,
                   StoreRole role,
                   const ServerIdentity& identity);

@@ -1,4 +1,5 @@
-// Who makes and changes the tables; clocks that jump; machines that start anew.
+// Creation and migration of the tables, stores of other versions, clocks that jump, restarts of the
+// machine.
 #include "server/store/store_schema.h"
 
 #include <gtest/gtest.h>
@@ -6,6 +7,7 @@
 #include <map>
 
 #include "server/store/project_store.h"
+#include "server/store/schema.h"
 #include "server/store/sqlite_db.h"
 #include "tests/support/service/job_store_fixture.h"
 
@@ -20,22 +22,37 @@ class StoreSchemaTest : public JobStoreTest {
     options.program_version = version;
     SqliteJobStore(file, StoreRole::kWorker, TestClocks(), options);
   }
+  // Brings a store of version 1 to `version`, as a program of that version did.
+  void MigrateOldTo(int version) {
+    SqliteDatabase old(File(), SqliteAccess::kWrite);
+    for (int from = 1; from < version; ++from) old.Exec(kMigrations[from - 1]);
+    old.Run("update schema_version set version=?", version);
+  }
+  // Columns, indexes and triggers of all tables, each on a line.
+  static std::vector<std::string> DescribeTables(const fs::path& file) {
+    SqliteDatabase db(file, SqliteAccess::kRead);
+    return SqliteStatement(
+               db,
+               "select t.name||'.'||c.name||' '||lower(c.type)||' '||c.\"notnull\"||' '||"
+               "coalesce(c.dflt_value, '')||' '||c.pk as line from sqlite_master t, "
+               "pragma_table_info(t.name) c where t.type='table' union "
+               "select type||' '||name||': '||replace(replace(sql, char(10), ''), '  ', ' ') from "
+               "sqlite_master where type in('index','trigger') and sql<>'' order by line")
+        .Texts();
+  }
   int64_t VersionOf(const fs::path& file) {
     SqliteDatabase db(file, SqliteAccess::kWrite);
-    SqliteStatement version(db.handle(), "select version from schema_version");
+    SqliteStatement version(db, "select version from schema_version");
     return version.Step() ? version.Int(0) : 0;
   }
-  // What a program of version 1 has written.
+  // Makes a store of version 1.
   void MakeOld() {
     store_.reset();
     SqliteDatabase old(File(), SqliteAccess::kWrite);
     old.Exec("pragma auto_vacuum=NONE");
     old.Exec("vacuum");
-    std::vector<std::string> triggers;
-    {
-      SqliteStatement all(old.handle(), "select name from sqlite_master where type='trigger'");
-      while (all.Step()) triggers.push_back(all.Text(0));
-    }
+    const std::vector<std::string> triggers =
+        SqliteStatement(old, "select name from sqlite_master where type='trigger'").Texts();
     for (const std::string& trigger : triggers) old.Exec(("drop trigger " + trigger).c_str());
     old.Exec(
         "drop index scene_file_blob; alter table scene_file rename to newer; create table "
@@ -75,7 +92,7 @@ class StoreSchemaTest : public JobStoreTest {
   }
 };
 
-TEST_F(StoreSchemaTest, ServerMigratesAnOldStoreAndKeepsACopy) {
+TEST_F(StoreSchemaTest, ServerMigratesOldStoreAndKeepsCopy) {
   CreateSingle();
   const JobRecord done = ClaimOne();
   Succeed(done);
@@ -96,16 +113,57 @@ TEST_F(StoreSchemaTest, ServerMigratesAnOldStoreAndKeepsACopy) {
   const fs::path copy = File().string() + ".v1";
   EXPECT_EQ(VersionOf(copy), 1);
   fs::remove(copy);
-  Open();  // nothing is left to be done
+  Open();  // nothing to migrate
   EXPECT_FALSE(fs::exists(copy));
   EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 1u);
 }
 
-// Free pages of the database, and how long its file is once the log is folded into it.
+TEST_F(StoreSchemaTest, MigratesEveryEarlierVersion) {
+  const std::vector<std::string> tables = DescribeTables(File());
+  EXPECT_GT(tables.size(), 100u);
+  for (int version = 1; version < kSchemaVersion; ++version) {
+    SCOPED_TRACE(version);
+    const JobRecord job = CreateSingle();
+    MakeOld();
+    MigrateOldTo(version);
+    Open();
+    EXPECT_EQ(VersionOf(File()), kSchemaVersion);
+    EXPECT_EQ(DescribeTables(File()), tables);
+    EXPECT_EQ(store_->GetScene("scenes/test").files.at(0).path, "a.jpg");
+    EXPECT_EQ(store_->GetProject("").scenes, 1);
+    const JobRecord claimed = ClaimOne();
+    EXPECT_EQ(claimed.name, job.name);
+    EXPECT_EQ(claimed.spec, "spec of single");
+    Succeed(claimed, "result of version " + std::to_string(version));
+  }
+}
+
+// A store of this version that another build wrote has exactly these tables. After a change of the
+// tables raise kSchemaVersion, add a migration and only then change this digest.
+TEST_F(StoreSchemaTest, TablesChangeOnlyWithTheVersion) {
+  std::string text = std::to_string(kSchemaVersion);
+  for (const std::string& line : DescribeTables(File())) text += "\n" + line;
+  EXPECT_EQ(Sha256Hex(text), "b5ae7c37e0b8dbb22a94b6d9976cc9de67afcc54b14708a1f5fea7046dfdfc8a")
+      << text;
+}
+
+TEST_F(StoreSchemaTest, RefusesStoreOfNewerVersion) {
+  store_.reset();
+  SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=version+1");
+  try {
+    Open();
+    ADD_FAILURE() << "the store was opened";
+  } catch (const Error& e) {
+    EXPECT_EQ(ReasonOf(e), "STORE_VERSION");
+    EXPECT_NE(std::string(e.what()).find("use the program that wrote it"), std::string::npos);
+  }
+}
+
+// Returns the number of free pages of the database after a checkpoint.
 int64_t FreePages(const fs::path& file) {
   SqliteDatabase db(file, SqliteAccess::kWrite);
   db.Run("pragma wal_checkpoint(truncate)");
-  SqliteStatement free(db.handle(), "pragma freelist_count");
+  SqliteStatement free(db, "pragma freelist_count");
   return free.Step() ? free.Int(0) : -1;
 }
 
@@ -127,7 +185,7 @@ TEST_F(StoreSchemaTest, FreePagesReturnToTheFileSystem) {
     store_->DeleteScene(scene.name, {});
     EXPECT_GT(FreePages(File()), 1000);
     int64_t left = 1;
-    for (int i = 0; i < 10 && left > 0; ++i) left = store_->GiveBackSpace(0);
+    for (int i = 0; i < 10 && left > 0; ++i) left = store_->ReturnFreeSpace(0);
     EXPECT_EQ(left, 0);
     EXPECT_EQ(FreePages(File()), 0);
     EXPECT_LT(static_cast<int64_t>(fs::file_size(File())), before - (4 << 20));
@@ -141,7 +199,7 @@ TEST_F(StoreSchemaTest, WorkersDoNotMigrate) {
   EXPECT_EQ(VersionOf(File()), 1);
 }
 
-TEST_F(StoreSchemaTest, WorkersOfAnotherReleaseGetNoJob) {
+TEST_F(StoreSchemaTest, WorkersOfOtherReleaseGetNoJob) {
   CreateSingle();
   StoreOptions options;
   options.program_version = "0.0.1";
@@ -155,7 +213,7 @@ TEST_F(StoreSchemaTest, WorkersOfAnotherReleaseGetNoJob) {
   EXPECT_EQ(ClaimOne().attempt, 1) << "nothing was spent";
 }
 
-TEST_F(StoreSchemaTest, WorkersOfAnotherBuildGetNoJob) {
+TEST_F(StoreSchemaTest, WorkersOfOtherBuildGetNoJob) {
   CreateSingle();
   SqliteJobStore worker(File(), StoreRole::kWorker, TestClocks());
   SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=version+1");
@@ -181,7 +239,7 @@ TEST_F(StoreSchemaTest, RebootEndsAllLeases) {
   now_ = int64_t{1} << 40;
   const JobRecord running = (CreateSingle(), ClaimOne());
   const JobRecord waiting = (CreateSingle(), ClaimOne());
-  FailWith(waiting, ErrorCode::kUnavailable);  // to be tried again in a while
+  FailWith(waiting, ErrorCode::kUnavailable);  // retried later
   store_.reset();
   now_ = 5;
   boot_id_ = "boot 2";
@@ -192,7 +250,7 @@ TEST_F(StoreSchemaTest, RebootEndsAllLeases) {
   EXPECT_EQ(ClaimOne().name, running.name);
 }
 
-// As on a full disk: nothing can be written, but whoever reads is served.
+// Like a full disk: writes fail, reads are answered.
 TEST_F(StoreSchemaTest, RestartWritesNothing) {
   SqliteDatabase other(File(), SqliteAccess::kWrite);
   const SqliteTransaction held(other);
@@ -200,7 +258,7 @@ TEST_F(StoreSchemaTest, RestartWritesNothing) {
   EXPECT_EQ(store_->ListScenes({}, 0, 10).size(), 1u);
 }
 
-TEST_F(StoreSchemaTest, ReadsDoNotWaitForAWriter) {
+TEST_F(StoreSchemaTest, ReadsDoNotWaitForWriter) {
   const JobRecord job = CreateSingle();
   SqliteDatabase frozen(File(), SqliteAccess::kWrite);
   SqliteTransaction held(frozen);
@@ -209,7 +267,7 @@ TEST_F(StoreSchemaTest, ReadsDoNotWaitForAWriter) {
   EXPECT_EQ(store_->GetJob(job.name).priority, 100);
   EXPECT_EQ(store_->ListJobs({}, 0, 10, {}).size(), 1u);
   EXPECT_EQ(store_->CountJobs().queued, 1);
-  // ... nor do they wait for a thread of ours that waits for it (its time-out is 10 s).
+  // Nor do they wait for another thread that waits for it (its time-out is 10 s).
   std::thread writer([&] { ReasonThrown([&] { store_->Cancel(job.name, {}); }); });
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   EXPECT_EQ(store_->GetJob(job.name).state, JobState::kQueued);
@@ -219,10 +277,10 @@ TEST_F(StoreSchemaTest, ReadsDoNotWaitForAWriter) {
   EXPECT_EQ(StateOf(job.name), JobState::kCancelled);
 }
 
-// What the service does all day costs as much after many finished jobs as after few.
+// The cost of frequent calls does not depend on the number of finished jobs.
 class StoreCostTest : public JobStoreTest {
  protected:
-  // As clients see it.
+  // The store as seen by clients.
   ProjectStore Mine() { return ProjectStore(*store_, "attic"); }
   NewGraph Personalize(const std::string& scene) {
     NewGraph graph;
@@ -239,7 +297,7 @@ class StoreCostTest : public JobStoreTest {
       Succeed(ClaimOne());
     }
   }
-  // Makes two jobs, works at them and deletes them; the steps that each call took.
+  // Creates, runs and deletes two jobs; returns the steps of each call.
   std::map<std::string, int64_t> Costs() {
     std::map<std::string, int64_t> costs;
     const auto count = [&](const char* call, const auto& body) {

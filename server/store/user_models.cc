@@ -12,8 +12,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr size_t kMaxNameBytes = 64;
-// Key names of a safetensors header or a pickle lie before the numbers; a zip's names of files lie
-// behind them.
+// Key names of safetensors and pickle files precede the data; file names of a zip follow it.
 constexpr int64_t kHeadBytes = int64_t{4} << 20;
 constexpr int64_t kTailBytes = int64_t{1} << 18;
 
@@ -106,7 +105,7 @@ std::vector<std::string> ToFlags(const UserModels& models) {
   return flags;
 }
 
-std::string LooksLike(const fs::path& file) {
+std::string GuessModelKind(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw Error(ErrorCode::kNotFound, "cannot read {}", file.string());
   const std::string head = ReadUpTo(stream, kHeadBytes);

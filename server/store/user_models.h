@@ -1,5 +1,5 @@
-// The weights and model servers of the user's that jobs may name: set when the server starts,
-// handed to its workers, never changed over RPC.
+// Weight files and model servers that jobs may name: set when the server starts, passed to its
+// workers, never changed over RPC.
 #pragma once
 
 #include <cstdint>
@@ -18,19 +18,18 @@ struct UserModels {
   std::map<std::string, std::string> backends;         // addresses, by name
 };
 
-// From "NAME=FILE" and "NAME=ADDRESS". A name is 1 to 64 of a-z, 0-9, '.', '_', '-', and begins
-// with a letter or digit. Throws Error{kInvalidArgument} naming the entry that is malformed or a
-// name that is given twice.
+// Parses "NAME=FILE" and "NAME=ADDRESS". A name is 1 to 64 of a-z, 0-9, '.', '_', '-', and begins
+// with a letter or digit. Throws Error{kInvalidArgument} with the malformed entry or repeated name.
 UserModels ParseUserModels(const std::vector<std::string>& models,
                            const std::vector<std::string>& backends);
 
-// Throws Error{kNotFound} naming the first model whose file cannot be read.
+// Throws Error{kNotFound} with the first model whose file is unreadable.
 void RequireReadable(const UserModels& models);
 
-// The flags that hand the models to a worker: "--model", "NAME=FILE", ...
+// Returns the flags that pass the models to a worker: "--model", "NAME=FILE", ...
 std::vector<std::string> ToFlags(const UserModels& models);
 
-// "a, b and c", or "none": for error messages.
+// Returns "a, b, c" or "none", for error messages.
 template <typename Value>
 std::string NamesOf(const std::map<std::string, Value>& entries) {
   std::string text;
@@ -38,20 +37,19 @@ std::string NamesOf(const std::map<std::string, Value>& entries) {
   return text.empty() ? "none" : text;
 }
 
-// Kind of a weight file, by its first megabytes: "clip", "ddcolor", "convnext",
-// "torchscript" or "unknown". For people who list models: nothing relies on it. Throws
-// Error{kNotFound}.
-std::string LooksLike(const std::filesystem::path& file);
+// Guesses the kind of a weight file, for display only: "clip", "ddcolor", "convnext", "torchscript"
+// or "unknown". Throws Error{kNotFound}.
+std::string GuessModelKind(const std::filesystem::path& file);
 
-// Distinguishes states of a file without reading it; empty if there is no such file.
+// Identifies the state of a file without reading it; empty if there is no such file.
 std::string FileIdentity(const std::filesystem::path& file);
 
-// The file itself and what models read beside it when it is there: CLIP's vocabulary and
-// configuration. Whoever compares states of a model compares all of them.
+// Returns the file and the existing files that are read with it: vocabulary and configuration of
+// CLIP. Comparisons of a model must include all of them.
 std::vector<std::filesystem::path> FilesOfModel(const std::filesystem::path& file);
 
-// Digests of large files, read again only when the file has changed. Thread-safe; two threads that
-// ask for the same file read it once.
+// Digests of large files, recomputed only for changed files. Thread-safe; concurrent calls for one
+// file read it once.
 class FileDigests {
  public:
   // Throws Error{kNotFound}.

@@ -23,7 +23,7 @@ std::string ParseError(const std::vector<std::string>& models,
   return "";
 }
 
-TEST(UserModels, FlagsAreParsedAndPassedOn) {
+TEST(UserModels, ParsesFlagsAndPassesThemOn) {
   const UserModels models =
       ParseUserModels({"clip=/m/a=b.pt", "ddcolor-1.0=/m/d"}, {"uni=127.0.0.1:7"});
   EXPECT_EQ(models.files.at("clip"), "/m/a=b.pt");
@@ -49,7 +49,7 @@ TEST(UserModels, RefusesBadAndRepeatedNames) {
   EXPECT_THAT(ParseError({}, {"a=x", "a=x"}), HasSubstr("--backend a is given twice"));
 }
 
-TEST(UserModels, NamesAMissingFile) {
+TEST(UserModels, NamesMissingFile) {
   const ScratchFolder folder;
   WriteFileAtomic(folder.path() / "there", "x");
   const std::string there = "a=" + (folder.path() / "there").string();
@@ -63,7 +63,7 @@ TEST(UserModels, NamesAMissingFile) {
   }
 }
 
-TEST(UserModels, AReplacedFileHasAnotherDigest) {
+TEST(UserModels, ReplacedFileHasNewDigest) {
   const ScratchFolder folder;
   const auto file = folder.path() / "w";
   WriteFileAtomic(file, "one");
@@ -76,11 +76,11 @@ TEST(UserModels, AReplacedFileHasAnotherDigest) {
   EXPECT_THROW(digests.Of(folder.path() / "none"), Error);
 }
 
-TEST(UserModels, KindsAreRecognised) {
+TEST(UserModels, RecognisesKinds) {
   const ScratchFolder folder;
   const auto kind = [&](const std::string& bytes) {
     WriteFileAtomic(folder.path() / "w", bytes);
-    return LooksLike(folder.path() / "w");
+    return GuessModelKind(folder.path() / "w");
   };
   EXPECT_EQ(kind("........{\"visual.conv1.weight\":"), "clip");
   EXPECT_EQ(kind("........{\"encoder.arch.norm0.weight\":"), "ddcolor");

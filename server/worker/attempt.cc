@@ -24,14 +24,14 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Read-only view of a blob under another name: a hard link, or a copy across filesystems.
+// Makes a blob readable under another name: by a hard link, or by a copy across filesystems.
 void LinkOrCopy(const fs::path& blob, const fs::path& target) {
   fs::create_directories(target.parent_path());
   if (::link(blob.c_str(), target.c_str()) == 0) return;
   fs::copy_file(blob, target);
 }
 
-// Identity of a model's file and of all files that are read beside it.
+// Identity of a model file and of all files that are read with it.
 std::string IdentityOf(const fs::path& model) {
   std::string identity;
   for (const fs::path& part : FilesOfModel(model)) {
@@ -79,13 +79,13 @@ class Attempt {
   void NoteModels(const std::vector<std::string>& names);
   void RequireModelsUnchanged() const;
   bool ServeFromCache();
-  // Returns true if the job was put back because a running job does equal work.
+  // Returns true if the job was requeued because a running job does equal work.
   bool JoinEqual();
   void Compute();
   void Publish(const StageOutput& output);
   void HandleError(const JobError& found);
   JobError OutOfMemory(const std::exception& e) const;
-  // Writes the end of an attempt that was told to stop; false when there was no such order.
+  // Stores the end of an attempt that was asked to stop; returns false if it was not.
   void ReportEnd(WorkerStore& store, StopReason reason, const JobError& error);
   [[noreturn]] void GiveUp(StopReason reason);
   void LogEnd(const char* how);
@@ -102,7 +102,7 @@ class Attempt {
     std::string identity;
     std::string digests;
   };
-  std::map<std::string, ModelFile> models_;  // those that the spec names
+  std::map<std::string, ModelFile> models_;  // models named in the spec
   LeaseKeeper keeper_;
   BlobCheckpoints checkpoints_;
 };
@@ -113,7 +113,7 @@ void Attempt::Run() {
     Prepare();
     if (!ServeFromCache() && !JoinEqual()) Compute();
   } catch (const Error& e) {
-    // Libraries' exceptions become internal errors with their text.
+    // Exceptions of libraries become internal errors with their text.
     if (e.code() == ErrorCode::kInternal && IsOutOfMemory(e)) {
       HandleError(OutOfMemory(e));
     } else {
@@ -168,7 +168,7 @@ void Attempt::Prepare() {
   }
   int additional_key_views = 0;
   for (const JobRecord& input : context_.store.GetInputs(job_.id)) {
-    // Their artifacts have the names of the first key view's.
+    // Their artifacts have the same names as those of the first key view.
     std::string folder;
     if (ColorsAdditionalKeyView(ParseSpec(input.spec, input.name))) {
       folder = fmt::format("{}{}/", artifact::kKeyViews, ++additional_key_views);
@@ -178,7 +178,7 @@ void Attempt::Prepare() {
       if (!input_artifacts_.emplace(artifact.name, artifact).second) continue;
       const fs::path path = scratch_ / "inputs" / artifact.name;
       LinkOrCopy(context_.blobs.Fetch(artifact.digest.sha256), path);
-      // What was drawn in place of photos lies where photos do.
+      // Rendered views are stored in place of photos.
       if (artifact.name.starts_with(artifact::kGivenViews)) {
         LinkOrCopy(path, run_.scene_folder / artifact.name);
       }
@@ -196,14 +196,14 @@ void Attempt::Prepare() {
   const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
   if (part.bytes.empty()) return;
-  // Keyed by project: a project must not learn of equal work of others.
+  // The key includes the project, which must not learn of equal work of others.
   std::string material =
       context_.code_version + '\n' + job_.project + '\n' + Sha256Hex(manifest) + '\n';
   for (const auto& [name, artifact] : input_artifacts_) {
     material += name + '\n' + artifact.digest.sha256 + '\n';
   }
-  // Names say nothing of what they stand for: other weights under an old name are other work. What
-  // a backend computes cannot be known; its address stands for it.
+  // The key includes digests of weights, because a name may get new ones, and addresses of
+  // backends, whose computation is unknown.
   for (const std::string& name : part.models) material += models_.at(name).digests;
   for (const std::string& name : part.backends) {
     const auto address = context_.models.backends.find(name);
@@ -216,18 +216,19 @@ void Attempt::NoteModels(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
     const auto file = context_.models.files.find(name);
     if (file == context_.models.files.end()) {
-      throw Error(ErrorCode::kFailedPrecondition,
-                  "{} needs the model '{}', which this server does not have (it has: {}); start it "
-                  "with --model {}=FILE and retry the job",
-                  job_.kind,
-                  name,
-                  NamesOf(context_.models.files),
-                  name);
+      throw Error(
+          ErrorCode::kFailedPrecondition,
+          "{} needs the model '{}', which this server does not have (it has: {}); start the server "
+          "with --model {}=FILE and retry the job",
+          job_.kind,
+          name,
+          NamesOf(context_.models.files),
+          name);
     }
     std::error_code none;
     if (!fs::is_regular_file(file->second, none)) {
       throw Error(ErrorCode::kFailedPrecondition,
-                  "the file of the model '{}' ({}) is gone; put it back and retry the job",
+                  "the file of the model '{}' ({}) is missing; restore it and retry the job",
                   name,
                   file->second.string());
     }
@@ -240,7 +241,7 @@ void Attempt::NoteModels(const std::vector<std::string>& names) {
   }
 }
 
-// The stage has read the files some time after their digests were taken.
+// The stage may have read the files after a change.
 void Attempt::RequireModelsUnchanged() const {
   for (const auto& [name, model] : models_) {
     if (IdentityOf(model.file) == model.identity) continue;
@@ -275,7 +276,7 @@ bool Attempt::JoinEqual() {
   if (run_.spec.skip_cache() || stage_key_.empty()) return false;
   if (!context_.store.JoinEqual(keeper_.lease(), stage_key_)) return false;
   keeper_.Stop();
-  spdlog::info("{} waits for a job that does the same", tag_);
+  spdlog::info("{} waits for a job that does equal work", tag_);
   return true;
 }
 
@@ -301,7 +302,7 @@ void Attempt::Publish(const StageOutput& output) {
     std::error_code error;
     if (!IsSafeRelativePath(name) || !fs::is_regular_file(fs::symlink_status(file, error))) {
       throw Error(ErrorCode::kInternal,
-                  "{} names the result '{}', which is not a file in its output folder",
+                  "{} lists the result '{}', which is not a file in its output folder",
                   job_.kind,
                   name);
     }
@@ -309,14 +310,15 @@ void Attempt::Publish(const StageOutput& output) {
     publication.artifacts.push_back({name, context_.blobs.PutFile(file), MediaTypeOf(name)});
     if (keeper_.stop_reason() == StopReason::kLeaseLost) keeper_.token().ThrowIfCancelled();
   }
-  // Touched, so that no sweep takes them before they are named; and there, whoever made them.
+  // Touched, so that no sweep removes them before they are named.
   for (const ArtifactRecord& artifact : publication.artifacts) {
     if (context_.blobs.Touch(artifact.digest)) continue;
-    throw ServiceError(ErrorCode::kUnavailable,
-                       ErrorReason::kBlobMissing,
-                       "the result {} of {} is gone from the blob store before it was published",
-                       artifact.name,
-                       job_.kind);
+    throw ServiceError(
+        ErrorCode::kUnavailable,
+        ErrorReason::kBlobMissing,
+        "the result {} of {} disappeared from the blob store before it was published",
+        artifact.name,
+        job_.kind);
   }
   publication.stage_key = stage_key_;
   publication.usage = keeper_.Usage();
@@ -345,7 +347,7 @@ void Attempt::HandleError(const JobError& found) {
   keeper_.Stop();
   // The stage may learn of a lost lease (saving a checkpoint) before the heartbeat does.
   const bool lost = error.reason == ErrorReasonName(ErrorReason::kLeaseLost);
-  // Room first: on a full disk the store could not even write that the job failed.
+  // Frees space first: on a full disk the store could not even record the failure.
   std::error_code ignored;
   fs::remove_all(scratch_, ignored);
   for (int tries_left = 2;; --tries_left) {
@@ -357,7 +359,7 @@ void Attempt::HandleError(const JobError& found) {
         std::this_thread::sleep_for(context_.timing.report_pause);
         continue;
       }
-      spdlog::error("{} cannot report its end ({}); its lease will run out", tag_, e.what());
+      spdlog::error("{} cannot store its outcome ({}); its lease will expire", tag_, e.what());
       return;
     }
   }
@@ -391,8 +393,8 @@ void Attempt::ReportEnd(WorkerStore& store, StopReason reason, const JobError& e
   LogEnd("failed");
 }
 
-// The stage does not react to the token: end the attempt in the store, then the process, because
-// the thread that hangs cannot be ended alone.
+// The stage ignores the token: ends the attempt in the store, then the process, because a hanging
+// thread cannot be ended alone.
 void Attempt::GiveUp(StopReason reason) {
   try {
     ReportEnd(context_.heartbeat_store, reason, {});
@@ -410,7 +412,7 @@ void ReturnJob(WorkerStore& store, const JobRecord& job) {
   try {
     store.Release({job.id, job.lease_epoch}, job.usage);
   } catch (const std::exception& e) {
-    spdlog::error("{} cannot be given back; its lease will run out: {}", AttemptTag(job), e.what());
+    spdlog::error("{} cannot be requeued; its lease will expire: {}", AttemptTag(job), e.what());
   }
 }
 
@@ -419,7 +421,7 @@ void RunAttempt(const AttemptContext& context, const JobRecord& job, bool shares
     Attempt attempt(context, job, shares_process);
     attempt.Run();
   } catch (const std::exception& e) {
-    // It was not begun, or its end could not be told: not the job's fault, and no attempt.
+    // The attempt did not start or its end could not be stored: not a failure of the job.
     spdlog::error("{} could not be run here: {}", AttemptTag(job), e.what());
     std::this_thread::sleep_for(context.timing.report_pause);
     ReturnJob(context.store, job);

@@ -1,5 +1,5 @@
-// One attempt at one job, from claim to publication: scratch folder, inputs, stage cache, the stage
-// itself, and what becomes of its results or of its failure.
+// One attempt at a job, from claim to publication: scratch folder, inputs, stage cache, the stage,
+// and its results or failure. Not thread-safe.
 #pragma once
 
 #include <atomic>
@@ -17,15 +17,15 @@
 namespace color3d {
 
 struct AttemptContext {
-  WorkerStore& store;            // the worker's thread
-  WorkerStore& heartbeat_store;  // the heartbeat thread
+  WorkerStore& store;            // used by the thread of the worker
+  WorkerStore& heartbeat_store;  // used by the heartbeat thread
   BlobStore& blobs;
   StageRunner& runner;
   DataPaths paths;
   LeaseTiming timing;
   std::chrono::milliseconds checkpoint_interval{20'000};
   int threads = 1;
-  // Part of the stage cache's key: results of other code are not reused.
+  // Part of the key of the stage cache: results of other builds are not reused.
   std::string code_version;
   const UserModels& models;
   FileDigests& digests;
@@ -34,12 +34,11 @@ struct AttemptContext {
   std::function<void(const JobRecord&)> on_heartbeat;
 };
 
-// Back to the queue, without counting the attempt. Never throws.
+// Requeues the job without counting the attempt. Does not throw.
 void GiveBack(WorkerStore& store, const JobRecord& job);
 
-// Never throws: whatever happens is written to the store, or, when that is impossible, left to the
-// lease's end.
-// `shares_process`: other attempts run in it, too; peak memory is then that of all together.
+// Does not throw: the outcome is stored or, if that fails, left to the end of the lease.
+// `shares_process`: other attempts run in this process; peak memory is then that of all of them.
 void RunAttempt(const AttemptContext& context, const JobRecord& job, bool shares_process = false);
 
 }  // namespace color3d

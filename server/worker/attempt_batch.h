@@ -1,7 +1,6 @@
-// Attempts that run in one worker at once, each on a thread of its own with its own lease,
-// heartbeats, checkpoints and cancellation. One of them can fail, be cancelled or lose its lease
-// without the others noticing; only the end of the process ends them all, and then each goes on
-// from its checkpoint. Used by the worker's thread.
+// Concurrent attempts of one worker, each on its own thread with its own lease, heartbeats,
+// checkpoints and cancellation. A failure, cancellation or lost lease of one does not affect the
+// others; if the process ends, each resumes from its checkpoint. Not thread-safe.
 #pragma once
 
 #include <list>
@@ -15,12 +14,12 @@ namespace color3d {
 class AttemptBatch {
  public:
   explicit AttemptBatch(const AttemptContext& context) : context_(context) {}
-  // Waits for all.
+  // Waits for all attempts.
   ~AttemptBatch();
 
   int size() const { return static_cast<int>(running_.size()); }
   void Start(const JobRecord& job);
-  // Waits until an attempt has ended or the time is over; returns how many have ended.
+  // Waits until an attempt has ended or the time is over; returns the number of ended attempts.
   int Reap(std::chrono::milliseconds timeout);
 
  private:

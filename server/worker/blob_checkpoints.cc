@@ -23,7 +23,7 @@ std::optional<std::filesystem::path> BlobCheckpoints::Newest() {
   try {
     return blobs_.Fetch(newest_->sha256);
   } catch (const Error& e) {
-    spdlog::warn("{} the checkpoint is gone, starting afresh: {}", tag_, e.what());
+    spdlog::warn("{} the checkpoint is missing, starting over: {}", tag_, e.what());
     return std::nullopt;
   }
 }
@@ -71,7 +71,7 @@ void BlobCheckpoints::RemoveOwn(const StoredBlob& blob) {
   if (!store_.IsReferenced(blob.digest.sha256)) blobs_.RemoveIfUntouched(blob);
 }
 
-// One that an earlier attempt stored goes with the sweep.
+// The sweep removes checkpoints of earlier attempts.
 void BlobCheckpoints::RemoveNewest() {
   if (own_) RemoveOwn(*own_);
   own_.reset();

@@ -1,5 +1,5 @@
-// Checkpoints of a running job as blobs, named by a fenced update of the job's row. Only the newest
-// is kept. Used by the stage's thread.
+// Checkpoints of a running job as blobs, recorded in the row of the job under its lease. Keeps only
+// the newest. Not thread-safe.
 #pragma once
 
 #include <chrono>
@@ -26,15 +26,14 @@ class BlobCheckpoints : public CheckpointStore {
   void Save(const std::string& state) override;
   bool LoadTo(const std::filesystem::path& file) override;
   void SaveFile(const std::filesystem::path& file) override;
-  // After the job was published: its checkpoint is of no more use.
+  // Removes the checkpoint. Called after the job was published.
   void RemoveNewest();
 
  private:
   std::optional<std::filesystem::path> Newest();
-  // Puts the blob and makes it the checkpoint.
+  // Stores the blob and makes it the checkpoint.
   void Replace(const FileDigest& digest, const std::function<void()>& put);
-  // Removes what this attempt has stored, unless somebody else counts on the same bytes: he may
-  // name them at any time.
+  // Removes a blob that this attempt has stored, unless others use the same bytes.
   void RemoveOwn(const StoredBlob& blob);
 
   WorkerStore& store_;
@@ -43,7 +42,7 @@ class BlobCheckpoints : public CheckpointStore {
   const std::string tag_;  // of log lines
   CheckpointPace pace_;
   std::optional<FileDigest> newest_;
-  // The newest as it was stored, where nobody had stored its bytes before.
+  // The newest, if its bytes were not stored before.
   std::optional<StoredBlob> own_;
 };
 

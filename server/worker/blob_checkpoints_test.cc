@@ -1,4 +1,4 @@
-// Checkpoints of several attempts that may be the same bytes.
+// Checkpoints of several attempts, possibly with equal bytes.
 #include "server/worker/blob_checkpoints.h"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ class BlobCheckpointsTest : public JobStoreTest {
   FileBlobStore blobs_{scratch_.path() / "blobs", {0}};
 };
 
-TEST_F(BlobCheckpointsTest, OnlyTheNewestIsKept) {
+TEST_F(BlobCheckpointsTest, KeepsOnlyNewestCheckpoint) {
   auto checkpoints = Of(Running());
   checkpoints.Save("one");
   checkpoints.Save("two");
@@ -38,8 +38,8 @@ TEST_F(BlobCheckpointsTest, OnlyTheNewestIsKept) {
   EXPECT_TRUE(IsThere("three")) << "the job's row names it still";
 }
 
-// Another worker has stored the same bytes and is about to name them.
-TEST_F(BlobCheckpointsTest, KeepsABlobThatAnotherJobIsAboutToName) {
+// Another worker has stored the same bytes and will name them.
+TEST_F(BlobCheckpointsTest, KeepsBlobThatOtherJobTouched) {
   auto checkpoints = Of(Running());
   checkpoints.Save("equal");
   const FileDigest other = blobs_.PutBytes("equal");  // found there, and touched
@@ -50,7 +50,7 @@ TEST_F(BlobCheckpointsTest, KeepsABlobThatAnotherJobIsAboutToName) {
   EXPECT_EQ(Of(store_->GetJob(another.name)).Load(), "equal");
 }
 
-TEST_F(BlobCheckpointsTest, KeepsABlobThatAnotherJobStoredBefore) {
+TEST_F(BlobCheckpointsTest, KeepsBlobStoredByOtherJob) {
   blobs_.PutBytes("equal");
   auto checkpoints = Of(Running());
   checkpoints.Save("equal");

@@ -1,5 +1,5 @@
-// When a running job's next checkpoint is worth its cost. By the caller's clock, used from one
-// thread at a time.
+// Decides when the next checkpoint of a job is worth its cost, by the caller's clock. Not
+// thread-safe.
 #pragma once
 
 #include <algorithm>
@@ -12,13 +12,13 @@ class CheckpointPace {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  // `interval`: between checkpoints, at least; 0: each that can be saved is.
+  // `interval`: minimum time between checkpoints; 0: saves at each opportunity.
   CheckpointPace(std::chrono::milliseconds interval, Time now)
       : interval_(interval), last_save_(now) {}
 
-  // Where it is time, saving begins now.
+  // Returns true if it is time; saving then begins now.
   bool IsDue(Time now) {
-    // Some states grow with what is done, and are saved as a whole.
+    // Some states grow with progress and are saved as a whole.
     const std::chrono::nanoseconds pause =
         interval_.count() > 0
             ? std::max<std::chrono::nanoseconds>(interval_, kWorkPerSaving * last_took_)
@@ -34,7 +34,7 @@ class CheckpointPace {
   }
 
  private:
-  static constexpr int kWorkPerSaving = 20;  // so saving takes a twentieth of the time at most
+  static constexpr int kWorkPerSaving = 20;  // saving takes at most a twentieth of the time
 
   const std::chrono::milliseconds interval_;
   Time last_save_;

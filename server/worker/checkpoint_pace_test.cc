@@ -8,8 +8,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-// A checkpoint is saved whenever it is time; what is saved takes longer and longer.
-TEST(CheckpointPace, LargeCheckpointsTakeATwentiethOfTheTime) {
+// Checkpoints are saved as soon as possible; each takes longer than the one before.
+TEST(CheckpointPace, LargeCheckpointsTakeTwentiethOfTime) {
   const CheckpointPace::Time begin{};
   CheckpointPace::Time now = begin;
   CheckpointPace pace(seconds(20), now);
@@ -27,7 +27,7 @@ TEST(CheckpointPace, LargeCheckpointsTakeATwentiethOfTheTime) {
   EXPECT_LT(20 * saving, now - begin);
 }
 
-TEST(CheckpointPace, CheapCheckpointsKeepTheInterval) {
+TEST(CheckpointPace, CheapCheckpointsKeepInterval) {
   const CheckpointPace::Time begin{};
   CheckpointPace pace(seconds(20), begin);
   EXPECT_FALSE(pace.IsDue(begin + seconds(19)));
@@ -40,7 +40,7 @@ TEST(CheckpointPace, CheapCheckpointsKeepTheInterval) {
   EXPECT_TRUE(pace.IsDue(begin + seconds(43 + 59)));
 }
 
-TEST(CheckpointPace, WithoutAnIntervalEachIsSaved) {
+TEST(CheckpointPace, SavesEachWithoutInterval) {
   const CheckpointPace::Time begin{};
   CheckpointPace pace(milliseconds(0), begin);
   EXPECT_TRUE(pace.IsDue(begin));

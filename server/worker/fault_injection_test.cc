@@ -1,6 +1,6 @@
-// A scripted life of a photo that is uploaded and of jobs that read it, one after another, joined,
-// cancelled and drained, in which the nth call of the stores fails, before or after it has had its
-// effect, for every n: whatever it is, every job ends, and each effect is there once and whole.
+// Scripted scenario of an upload and of jobs that read it, in sequence, joined, cancelled and
+// drained. The nth call of the stores fails, before or after its effect, for every n; nevertheless
+// all jobs end and each effect is complete and happens once.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ using testing::Faults;
 
 constexpr int kSteps = 3;
 
-// The first result is gone as soon as it was put: somebody cleared the disk.
+// Loses the first stored result, like a disk that was cleared.
 class ForgetfulBlobs : public FileBlobStore {
  public:
   explicit ForgetfulBlobs(const fs::path& folder) : FileBlobStore(folder, {0}) {}
@@ -43,7 +43,7 @@ class ForgetfulBlobs : public FileBlobStore {
   bool forgot_ = false;
 };
 
-// Steps with a checkpoint after each; the result tells every step once.
+// Runs steps with a checkpoint after each; the result lists each step once.
 class SteppingRunner : public StageRunner {
  public:
   StageOutput Run(const StageRun& run,
@@ -74,11 +74,11 @@ bool WaitFor(const std::function<bool()>& condition) {
   return condition();
 }
 
-// What becomes of a job is told by its seed.
+// The seed of a job selects its scenario.
 constexpr uint64_t kPlain = 1;  // two submissions: one joins the other
 constexpr uint64_t kDrained = 2, kCancelled = 3, kBatched = 4;
 
-// A data folder in which jobs live from their submission to their end.
+// Data folder with jobs from submission to end.
 class World {
  public:
   World(Faults& faults, Faults& of_heartbeats)
@@ -98,7 +98,7 @@ class World {
 
   SteppingRunner& runner() { return runner_; }
 
-  // As a client does: until it has succeeded.
+  // Retries like a client until success.
   void UploadPhoto() {
     const std::string photo = "photo";
     const UploadName name{"upload", {Sha256Hex(photo), static_cast<int64_t>(photo.size())}};
@@ -121,7 +121,7 @@ class World {
     store_.ActivateScene(scene.name, CaptureLayout::kPhotos, 1, {});
   }
 
-  // A job that is submitted alone, or with one that it reads.
+  // Submits a job alone or with an input job.
   void Submit(uint64_t seed, int priority, bool with_input) {
     NewGraph graph;
     graph.scene = kScene;
@@ -141,7 +141,7 @@ class World {
     roots_.push_back(store_.CreateGraph(graph, {}, 100).name);
   }
 
-  // What a worker's loop does, until all jobs have ended.
+  // Runs jobs like a worker loop until all have ended.
   void Work(bool forgetful = false) {
     forgetful_ = forgetful;
     const std::vector<int64_t> ids = store_.ResolveWatch(roots_);
@@ -159,10 +159,10 @@ class World {
     Try([&] { failing_store_.RemoveWorker("worker"); });
   }
 
-  // By what has become of them, with their children.
+  // Final states of jobs and their children.
   std::vector<JobRecord> Jobs() { return store_.LoadJobs(store_.ResolveWatch(roots_), {}).jobs; }
 
-  // What must hold whatever has failed.
+  // Invariants after any failure.
   void CheckWhole() {
     const FileBlobStore blobs(paths_.Blobs(), {0});
     EXPECT_TRUE(store_.AllFinished(store_.ResolveWatch(roots_))) << "a job never ends";
@@ -180,19 +180,19 @@ class World {
     EXPECT_TRUE(fs::is_empty(paths_.Scratch()));
     EXPECT_TRUE(fs::is_empty(paths_.Uploads()));
     SqliteDatabase db(paths_.Store(), SqliteAccess::kRead);
-    SqliteStatement wins(db.handle(),
+    SqliteStatement wins(db,
                          "select count(*), count(distinct job_id) from job_attempt where "
                          "outcome='SUCCEEDED'");
     ASSERT_TRUE(wins.Step());
     EXPECT_EQ(wins.Int(0), wins.Int(1)) << "a job succeeded twice";
-    SqliteStatement open(db.handle(), "select count(*) from job_attempt where end_ms=0");
+    SqliteStatement open(db, "select count(*) from job_attempt where end_ms=0");
     ASSERT_TRUE(open.Step());
     EXPECT_EQ(open.Int(0), 0) << "an attempt never ended";
   }
 
   bool HasJoined() const {
     SqliteDatabase db(paths_.Store(), SqliteAccess::kRead);
-    SqliteStatement joined(db.handle(), "select 1 from job_attempt where outcome='JOINED'");
+    SqliteStatement joined(db, "select 1 from job_attempt where outcome='JOINED'");
     return joined.Step();
   }
 
@@ -243,7 +243,7 @@ class World {
   void OnStep(const StageRun& run, const CancellationToken& cancel) {
     const uint64_t seed = run.spec.seed();
     if (seed == kPlain && !std::exchange(met_, true)) {
-      if (const auto twin = Claim()) Attempt(*twin);  // another worker's
+      if (const auto twin = Claim()) Attempt(*twin);  // of another worker
     } else if (seed == kDrained && !std::exchange(drained_, true)) {
       draining_ = true;
       EXPECT_TRUE(WaitFor([&] { return cancel.IsCancelled(); }));
@@ -298,7 +298,7 @@ JobState EndOf(const JobRecord& job) {
   return is_cancelled ? JobState::kCancelled : JobState::kSucceeded;
 }
 
-TEST(FaultInjectionTest, EveryCallIsPartOfTheLife) {
+TEST(FaultInjectionTest, ScenarioMakesEveryCall) {
   EXPECT_THAT(Live(0, false, ErrorCode::kUnavailable).seen,
               ::testing::IsSupersetOf({"Adopt",
                                        "Claim",
@@ -325,7 +325,7 @@ TEST(FaultInjectionTest, EveryCallIsPartOfTheLife) {
                                        "UpdateWorker"}));
 }
 
-TEST(FaultInjectionTest, TransientFailureCostsNoJob) {
+TEST(FaultInjectionTest, TransientFailureFailsNoJob) {
   const Life undisturbed = Live(0, false, ErrorCode::kUnavailable);
   for (const JobRecord& job : undisturbed.jobs) {
     EXPECT_EQ(job.state, EndOf(job)) << job.kind;
@@ -345,7 +345,7 @@ TEST(FaultInjectionTest, TransientFailureCostsNoJob) {
   }
 }
 
-TEST(FaultInjectionTest, DoesNotPublishAMissingResult) {
+TEST(FaultInjectionTest, DoesNotPublishMissingResult) {
   Faults none(0, false, ErrorCode::kUnavailable);
   World world(none, none);
   world.UploadPhoto();
@@ -358,7 +358,7 @@ TEST(FaultInjectionTest, DoesNotPublishAMissingResult) {
   }
 }
 
-TEST(FaultInjectionTest, PermanentFailureEndsTheJobWithItsReason) {
+TEST(FaultInjectionTest, PermanentFailureEndsJobWithReason) {
   const int calls = Live(0, false, ErrorCode::kInternal).calls;
   for (const bool after : {false, true}) {
     for (int n = 1; n <= calls; ++n) {
@@ -368,7 +368,7 @@ TEST(FaultInjectionTest, PermanentFailureEndsTheJobWithItsReason) {
   }
 }
 
-// Each step lasts for two heartbeats, or looks of the heartbeat's thread.
+// Each step lasts for two heartbeats or checks of the heartbeat thread.
 TEST(FaultInjectionTest, FailedHeartbeatsCostAtMostOneAttempt) {
   std::set<std::string> failed;
   for (const ErrorCode code :

@@ -67,7 +67,7 @@ void LeaseKeeper::OnProgress(int64_t step, int64_t total_steps, const std::strin
   progress_.step = step;
   progress_.total_steps = total_steps;
   last_progress_ = SteadyClock::now();
-  // For the job's own log; a message may change with every step.
+  // For the log of the job; messages may change with every step.
   if (message != progress_.message && last_progress_ - last_said_ >= std::chrono::seconds(1)) {
     last_said_ = last_progress_;
     spdlog::debug("{} {}", tag_, message);
@@ -112,7 +112,7 @@ void LeaseKeeper::StopStage(StopReason reason) {
   token_.Cancel();
 }
 
-// Stores progress and extends the lease, or at least looks whether the user wants it cancelled.
+// Stores progress and extends the lease, or only checks for a cancellation request.
 void LeaseKeeper::SendHeartbeat() {
   ProgressRecord progress;
   JobUsage usage;
@@ -165,7 +165,7 @@ void LeaseKeeper::Loop() {
     }
     SendHeartbeat();
     const auto now = SteadyClock::now();
-    // A worker that cannot reach the store stops before somebody else may take its job over.
+    // A worker that cannot reach the store stops before another worker can claim its job.
     if (SteadyClock::now() - last_success_ > timing_.lease * 2 / 3) {
       StopStage(StopReason::kLeaseLost);
     }

@@ -1,5 +1,5 @@
-// Keeps one running job alive: heartbeats from a thread of its own, coalesced progress, and every
-// reason to stop early (cancelled by a user, lease lost, drain, stuck) turned into one token.
+// Keeps the lease of a running job: sends heartbeats from its own thread, coalesces progress, and
+// cancels one token for each reason to stop (cancelled by a user, lease lost, drain, stuck).
 #pragma once
 
 #include <atomic>
@@ -19,18 +19,18 @@ namespace color3d {
 struct LeaseTiming {
   std::chrono::milliseconds lease{60'000};
   std::chrono::milliseconds heartbeat{10'000};
-  // Progress reaches the store at most this often.
+  // Minimum time between updates of progress in the store.
   std::chrono::milliseconds progress{250};
-  // Without any progress for this long the stage counts as stuck.
+  // A stage without progress for this time counts as stuck.
   std::chrono::milliseconds stuck{15 * 60'000};
-  // A stage that has not stopped this long after it was told to is given up with its process.
+  // The process is ended if a stage has not stopped this long after the request.
   std::chrono::milliseconds stop_grace{60'000};
   std::chrono::milliseconds drain_grace{15'000};
-  // Between attempts to tell the store how it ended.
+  // Pause between attempts to store the outcome.
   std::chrono::milliseconds report_pause{1'000};
 };
 
-// "[job=jobs/... attempt=1]", the beginning of every log line about the attempt.
+// Returns "[job=jobs/... attempt=1]", the prefix of log lines about the attempt.
 std::string AttemptTag(const JobRecord& job);
 
 enum class StopReason { kNone, kCancelled, kLeaseLost, kDraining, kStuck };
@@ -38,10 +38,9 @@ enum class StopReason { kNone, kCancelled, kLeaseLost, kDraining, kStuck };
 // Thread-safe. The stage reports progress here from its own threads.
 class LeaseKeeper : public ProgressObserver {
  public:
-  // `store` is used from the heartbeat thread: give it a connection of its own. `draining` turns
-  // true when the worker must stop. `on_heartbeat` is called there after each full heartbeat.
-  // `give_up` is called on the heartbeat thread when the stage does
-  // not stop in time, and must not return (the process ends).
+  // `store` is used by the heartbeat thread and needs its own connection. `draining` becomes true
+  // when the worker must stop. The heartbeat thread calls `on_heartbeat` after each full heartbeat,
+  // and `give_up` if the stage does not stop in time; `give_up` must end the process.
   LeaseKeeper(WorkerStore& store,
               const JobRecord& job,
               const LeaseTiming& timing,
@@ -54,7 +53,7 @@ class LeaseKeeper : public ProgressObserver {
   StopReason stop_reason() const { return reason_.load(); }
   // Ends the heartbeats; the caller then publishes or fails the job.
   void Stop();
-  // Seconds over all attempts, warnings and peak memory so far.
+  // Returns seconds over all attempts, warnings and peak memory so far.
   JobUsage Usage() const;
   Lease lease() const { return lease_; }
 
@@ -91,7 +90,7 @@ class LeaseKeeper : public ProgressObserver {
   std::vector<std::string> warnings_ COLOR3D_GUARDED_BY(mutex_);
   SteadyClock::time_point last_progress_ COLOR3D_GUARDED_BY(mutex_) = start_;
   SteadyClock::time_point last_said_ COLOR3D_GUARDED_BY(mutex_);
-  // Where the present run of steps began, for the expected time to its end.
+  // Begin of the present run of steps, for the estimated remaining time.
   int64_t eta_base_step_ COLOR3D_GUARDED_BY(mutex_) = 0;
   SteadyClock::time_point eta_base_time_ COLOR3D_GUARDED_BY(mutex_) = start_;
 

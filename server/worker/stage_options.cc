@@ -18,7 +18,7 @@ ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precisi
   }
 }
 
-// Throws when a job was planned by a version whose stages coloured additional key views themselves.
+// Throws if the job was planned by a version whose stages coloured additional key views themselves.
 void RequireColoredBefore(const v1::FurtherKeyView& key) {
   if (!key.has_color()) return;
   throw Error(ErrorCode::kFailedPrecondition,

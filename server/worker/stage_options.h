@@ -1,5 +1,5 @@
-// JobSpec messages -> option structs of the method library. Unset fields keep the struct's default;
-// a value out of range is refused later by the struct's own Validate().
+// Converts JobSpec messages to option structs of the method library. Unset fields keep the default
+// of the struct; Validate() of the struct rejects values out of range. Stateless.
 #pragma once
 
 #include "color3d/v1/stage.pb.h"
@@ -11,14 +11,14 @@ ImportOptions ImportOptionsFrom(const v1::ImportSceneSpec& spec);
 SplatViewOptions SplatViewOptionsFrom(const v1::ImportSceneSpec& spec);
 FilmOptions FilmOptionsFrom(const v1::ImportSceneSpec& spec);
 SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec);
-// Source and file are set by the caller, which holds the blobs.
+// The caller, which has the blobs, sets source and file.
 HintOptions HintOptionsFrom(const v1::ColorizeKeyViewSpec& spec);
 AugmentationOptions AugmentationOptionsFrom(const v1::GenerateAugmentationsSpec& spec);
 ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t seed);
-// Throws Error{kFailedPrecondition} for a job of a version that planned no jobs for additional key
+// Throws Error{kFailedPrecondition} for jobs of a version that did not plan jobs for additional key
 // views.
 CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec);
-// Corrections without a range of time are set by the caller, which holds the blobs. Throws as
+// The caller, which has the blobs, sets corrections without a time range. Throws like
 // CarryOptionsFrom.
 CorrectColorsOptions CorrectOptionsFrom(const v1::CorrectColorsSpec& spec);
 GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uint64_t seed);
@@ -26,7 +26,7 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed);
 ExportOptions ExportOptionsFrom(const v1::ExportSpec& spec);
 RenderOptions RenderOptionsFrom(const v1::RenderSpec& spec);
 
-// Working size when a single-stage job does not say.
+// Default working size of a single-stage job.
 inline constexpr int kDefaultMaxSidePx = 500;
 
 }  // namespace color3d

@@ -10,7 +10,9 @@
 #include <memory>
 
 #include "core/base/error.h"
+#include "core/catalogue/stages.h"
 #include "proto/option_text.h"
+#include "server/planning/job_spec.h"
 #include "server/planning/presets.h"
 #include "server/planning/spec_check.h"
 
@@ -38,7 +40,7 @@ TEST(CarryOptionsFromTest, NamesAdditionalKeyViewsInOrder) {
   EXPECT_EQ(CarryOptionsFrom(spec).additional_key_views, (std::vector<std::string>{"b", "a"}));
 }
 
-// As planned before additional key views had jobs of their own.
+// Planned before additional key views had their own jobs.
 TEST(CarryOptionsFromTest, RefusesJobsOfEarlierVersions) {
   v1::FurtherKeyView key;
   key.set_view("b");
@@ -59,7 +61,37 @@ TEST(CarryOptionsFromTest, RefusesJobsOfEarlierVersions) {
   EXPECT_FALSE(options.ranges[0].end_s);
 }
 
-TEST(ColorizerOptionsFromTest, UnsetFieldsKeepTheMethodsDefaults) {
+// The bytes of a queued carry_color job as an earlier version stored it: the additional key view
+// "b" is coloured automatically, by the stage itself.
+TEST(CarryOptionsFromTest, RefusesStoredJobOfVersionBefore) {
+  constexpr std::string_view kStored =
+      "\x0a\x0bscenes/fern"
+      "\x92\x01\x09"
+      "\x32\x07\x0a\x01"
+      "b"
+      "\x12\x02\x30\x01";
+  const v1::JobSpec spec = ParseSpec(std::string(kStored), "jobs/old");
+  try {
+    CarryOptionsFrom(spec.carry_color());
+    ADD_FAILURE() << "the job was accepted";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ErrorCode::kFailedPrecondition) << "not tried again";
+    EXPECT_STREQ(e.what(),
+                 "an earlier version of the server planned this job without a job that colours the "
+                 "additional key view b; submit it again");
+  }
+}
+
+TEST(StagesTest, CatalogueHasEveryStageOfTheApi) {
+  const auto* stages = v1::JobSpec::descriptor()->FindOneofByName("stage");
+  for (int i = 0; i < stages->field_count(); ++i) {
+    const std::string& name = stages->field(i)->name();
+    if (name == "reconstruct_dense") continue;  // not built
+    EXPECT_NE(FindStage(name), nullptr) << name;
+  }
+}
+
+TEST(ColorizerOptionsFromTest, UnsetFieldsKeepDefaults) {
   ColorizerOptions defaults;
   defaults.seed = 17;
   EXPECT_EQ(ColorizerOptionsFrom(v1::PersonalizeSpec(), 17), defaults);
@@ -73,7 +105,7 @@ TEST(ColorizerOptionsFromTest, PaperRecipeCrops320PxUnlessGiven) {
   EXPECT_EQ(ColorizerOptionsFrom(spec, 1).crop_px, 128);
 }
 
-TEST(ColorizerOptionsFromTest, WhatIsSetArrives) {
+TEST(ColorizerOptionsFromTest, ConvertsSetFields) {
   v1::PersonalizeSpec spec;
   spec.set_precision(v1::PersonalizeSpec::PRECISION_FLOAT32);
   spec.set_average_decay(0.0);
@@ -88,10 +120,10 @@ TEST(ColorizerOptionsFromTest, WhatIsSetArrives) {
   EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kAuto);
 }
 
-// What the method makes of a stage's options.
+// Conversion and validation of the options of a stage in the method library.
 struct Method {
   std::function<void(const Message&)> validate;
-  std::function<bool(const Message&, const Message&)> same;  // two specs mean the same options
+  std::function<bool(const Message&, const Message&)> same;  // both specs give equal options
 };
 
 template <typename Spec, typename From>
@@ -102,7 +134,7 @@ Method MakeMethod(From from) {
           }};
 }
 
-// A working size, which some stages take beside their options.
+// Working size, which some stages take in addition to their options.
 struct MaxSide {
   int px;
   void Validate() const { CheckMaxSide(px); }
@@ -123,7 +155,7 @@ struct SizedGeometry {
   bool operator==(const SizedGeometry&) const = default;
 };
 
-// Photos, splats and films have options of their own.
+// Options of the import of photos, splats and films.
 struct ImportMethod {
   ImportOptions photos;
   SplatViewOptions splat;
@@ -136,7 +168,7 @@ struct ImportMethod {
   bool operator==(const ImportMethod&) const = default;
 };
 
-// By the stage's name in JobSpec. A stage that is missing here has no options of its own.
+// By the name of the stage in JobSpec; stages without options are omitted.
 const std::map<std::string, Method>& Methods() {
   static const std::map<std::string, Method> methods = {
       {"import_scene", MakeMethod<v1::ImportSceneSpec>([](const auto& s) {
@@ -192,7 +224,7 @@ void SetNumber(const FieldDescriptor& field, double value, Message* message) {
   }
 }
 
-// What the server's check and the method say to one number.
+// Answers of the server's check and of the method to one number.
 struct Verdict {
   bool server = true;
   bool method = true;
@@ -221,8 +253,8 @@ Verdict Try(const FieldDescriptor& stage,
   return verdict;
 }
 
-// Every number has a range, and the method's own Validate draws it where the proto does.
-TEST(OptionRanges, TheMethodTakesWhatTheServerTakesAndNothingElse) {
+// Every number has a range, which is equal in the proto and in Validate of the method.
+TEST(OptionRanges, AreEqualInServerAndMethod) {
   int ranges = 0;
   ForEachOption(
       [&](const FieldDescriptor& stage, const FieldDescriptor& field, const Method& method) {
@@ -249,12 +281,11 @@ TEST(OptionRanges, TheMethodTakesWhatTheServerTakesAndNothingElse) {
   EXPECT_GT(ranges, 30);
 }
 
-TEST(OptionDefaults, TheProtoTellsTheMethodsOwn) {
+TEST(OptionDefaults, AreThoseOfProto) {
   ForEachOption(
       [&](const FieldDescriptor& stage, const FieldDescriptor& field, const Method& method) {
         const std::string& value = InfoOf(&field).default_value();
-        if (value.empty() || field.name() == "skip")
-          return;  // skip: the planner's, not the method's
+        if (value.empty() || field.name() == "skip") return;  // skip: an option of the planner only
         SCOPED_TRACE(field.full_name());
         const Message& unset = *google::protobuf::MessageFactory::generated_factory()->GetPrototype(
             stage.message_type());
@@ -265,8 +296,8 @@ TEST(OptionDefaults, TheProtoTellsTheMethodsOwn) {
       });
 }
 
-// A user of the library gets what a user of the service gets.
-TEST(OptionDefaults, TheMethodsOwnAreThoseOfTheFastPreset) {
+// The defaults of library and service are equal.
+TEST(OptionDefaults, EqualFastPreset) {
   const v1::ColorizeSceneSpec fast = WithPreset({});
   EXPECT_EQ(GeometryOptionsFrom(fast.reconstruct_geometry(), 1), GeometryOptions());
   EXPECT_EQ(fast.reconstruct_geometry().max_side_px(), kDefaultMaxSidePx);

@@ -19,7 +19,7 @@ namespace {
 
 using v1::JobSpec;
 
-// A blob's file; empty when the spec does not name one.
+// File of a blob; empty if the spec names none.
 std::filesystem::path FetchIf(bool present, const v1::Digest& digest, BlobSource& blobs) {
   return present ? blobs.Fetch(digest.sha256()) : std::filesystem::path();
 }
@@ -128,7 +128,7 @@ RenderOptions MovieOptions(const v1::RenderSpec& spec, BlobSource& blobs) {
 }
 
 ColorizerOptions PersonalizeOptions(v1::PersonalizeSpec spec, const StageContext& context) {
-  // As a part of colorize_scene it has its size already.
+  // As part of colorize_scene it has its size already.
   if (!ReadScene(context).capture().is_reconstructed) TrainAtFrameSize(kDefaultMaxSidePx, &spec);
   return ColorizerOptionsFrom(spec, context.seed());
 }
@@ -173,7 +173,7 @@ class CoreStageRunner : public StageRunner {
     setup.batch = Batch(run.threads);
     setup.project = run.project;
     StageContext context(std::move(setup), recorder, recorder, cancel);
-    if (LeaveOutIdleStage(kind, context).empty()) RunStage(run, blobs, context);
+    if (SkipIdleStage(kind, context).empty()) RunStage(run, blobs, context);
     const auto points = recorder.points();
     if (!points.empty() && kind != kind::kColorizeScene) {
       context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(points));
@@ -182,7 +182,7 @@ class CoreStageRunner : public StageRunner {
   }
 
  private:
-  // The batch of all personalize jobs of this process; made by the first one.
+  // Batch of all personalize jobs of this process; created by the first one.
   SceneBatch* Batch(int threads) {
     const MutexLock lock(mutex_);
     if (!batch_) batch_ = std::make_unique<SceneBatch>(threads);
@@ -236,11 +236,12 @@ class CoreStageRunner : public StageRunner {
       case JobSpec::kColorizeScene:
         return RunReport(run.graph, context);
       case JobSpec::kPersonalizeScenes:
-        return;  // its jobs have done it all
-      default:
-        throw Error(
-            ErrorCode::kUnimplemented, "jobs of kind \"{}\" are not built yet", KindOf(spec));
-    }
+        return;  // all work is done by its children
+      case JobSpec::kReconstructDense:
+      case JobSpec::STAGE_NOT_SET:
+        break;
+    }  // no default: the compiler warns of a stage without a case
+    throw Error(ErrorCode::kUnimplemented, "jobs of kind \"{}\" are not built yet", KindOf(spec));
   }
 
   Mutex mutex_;

@@ -1,6 +1,6 @@
-// What the worker loop (leases, blobs, heartbeats) asks of the method library: the loop prepares
-// files, the runner turns the job's spec into one core stage and leaves its results as files. The
-// only folder of the server that links the method library is server/worker.
+// Interface of the method library to the worker loop (leases, blobs, heartbeats): the loop prepares
+// files, the runner runs the stage of the spec and writes its results to files. Only server/worker
+// links the method library.
 #pragma once
 
 #include <filesystem>
@@ -17,26 +17,26 @@
 
 namespace color3d {
 
-// Files by digest, for blobs that a spec names (key colour, truth).
+// Files of the blobs that a spec names (key colour, truth), by digest.
 class BlobSource {
  public:
   virtual ~BlobSource() = default;
-  // A read-only file with these bytes; valid while the stage runs. Throws Error{kNotFound}.
+  // Returns a read-only file with these bytes, valid while the stage runs. Throws Error{kNotFound}.
   virtual std::filesystem::path Fetch(const std::string& sha256) = 0;
 };
 
 struct StageRun {
   std::string job_name;  // "jobs/..."
   std::string trace;     // W3C trace id of the call that made the job; empty: none
-  std::string project;   // of the job's owner; scenes in a batch take turns by project
+  std::string project;   // project of the job; scenes of a batch take turns by project
   v1::JobSpec spec;
   std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only
-  // Artifacts of the jobs that this one depends on, by artifact name (read-only files).
+  // Artifacts of the input jobs by artifact name (read-only files).
   std::map<std::string, std::filesystem::path> inputs;
-  std::filesystem::path output_folder;   // empty; what the runner leaves here may be published
-  std::filesystem::path scratch_folder;  // empty; deleted afterwards
+  std::filesystem::path output_folder;   // initially empty; files here may be published
+  std::filesystem::path scratch_folder;  // initially empty; deleted afterwards
   std::filesystem::path cache_folder;    // shared by all jobs of the server; empty: none
-  std::vector<StageSummary> graph;       // the root job only: its children
+  std::vector<StageSummary> graph;       // root job only: its children
   int threads = 1;
   int attempt = 1;
   UserModels models;
@@ -50,8 +50,8 @@ struct StageOutput {
 class StageRunner {
  public:
   virtual ~StageRunner() = default;
-  // Runs one attempt. Throws Error; anything else that escapes is an internal error of ours. Called
-  // from several threads at once for jobs of stages that run in batch.
+  // Runs one attempt. Throws Error; other exceptions are internal errors. Called concurrently for
+  // jobs of batch stages.
   virtual StageOutput Run(const StageRun& run,
                           BlobSource& blobs,
                           CheckpointStore& checkpoints,
@@ -59,7 +59,7 @@ class StageRunner {
                           const CancellationToken& cancel) = 0;
 };
 
-// The real one (stage_runner.cc): every stage of core/stage.
+// Implemented in stage_runner.cc for all stages of core/stage.
 std::unique_ptr<StageRunner> MakeStageRunner();
 
 }  // namespace color3d

@@ -1,5 +1,4 @@
-// Paths in messages to users: names in a scene or job, never the paths of the server.
-// Pure, thread-safe.
+// Paths in messages to users: names in a scene or job, never paths of the server. Stateless.
 #pragma once
 
 #include <filesystem>
@@ -8,8 +7,8 @@
 
 namespace color3d {
 
-// `message` without the paths of these folders, which are absolute or as the server was given them,
-// before the names of files in them. A folder that contains another one comes after it.
+// Removes the paths of these folders before names of files in them from the message. Folders are
+// absolute or as given to the server. Requires: a folder comes before its parents.
 inline std::string WithoutFolders(std::string message,
                                   std::initializer_list<std::filesystem::path> folders) {
   for (const std::filesystem::path& folder : folders) {

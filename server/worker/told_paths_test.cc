@@ -5,7 +5,7 @@
 namespace color3d {
 namespace {
 
-TEST(ToldPaths, UsersSeeNamesInTheirSceneOnly) {
+TEST(ToldPaths, KeepOnlyNamesInScene) {
   const auto told = [](const char* message) {
     return WithoutFolders(message, {"/data/scratch/JOB-1/scene", "/data/scratch/JOB-1", "/data"});
   };

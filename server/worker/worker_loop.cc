@@ -18,10 +18,10 @@
 namespace color3d {
 namespace {
 
-// Left free before one more scene is taken in: decoder, optimiser, averages and activations.
+// Free memory required for another scene: decoder, optimiser, averages and activations.
 constexpr int64_t kSceneMemoryBytes = int64_t{512} << 20;
 
-// Empty for a damaged spec, too: the job's own attempt says so.
+// Also empty for a damaged spec, which the attempt reports.
 std::string EncoderOf(const JobRecord& job) {
   v1::JobSpec spec;
   spec.ParseFromString(job.spec);
@@ -66,12 +66,12 @@ class WorkerLoop {
   }
   void ReportSelf(WorkerStore& store, const std::string& job) const;
   bool ShouldRecycle() const;
-  // Claims and runs one job, or a batch of them; false when there was none.
+  // Claims and runs one job or a batch; returns false if there was none.
   bool Turn();
   void RunBatch(const JobRecord& first);
   // Returns true if another scene may join the `running` ones.
   bool HasRoom(int running) const;
-  // The next job of this kind and encoder; none when the queue has none or cannot be read now.
+  // Claims the next job of this kind and encoder; none if there is none or the queue is unreadable.
   std::optional<JobRecord> ClaimForBatch(const std::string& kind, const std::string& encoder);
 
   const WorkerOptions options_;
@@ -86,12 +86,12 @@ class WorkerLoop {
   int jobs_done_ = 0;
 };
 
-// For people, and for the supervisor, who sees that this process is alive. Nothing fails with it.
+// Reports the state for listings and to the supervisor. Errors are only logged.
 void WorkerLoop::ReportSelf(WorkerStore& store, const std::string& job) const {
   try {
     store.UpdateWorker({id_, ::getpid(), job, ResidentMemoryBytes(), 0});
   } catch (const Error& e) {
-    spdlog::warn("{} cannot say what it does: {}", id_, e.what());
+    spdlog::warn("{} cannot report its state: {}", id_, e.what());
   }
 }
 
@@ -99,8 +99,7 @@ bool WorkerLoop::ShouldRecycle() const {
   if (jobs_done_ == 0) return false;
   const int64_t memory = ResidentMemoryBytes();
   if (memory <= options_.recycle_memory_bytes && jobs_done_ < options_.recycle_jobs) return false;
-  spdlog::info(
-      "{} ends after {} jobs with {} MiB, to be started afresh", id_, jobs_done_, memory >> 20);
+  spdlog::info("{} ends after {} jobs with {} MiB, to be restarted", id_, jobs_done_, memory >> 20);
   return true;
 }
 
@@ -109,7 +108,7 @@ bool WorkerLoop::Turn() {
   if (!job) return false;
   ReportSelf(store_, job->name);
   const Stage* stage = FindStage(job->kind);
-  // A job that a worker was lost with may be what killed it: it runs alone.
+  // A job that has lost a worker may have killed it, so it runs alone.
   if (stage != nullptr && stage->runs_in_batch && options_.batch_scenes > 1 && job->attempt <= 1) {
     RunBatch(*job);
   } else {
@@ -132,13 +131,13 @@ std::optional<JobRecord> WorkerLoop::ClaimForBatch(const std::string& kind,
   try {
     return store_.ClaimForBatch(id_, options_.timing.lease.count(), kind, has_encoder);
   } catch (const Error& e) {
-    spdlog::warn("{} cannot look for more jobs of its batch: {}", id_, e.what());
+    spdlog::warn("{} cannot claim more jobs for its batch: {}", id_, e.what());
     return std::nullopt;
   }
 }
 
-// Continuous batching: scenes join while there is room, and each leaves when it is done. One joins
-// at a time between two looks, so that workers without work get their share of the queue.
+// Continuous batching: scenes join while there is room and leave when they are done. One joins per
+// round, so that idle workers get their share of the queue.
 void WorkerLoop::RunBatch(const JobRecord& first) {
   AttemptBatch batch(context_);
   batch.Start(first);

@@ -1,5 +1,4 @@
-// The worker loop with scripted stages, in this process: jobs that run together, and their separate
-// ends.
+// The worker loop with scripted stages in this process: concurrent jobs and their independent ends.
 #include "server/worker/worker_loop.h"
 
 #include <gtest/gtest.h>
@@ -26,7 +25,7 @@ namespace {
 
 constexpr uint64_t kPoison = 666;
 
-// Each attempt waits a while for others, so that what may run together does.
+// Attempts wait for each other, so that jobs that may run together do.
 class MeetingRunner : public StageRunner {
  public:
   StageOutput Run(const StageRun& run,
@@ -67,8 +66,8 @@ class MeetingRunner : public StageRunner {
   std::map<std::string, std::vector<std::string>> inputs_;  // names, sorted
 };
 
-// Its attempts begin together and take turns in one batch with one slot, until project "b" has had
-// 100 of them.
+// Attempts start together and take turns in a batch with one slot, until project "b" has had 100
+// turns.
 class TurnsRunner : public StageRunner {
  public:
   explicit TurnsRunner(int attempts) : attempts_(attempts) {}
@@ -94,7 +93,7 @@ class TurnsRunner : public StageRunner {
     while (!enough_ && std::chrono::steady_clock::now() < end) {
       const SceneBatch::Turn turn(membership, cancel);
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
-      ++turns_[project];  // one slot: no other thread is here
+      ++turns_[project];  // one slot: no concurrent thread
       if (turns_["b"] >= 100) enough_ = true;
     }
   }
@@ -173,7 +172,7 @@ class WorkerLoopTest : public testing::Test {
   MeetingRunner runner_;
 };
 
-TEST_F(WorkerLoopTest, ScenesRunTogetherAndAPoisonedOneFailsAlone) {
+TEST_F(WorkerLoopTest, ScenesRunTogetherAndPoisonedOneFailsAlone) {
   const JobRecord root = Submit({1, kPoison, 2});
   Work({root});
   EXPECT_EQ(runner_.most(), 3);
@@ -212,12 +211,12 @@ TEST_F(WorkerLoopTest, AdditionalKeyViewsHaveNumberedFolders) {
   graph.jobs.push_back(carry);
   const JobRecord root = store_.CreateGraph(graph, {}, 1000);
   Work({root});
-  const std::string name = artifact::kColorizer;  // what every job leaves here
+  const std::string name = artifact::kColorizer;  // the result of every job here
   EXPECT_EQ(runner_.InputsOf(root),
             (std::vector<std::string>{name, "key_views/1/" + name, "key_views/2/" + name}));
 }
 
-TEST_F(WorkerLoopTest, NoMoreThanTheConfiguredNumberRunAtOnce) {
+TEST_F(WorkerLoopTest, LimitsConcurrentScenes) {
   options_.batch_scenes = 2;
   runner_.wanted = 2;
   std::vector<uint64_t> seeds;
@@ -228,7 +227,7 @@ TEST_F(WorkerLoopTest, NoMoreThanTheConfiguredNumberRunAtOnce) {
   EXPECT_EQ(store_.GetJob(root.name).state, JobState::kSucceeded);
 }
 
-// Ten jobs of one project against one of another: both get half of the computing.
+// Ten jobs of one project and one of another: each project gets half of the turns.
 TEST_F(WorkerLoopTest, ProjectsShareTheBatchEqually) {
   options_.batch_scenes = 11;
   TurnsRunner runner(11);
@@ -241,7 +240,7 @@ TEST_F(WorkerLoopTest, ProjectsShareTheBatchEqually) {
   EXPECT_LT(runner.turns("a"), 160);
 }
 
-TEST_F(WorkerLoopTest, LittleMemoryMeansOneAtATime) {
+TEST_F(WorkerLoopTest, RunsOneAtATimeWithLittleMemory) {
   options_.recycle_memory_bytes = 1;
   runner_.wanted = 1;
   const JobRecord root = Submit({1, 2});

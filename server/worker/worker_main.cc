@@ -25,7 +25,7 @@
 namespace color3d {
 namespace {
 
-// The largest blob, twice: what is made of it may be larger.
+// Twice the largest blob, because derived files may be larger.
 constexpr int64_t kMaxFileBytes = int64_t{16} << 30;
 
 constexpr int64_t kMaxMemoryMib = int64_t{1} << 30;
@@ -44,7 +44,7 @@ std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000.0));
 }
 
-// Flags without a group are hidden: they are set by `serve` and by tests.
+// Flags without a group are hidden: set by `serve` and by tests.
 void AddFlags(CLI::App* app, WorkerArguments* arguments) {
   WorkerSettings& settings = arguments->settings;
   WorkerOptions& options = arguments->options;
@@ -56,25 +56,25 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
       ->capture_default_str();
   app->add_option("--batch-scenes",
                   options.batch_scenes,
-                  "Scenes that are personalized at once, sharing the encoder")
+                  "Maximum number of scenes that are personalized together, sharing the encoder")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   app->add_option("--memory-mib",
                   settings.memory_mib,
-                  "Memory that this process may take, and each that it starts, MiB; 0: no limit")
+                  "Memory limit of this process and of each that it starts, MiB; 0: no limit")
       ->check(CLI::Range(int64_t{0}, kMaxMemoryMib));
   app->add_flag("!--no-sandbox", settings.sandbox, "Do not lock this process in");
   app->add_option("--log-format", settings.log_format, "text or json")
       ->check(CLI::IsMember({"text", "json"}));
   app->add_option("--log-level", settings.log_level, "trace, debug, info, warn, error, off")
       ->capture_default_str();
-  app->add_option("--model", arguments->models, "NAME=FILE: weights that jobs may name")
+  app->add_option("--model", arguments->models, "NAME=FILE: weights for jobs")
       ->allow_extra_args(false);
   app->add_option("--backend", arguments->backends, "NAME=ADDRESS: a ColorBackend server")
       ->allow_extra_args(false);
   app->add_option("--inference",
                   arguments->inference,
-                  "Answer ColorizeImages on this socket of the server's, in place of running jobs");
+                  "Answer ColorizeImages on this socket of the server instead of running jobs");
   app->add_option("--max-batch", arguments->max_batch)->group("");
   app->add_option("--idle-seconds", arguments->idle_seconds)->group("");
   app->add_option("--parent-pid", options.parent)->group("");
@@ -101,7 +101,7 @@ void Complete(WorkerArguments* arguments) {
   options.timing.drain_grace = Milliseconds(settings.drain_grace_seconds);
   options.checkpoint_interval = Milliseconds(settings.checkpoint_seconds);
   options.models = ParseUserModels(arguments->models, arguments->backends);
-  // Another build may compute something else: its results are not taken for ours.
+  // Another build may compute other results, which must not be reused.
   if (options.code_version.empty()) {
     options.code_version = std::string(COLOR3D_VERSION) + " " + DigestFile("/proc/self/exe").sha256;
   }
@@ -110,11 +110,11 @@ void Complete(WorkerArguments* arguments) {
 std::atomic<bool> g_draining{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler");
 
-// Drains, however often it is told to: a stop may reach a worker from the service manager, from the
-// server and, when that dies, from the kernel. What does not end is killed by the supervisor.
+// Drains also on repeated signals: a stop may come from the service manager, from the server and,
+// when that dies, from the kernel. The supervisor kills workers that do not end.
 void OnTerminate(int) { g_draining = true; }
 
-// A person at the terminal who asks twice means it.
+// A second signal from a terminal ends the worker at once.
 void OnInterrupt(int) {
   if (g_draining.exchange(true)) ::_exit(1);
 }
@@ -133,14 +133,14 @@ void HandleStopSignals() {
   IgnoreStraySignals();
 }
 
-// Uploads may take much memory: this process fails before the machine does.
+// Uploads may need much memory: this process fails before the machine does.
 void LimitMemory(int64_t memory_mib) {
-  // With less nothing can be computed.
+  // Minimum for any computation.
   constexpr int64_t kLeastBytes = int64_t{256} << 20;
-  // Sanitizers reserve terabytes, which the kernel would count.
+  // Sanitizers reserve terabytes, which would count.
   constexpr int64_t kMostReserved = int64_t{1} << 40;
   if (!PreferAsOomVictim()) {
-    spdlog::warn("the kernel may end the server before this worker when memory runs out");
+    spdlog::warn("the kernel may kill the server before this worker when memory runs out");
   }
   if (memory_mib == 0) return;
   const int64_t reserved = OwnMemoryBytes();
@@ -164,14 +164,14 @@ void LimitMemory(int64_t memory_mib) {
                 "the kernel does not let this worker limit its memory ({})",
                 std::strerror(errno));
   }
-  spdlog::info("may take {} MiB of memory, {} MiB of it are reserved", memory_mib, reserved >> 20);
+  spdlog::info("memory limit {} MiB, {} MiB of it reserved", memory_mib, reserved >> 20);
 }
 
-// This process decodes untrusted files. Threads that were there before are OpenBLAS's own.
+// Sandboxes this process, which decodes untrusted files. Earlier threads belong to OpenBLAS.
 void EnterSandbox(const WorkerArguments& arguments) {
   SetSandboxing(arguments.settings.sandbox);
   if (!arguments.settings.sandbox) return;
-  ProcessLimits limits;  // cores would hold what strangers uploaded
+  ProcessLimits limits;  // no core dumps: they would contain uploads
   limits.file_bytes = kMaxFileBytes;
   SandboxRules rules;
   rules.readable = {ProgramFolder().parent_path()};
@@ -185,13 +185,13 @@ void EnterSandbox(const WorkerArguments& arguments) {
   const Sandbox sandbox(rules);
   if (!LimitProcess(limits) || !sandbox.Enter()) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "the kernel does not let this worker lock itself in ({}); say --no-sandbox",
+                "the kernel does not allow the sandbox of this worker ({}); use --no-sandbox",
                 std::strerror(errno));
   }
   if (!sandbox.missing().empty()) {
-    spdlog::warn("not locked in by {}, which this machine does not have", sandbox.missing());
+    spdlog::warn("sandbox without {}, which this machine does not support", sandbox.missing());
   }
-  if (!sandbox.active().empty()) spdlog::info("locked in by {}", sandbox.active());
+  if (!sandbox.active().empty()) spdlog::info("sandbox: {}", sandbox.active());
 }
 
 void ServeInference(const WorkerArguments& arguments, const WorkerProgram& program) {
@@ -221,7 +221,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
   HandleStopSignals();
   ShareMallocArenas(arguments.settings.threads);
   if (arguments.options.parent != 0) {
-    // When the server dies, however it dies, this worker drains.
+    // The kernel signals this worker when the server dies.
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != arguments.options.parent) return 1;
   }

@@ -1,4 +1,4 @@
-// color3d-bench dynamic-scenes: writes a made-up scene that moves, for trying out the service.
+// color3d-bench dynamic-scenes: writes a synthetic dynamic scene.
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -38,18 +38,23 @@ void RunDynamicScenes(DynamicScenesArguments args) {
 void AddDynamicScenesCommand(CLI::App& app) {
   auto args = std::make_shared<DynamicScenesArguments>();
   CLI::App* command = app.add_subcommand(
-      "dynamic-scenes", "write a made-up scene that moves: colour pictures and transforms.json");
+      "dynamic-scenes", "Write a synthetic dynamic scene: colour pictures and transforms.json");
   std::vector<std::string> names;
   for (const DynamicCase each : DynamicCases()) names.push_back(DynamicCaseName(each));
-  command->add_option("--out", args->out, "folder")->required();
-  command->add_option("--case", args->name)->check(CLI::IsMember(names))->capture_default_str();
-  command->add_option("--side", args->side, "width, px; the height is 3/4 of it")
+  command->add_option("--out", args->out, "Folder for the scene")->required();
+  command->add_option("--case", args->name, "Motion of the objects")
+      ->check(CLI::IsMember(names))
+      ->capture_default_str();
+  command->add_option("--side", args->side, "Width of the pictures, px; the height is 3/4 of it")
       ->check(CLI::Range(22, 512))
       ->capture_default_str();
-  command->add_option("--cameras", args->options.cameras)->capture_default_str();
-  command->add_option("--times", args->options.times, "time steps; 0: the case's own");
-  command->add_flag("--moving-cameras", args->options.moving_cameras);
-  command->add_option("--seed", args->options.seed)->capture_default_str();
+  command->add_option("--cameras", args->options.cameras, "Number of cameras")
+      ->capture_default_str();
+  command->add_option(
+      "--times", args->options.times, "Number of time steps; 0: default of the case");
+  command->add_flag("--moving-cameras", args->options.moving_cameras, "Move the cameras");
+  command->add_option("--seed", args->options.seed, "Seed of furniture and textures")
+      ->capture_default_str();
   command->callback([args] { RunDynamicScenes(*args); });
 }
 

@@ -1,6 +1,6 @@
-// color3d-bench film: what each step of colouring a film is worth, against its true colours, and
-// how steady it is: no colour, each frame by the automatic colourizer, flow alone, and the
-// personalized colorizer after several lengths of training.
+// color3d-bench film: error against the true colours, and steadiness, of a film in grey, with each
+// frame coloured automatically, by optical flow alone, and by the personalized colorizer after
+// several lengths of training.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -31,8 +31,8 @@ struct FilmArguments {
   std::string frames_folder;
   std::string out_folder;
   std::string key_view;
-  std::string recolor_view;  // in its true colours; the key view has false ones then
-  std::vector<double> recolor_s = {0.0, 1e6};  // where
+  std::string recolor_view;  // in its true colours; the key view then has false ones
+  std::vector<double> recolor_s = {0.0, 1e6};  // begin and end of the range, s
   std::vector<int> iterations = {0, 20, 50, 100, 200};
   int max_side_px = 500;
   int threads = 2;
@@ -89,7 +89,7 @@ class FilmBench {
     return seconds;
   }
 
-  // Mean chroma error of the held-out frames in a colouring.
+  // Mean chroma error of held-out frames.
   static double ErrorOf(const Scene& scene,
                         const ViewImages& images,
                         const std::function<Image(int view)>& lab) {
@@ -110,7 +110,7 @@ class FilmBench {
       const auto luminance = images.Luminance(view);
       return JoinLab(*luminance, Image(luminance->width, luminance->height, 2));
     };
-    // What flow does not follow stays grey.
+    // Pixels without flow stay grey.
     const auto carried = [&](int view) {
       const auto luminance = images.Luminance(view);
       return JoinLab(
@@ -143,7 +143,7 @@ class FilmBench {
     return rows;
   }
 
-  // Of some frames that are not held out: what constants are chosen by.
+  // Errors of some frames that are not held out, to choose constants by.
   static double TrainingError(const StageContext& context) {
     constexpr size_t kFrames = 8;
     const Scene scene = ReadScene(context);
@@ -196,7 +196,7 @@ class FilmBench {
             {"seconds_colorize_views", colored - trained}};
   }
 
-  // a and b of each pixel change places.
+  // Swaps a and b.
   static fs::path InFalseColors(const fs::path& picture, const StageContext& context) {
     Image lab = LabFromSrgb(ReadImage(picture));
     std::swap_ranges(lab.Plane(1), lab.Plane(2), lab.Plane(2));
@@ -205,7 +205,7 @@ class FilmBench {
     return file;
   }
 
-  // Mean chroma errors of the held-out frames within the range, before and after.
+  // Mean chroma errors of the held-out frames within the range, before and after recolouring.
   ordered_json Recolored() {
     const double before = Seconds();
     const auto errors = [&] {
@@ -267,24 +267,30 @@ void RunFilm(const FilmArguments& args) {
 
 void AddFilmCommand(CLI::App& app) {
   auto args = std::make_shared<FilmArguments>();
-  CLI::App* command = app.add_subcommand(
-      "film",
-      "frames in colour -> error and steadiness of automatic, carried and inferred colours");
-  command->add_option("--frames", args->frames_folder, "folder of frames, in their order")
+  CLI::App* command =
+      app.add_subcommand("film",
+                         "Measure error and steadiness of a film coloured automatically, by "
+                         "optical flow, and by the personalized colorizer");
+  command->add_option("--frames", args->frames_folder, "Folder of colour frames, ordered by name")
       ->required()
       ->check(CLI::ExistingDirectory);
-  command->add_option("--out", args->out_folder, "for what the stages leave")->required();
-  command->add_option("--key-view", args->key_view, "frame whose true colours are given");
+  command->add_option("--out", args->out_folder, "Folder for artifacts")->required();
   command->add_option(
-      "--recolor-view",
-      args->recolor_view,
-      "frame that recolours a range in its true colours; --key-view has false ones");
-  command->add_option("--recolor-range", args->recolor_s, "its range, two times in s")->expected(2);
-  command->add_option("--iterations", args->iterations, "of personalization; several")
+      "--key-view", args->key_view, "Name of the key frame, given in its true colours");
+  command->add_option("--recolor-view",
+                      args->recolor_view,
+                      "Name of the frame that recolours a range of time in its true colours; the "
+                      "key frame then has false ones");
+  command->add_option("--recolor-range", args->recolor_s, "Begin and end of that range, s")
+      ->expected(2);
+  command
+      ->add_option(
+          "--iterations", args->iterations, "Iterations of personalization; may be repeated")
       ->check(CLI::Range(0, 100000));
-  command->add_option("--max-side", args->max_side_px, "px")->check(CLI::Range(64, 4096));
-  command->add_option("--threads", args->threads)->check(CLI::Range(1, 256));
-  command->add_option("--seed", args->seed);
+  command->add_option("--max-side", args->max_side_px, "Longer side of the working pictures, px")
+      ->check(CLI::Range(64, 4096));
+  command->add_option("--threads", args->threads, "Number of threads")->check(CLI::Range(1, 256));
+  command->add_option("--seed", args->seed, "Seed");
   command->callback([args] { RunFilm(*args); });
 }
 

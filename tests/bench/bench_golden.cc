@@ -1,4 +1,4 @@
-// color3d-bench golden: a published network against outputs that its authors' code wrote.
+// color3d-bench golden: compares a published network with outputs of its authors' code.
 #include <fmt/core.h>
 #include <torch/types.h>
 
@@ -32,7 +32,7 @@ struct GoldenArguments {
   double tolerance = 1e-4;
 };
 
-// Compares tensor by tensor. The relative error of a tensor is its largest deviation over its
+// Compares tensors. The relative error of a tensor is its largest deviation over its
 // largest expected magnitude.
 class Comparison {
  public:
@@ -42,7 +42,7 @@ class Comparison {
   const WeightArray& Expected(const std::string& name) const {
     const auto found = expected_.find(name);
     if (found == expected_.end()) {
-      throw InvalidArgument("the expected file has no \"{}\"", name);
+      throw InvalidArgument("the file of expected outputs has no \"{}\"", name);
     }
     return found->second;
   }
@@ -72,7 +72,7 @@ std::vector<float> ValuesOf(const torch::Tensor& tensor) {
 // Picture `index` of an array [N,3,H,W].
 Image PictureOf(const WeightArray& array, int64_t index) {
   if (array.shape.size() != 4 || array.shape[1] != 3 || index >= array.shape[0]) {
-    throw InvalidArgument("the expected file's pictures are not [N,3,H,W]");
+    throw InvalidArgument("the pictures in the file of expected outputs are not [N,3,H,W]");
   }
   Image image(static_cast<int>(array.shape[3]), static_cast<int>(array.shape[2]), 3);
   std::copy_n(array.values.begin() + index * static_cast<int64_t>(image.data.size()),
@@ -105,7 +105,7 @@ void Normalize(std::vector<float>& feature) {
   for (float& value : feature) value = static_cast<float>(value / std::sqrt(sum));
 }
 
-// Returns what could not be compared, empty when nothing.
+// Returns which part was not compared; empty: none.
 std::string CompareClip(WeightMap weights,
                         const GoldenArguments& args,
                         const WeightMetadata& metadata,
@@ -147,7 +147,8 @@ std::string CompareClip(WeightMap weights,
   std::vector<float> all_tokens;
   for (const nlohmann::json& prompt : list) {
     if (!prompt.is_string()) {
-      throw InvalidArgument("the expected file's \"prompts\" are no JSON list of texts");
+      throw InvalidArgument(
+          "\"prompts\" in the file of expected outputs is not a JSON list of strings");
     }
     const std::vector<float> ours = AsFloats(clip.Tokens(prompt.get<std::string>()));
     all_tokens.insert(all_tokens.end(), ours.begin(), ours.end());
@@ -197,15 +198,18 @@ int RunGolden(const GoldenArguments& args) {
 void AddGoldenCommand(CLI::App& app) {
   auto args = std::make_shared<GoldenArguments>();
   CLI::App* command = app.add_subcommand(
-      "golden", "a DDColor or CLIP weight file against outputs of its authors' code");
-  command->add_option("--weights", args->weights_file)->required();
-  command->add_option("--expected", args->expected_file, "safetensors")->required();
-  command->add_option("--vocabulary", args->vocabulary, "CLIP's, to compare the tokens too");
+      "golden", "Compare a DDColor or CLIP weight file with outputs of its authors' code");
+  command->add_option("--weights", args->weights_file, "Weight file")->required();
+  command->add_option("--expected", args->expected_file, "Expected outputs (safetensors)")
+      ->required();
+  command->add_option(
+      "--vocabulary", args->vocabulary, "Vocabulary of CLIP, to compare the tokens, too");
   command->add_option("--tolerance",
                       args->tolerance,
-                      "worst deviation over the largest expected value; half-precision copies of "
-                      "float32 weights need about 1e-2");
-  command->add_option("--json", args->json_file);
+                      "Maximum deviation, relative to the largest expected value; half-precision "
+                      "copies of float32 weights need about 1e-2");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] {
     if (RunGolden(*args) != 0) throw CLI::RuntimeError(1);
   });

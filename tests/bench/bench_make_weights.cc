@@ -1,4 +1,4 @@
-// color3d-bench make-weights: a weight file in a published layout, filled with random numbers.
+// color3d-bench make-weights: writes random weights in a published layout.
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -55,12 +55,12 @@ void RunMakeWeights(const MakeWeightsArguments& args) {
 void AddMakeWeightsCommand(CLI::App& app) {
   auto args = std::make_shared<MakeWeightsArguments>();
   CLI::App* command = app.add_subcommand(
-      "make-weights", "write a safetensors file with random weights in a published layout");
-  command->add_option("file", args->file)->required();
-  command->add_option("--kind", args->kind)
+      "make-weights", "Write a safetensors file with random weights in a published layout");
+  command->add_option("file", args->file, "File to write")->required();
+  command->add_option("--kind", args->kind, "Network")
       ->check(CLI::IsMember({"ddcolor-tiny", "ddcolor-mini", "clip-b32", "clip-mini"}));
-  command->add_flag("--half", args->half, "float16");
-  command->add_option("--seed", args->seed);
+  command->add_flag("--half", args->half, "Write float16");
+  command->add_option("--seed", args->seed, "Seed");
   command->callback([args] { RunMakeWeights(*args); });
 }
 

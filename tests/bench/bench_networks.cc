@@ -1,5 +1,4 @@
-// color3d-bench networks: what a published network costs: seconds and memory to load, seconds a
-// picture.
+// color3d-bench networks: time and memory to load a published network, and time per picture.
 #include <ATen/Parallel.h>
 
 #include <chrono>
@@ -43,7 +42,7 @@ void RunNetworks(const NetworksArguments& args) {
       luminance.At(0, y, x) = 50.0f + 30.0f * std::sin(0.05f * x) * std::cos(0.03f * y);
     }
   }
-  // A small network first: what the libraries take once is not counted with the weights.
+  // Runs a small network first, so that memory of the libraries is not counted.
   Ddcolor(SyntheticDdcolorWeights(SyntheticDdcolor::Mini(), 1)).Colorize(Image(8, 8, 1, 50.0f));
   const int64_t before = ResidentMemoryBytes();
   nlohmann::ordered_json result{{"weights", args.weights_file}, {"threads", args.threads}};
@@ -77,14 +76,17 @@ void RunNetworks(const NetworksArguments& args) {
 void AddNetworksCommand(CLI::App& app) {
   auto args = std::make_shared<NetworksArguments>();
   CLI::App* command =
-      app.add_subcommand("networks", "seconds and memory of a published network's weight file");
-  command->add_option("--weights", args->weights_file)->required();
-  command->add_option("--as", args->as, "automatic colourizer or encoder")
+      app.add_subcommand("networks", "Measure time and memory of a published network");
+  command->add_option("--weights", args->weights_file, "Weight file")->required();
+  command->add_option("--as", args->as, "Use of the network: automatic colourizer or encoder")
       ->check(CLI::IsMember({"auto", "encoder"}));
-  command->add_option("--width", args->width, "px")->check(CLI::Range(1, 10000));
-  command->add_option("--height", args->height, "px")->check(CLI::Range(1, 10000));
-  command->add_option("--threads", args->threads)->check(CLI::Range(1, 1024));
-  command->add_option("--json", args->json_file);
+  command->add_option("--width", args->width, "Width of the picture, px")
+      ->check(CLI::Range(1, 10000));
+  command->add_option("--height", args->height, "Height of the picture, px")
+      ->check(CLI::Range(1, 10000));
+  command->add_option("--threads", args->threads, "Number of threads")->check(CLI::Range(1, 1024));
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] { RunNetworks(*args); });
 }
 

@@ -1,4 +1,4 @@
-// color3d-bench pipeline: a colour scene end to end in benchmark mode, without server.
+// color3d-bench pipeline: runs all stages on a colour scene in benchmark mode, without a server.
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -46,8 +46,8 @@ void Evaluate(const PipelineArguments& args, const Scene& scene, StageContext& c
   RunEvaluate(options, context);
 }
 
-// Whether the stage comes before the one to begin with; then what it left in the earlier run is
-// taken.
+// Returns true if the stage comes before the first one to run. Its artifacts are then taken from
+// the earlier run.
 bool TakeEarlier(const PipelineArguments& args, const char* kind, LocalPipeline* pipeline) {
   if (args.earlier_folder.empty()) return false;
   const std::vector<Stage>& stages = StageCatalogue();
@@ -136,38 +136,47 @@ void RunPipeline(const PipelineArguments& args) {
 void AddPipelineCommand(CLI::App& app) {
   auto args = std::make_shared<PipelineArguments>();
   CLI::App* command = app.add_subcommand(
-      "pipeline", "photos in colour -> coloured scene and its score, all stages in this process");
-  command->add_option("--scene", args->scene_folder, "folder of photos, with or without poses")
+      "pipeline", "Run all stages on colour photos in benchmark mode, in one process");
+  command
+      ->add_option("--scene", args->scene_folder, "Folder of colour photos, with or without poses")
       ->required();
-  command->add_option("--out", args->out_folder, "where artifacts and the report go")->required();
-  command->add_option("--max-side", args->max_side_px, "working size, px");
-  command->add_option("--threads", args->threads);
-  command->add_option("--seed", args->seed);
-  command->add_option("--key-view", args->key_view, "instead of the selected one");
-  command->add_option("--geometry-iterations", args->geometry.iterations);
-  command->add_option("--max-gaussians", args->geometry.max_gaussians);
-  command->add_option("--colorizer-iterations", args->colorizer.iterations);
-  command->add_option("--chroma-iterations", args->chroma.iterations);
-  command->add_flag("--carry,!--no-carry", args->carry, "geometry first");
-  command->add_flag("--paper", args->paper, "the paper's colorizer recipe");
+  command->add_option("--out", args->out_folder, "Folder for artifacts and the report")->required();
+  command->add_option("--max-side", args->max_side_px, "Longer side of the working pictures, px");
+  command->add_option("--threads", args->threads, "Number of threads");
+  command->add_option("--seed", args->seed, "Seed");
+  command->add_option("--key-view", args->key_view, "Name of the key view; default: selected");
+  command->add_option("--geometry-iterations",
+                      args->geometry.iterations,
+                      "Training iterations of the luminance Gaussians");
+  command->add_option(
+      "--max-gaussians", args->geometry.max_gaussians, "Maximum number of Gaussians");
+  command->add_option(
+      "--colorizer-iterations", args->colorizer.iterations, "Iterations of personalization");
+  command->add_option(
+      "--chroma-iterations", args->chroma.iterations, "Iterations of the chroma solver");
+  command->add_flag("--carry,!--no-carry",
+                    args->carry,
+                    "Carry the key view's colours through the geometry (default), or not");
+  command->add_flag("--paper", args->paper, "Use the paper's colorizer recipe");
   command
       ->add_option("--geometry",
                    args->geometry_file,
-                   "geometry.c3g of an earlier run of the scene at this size, in place of training")
+                   "geometry.c3g of an earlier run of the scene at this size, instead of training")
       ->check(CLI::ExistingFile);
-  command->add_flag(
-      "--rescore", args->rescore, "run evaluation alone, on what an earlier run left in --out");
+  command->add_flag("--rescore", args->rescore, "Only evaluate what an earlier run wrote to --out");
   CLI::Option* from =
-      command->add_option("--from", args->from_stage, "begin with this stage, e.g. colorize_views");
-  command->add_option("--earlier", args->earlier_folder, "run that the stages before it left")
+      command->add_option("--from", args->from_stage, "First stage to run, e.g. colorize_views");
+  command
+      ->add_option(
+          "--earlier", args->earlier_folder, "Output folder of the run with the stages before it")
       ->check(CLI::ExistingDirectory)
       ->needs(from);
-  command->add_flag("--score-training",
-                    args->score_training,
-                    "errors of the training views that are not the key view, to choose constants "
-                    "by; nothing is exported");
   command->add_flag(
-      "--bound", args->bound, "also score the same geometry under the true colours of all views");
+      "--score-training",
+      args->score_training,
+      "Score the training views other than the key view, to choose constants; exports nothing");
+  command->add_flag(
+      "--bound", args->bound, "Also score the same geometry with the true colours of all views");
   command->callback([args] { RunPipeline(*args); });
 }
 

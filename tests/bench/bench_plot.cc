@@ -1,7 +1,7 @@
-// color3d-bench plot: error against seconds of several results as one figure, a panel per scene. Of
-// `reconstruct`: a line per label. Of `suite`: a line per variant from its curves, or, with
-// --metric, through the variants whose names agree up to '@' (fast@100, fast@300, ...). Of
-// `choices`: a panel for each choice, means over the scenes.
+// color3d-bench plot: draws error against seconds of several results, with a panel per scene.
+// `reconstruct`: a line per label. `suite`: a line per variant from its curves or, with --metric,
+// through the variants whose names agree up to '@' (fast@100, fast@300, ...). `choices`: a panel
+// per choice with means over the scenes.
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -61,11 +61,11 @@ void AddResult(const std::string& file, const PlotArguments& args, std::vector<P
   PlotOfTitle(name + ": " + args.quality, !args.linear, plots).series.push_back(std::move(series));
 }
 
-// One run's curve.
+// The curve of one run.
 void AddCurve(const SuiteRun& run, const PlotArguments& args, std::vector<Plot>& plots) {
   const size_t colon = args.curve.find(':');
   if (colon == std::string::npos) {
-    throw InvalidArgument("\"" + args.curve + "\" is no curve; give STAGE:ERROR_NAME");
+    throw InvalidArgument("\"" + args.curve + "\" is not a curve; give STAGE:ERROR_NAME");
   }
   const std::string stage = args.curve.substr(0, colon), error = args.curve.substr(colon + 1);
   const std::filesystem::path file = std::filesystem::path(args.suite_folder) / run.SceneName() /
@@ -77,7 +77,7 @@ void AddCurve(const SuiteRun& run, const PlotArguments& args, std::vector<Plot>&
   }
 }
 
-// One run as a point of its variant's line.
+// A run as a point of the line of its variant.
 void AddPoint(const SuiteRun& run, const PlotArguments& args, std::vector<Plot>& plots) {
   Plot& plot = PlotOfTitle(run.SceneName() + ": " + args.metric, !args.linear, plots);
   const double seconds = run.metrics.at(args.seconds), value = run.metrics.at(args.metric);
@@ -123,7 +123,7 @@ void RunPlot(const PlotArguments& args) {
       AddResult(file, args, plots);
     }
   } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument(file + " is no result that has these figures: " + e.what());
+    throw InvalidArgument(file + " has none of these figures: " + e.what());
   }
   if (plots.empty()) throw InvalidArgument("give results of reconstruct, --suite or --choices");
   WriteFileAtomic(args.svg_file, FigureSvg(plots));
@@ -134,20 +134,25 @@ void RunPlot(const PlotArguments& args) {
 void AddPlotCommand(CLI::App& app) {
   auto args = std::make_shared<PlotArguments>();
   CLI::App* command =
-      app.add_subcommand("plot", "error against seconds of several results, as SVG");
-  command->add_option("files", args->json_files, "JSON of `reconstruct`");
-  command->add_option("--svg", args->svg_file)->required();
-  command->add_option("--quality", args->quality, "psnr_db, ssim or l1")->capture_default_str();
-  command->add_option("--label", args->label, "field that names a line")->capture_default_str();
-  command->add_option("--suite", args->suite_folder, "the --out folder of `suite`");
-  command->add_option("--curve", args->curve, "STAGE:ERROR_NAME of its curves.csv");
-  command->add_option("--metric", args->metric, "of its metrics.json, e.g. delta_e00_chroma_2d");
-  command->add_option("--seconds", args->seconds, "that go with --metric")->capture_default_str();
-  command->add_option("--choices", args->choices_folders, "the --out folders of `choices`");
+      app.add_subcommand("plot", "Draw error against seconds of several results as SVG");
+  command->add_option("files", args->json_files, "Results of `reconstruct`");
+  command->add_option("--svg", args->svg_file, "File for the figure")->required();
+  command->add_option("--quality", args->quality, "Quality to draw: psnr_db, ssim or l1")
+      ->capture_default_str();
+  command->add_option("--label", args->label, "Field of the results that names a line")
+      ->capture_default_str();
+  command->add_option("--suite", args->suite_folder, "Output folder of `suite`");
+  command->add_option("--curve", args->curve, "Curve of its curves.csv: STAGE:ERROR_NAME");
+  command->add_option(
+      "--metric", args->metric, "Metric of its metrics.json, e.g. delta_e00_chroma_2d");
+  command
+      ->add_option("--seconds", args->seconds, "Seconds of its metrics.json to draw with --metric")
+      ->capture_default_str();
+  command->add_option("--choices", args->choices_folders, "Output folders of `choices`");
   command->add_flag("--delivered",
                     args->delivered,
-                    "with --choices: the error after fusion with carried colours");
-  command->add_flag("--linear", args->linear, "seconds on a linear axis");
+                    "With --choices: draw the error after fusion with carried colours");
+  command->add_flag("--linear", args->linear, "Draw seconds on a linear axis");
   command->callback([args] { RunPlot(*args); });
 }
 

@@ -1,5 +1,5 @@
-// color3d-bench poses: structure-from-motion of a folder of photos, seconds per phase, and how far
-// its cameras are from a given model.
+// color3d-bench poses: measures seconds per phase of structure-from-motion, and the distance of its
+// cameras from a given model.
 #include <sqlite3.h>
 #include <sys/resource.h>
 
@@ -38,8 +38,8 @@ class WarningList : public NullObserver {
   std::vector<std::string> warnings;
 };
 
-// Pairs in COLMAP's database with at least as many verified matches as its mapper asks for; -1 when
-// it cannot be read.
+// Number of pairs in COLMAP's database with enough verified matches for its mapper; -1 if it cannot
+// be read.
 int CountVerifiedPairs(const fs::path& database) {
   sqlite3* db = nullptr;
   sqlite3_stmt* query = nullptr;
@@ -56,8 +56,8 @@ int CountVerifiedPairs(const fs::path& database) {
   return count;
 }
 
-// Camera centres and viewing directions against a model's, after the similarity that fits the
-// centres best (Umeyama 1991).
+// Differences of camera centres and viewing directions from a model's, after alignment by a
+// similarity transform of the centres (Umeyama 1991).
 nlohmann::ordered_json CompareWithModel(const Scene& found, const Scene& model) {
   std::map<std::string, const View*> view_of_name;
   for (const View& view : model.views) view_of_name[view.name] = &view;
@@ -96,7 +96,7 @@ nlohmann::ordered_json CompareWithModel(const Scene& found, const Scene& model) 
   return result;
 }
 
-// Of this process and its finished children: what the wall time would be on one quiet core.
+// CPU time of this process and its finished children.
 double CpuSeconds() {
   double seconds = 0.0;
   for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
@@ -109,7 +109,7 @@ double CpuSeconds() {
   return seconds;
 }
 
-// The scene's photos without its poses, so that the import has to find them.
+// The scene's photos without its poses, so that import estimates them.
 void CopyPhotos(const fs::path& scene_folder, const fs::path& folder) {
   const fs::path images = scene_folder / "images";
   fs::copy(
@@ -171,14 +171,21 @@ void RunPoses(PosesArguments& args) {
 void AddPosesCommand(CLI::App& app) {
   auto args = std::make_shared<PosesArguments>();
   CLI::App* command =
-      app.add_subcommand("poses", "structure-from-motion of photos: seconds and registered views");
-  command->add_option("--scene", args->scene_folder, "folder with images/")->required();
-  command->add_option("--pairs", args->pairs)->check(CLI::IsMember({"planned", "exhaustive"}));
-  command->add_option("--neighbors", args->options.sfm_neighbors, "similar photos per photo");
-  command->add_option("--max-features", args->options.sfm_max_features, "per photo");
-  command->add_option("--threads", args->threads, "0: all");
-  command->add_option("--keep", args->keep_folder, "keeps COLMAP's files and sfm.log here");
-  command->add_option("--json", args->json_file, "default: standard output");
+      app.add_subcommand("poses", "Measure time and registered views of structure-from-motion");
+  command
+      ->add_option("--scene", args->scene_folder, "Folder with images/, and poses to compare with")
+      ->required();
+  command->add_option("--pairs", args->pairs, "Pairs of photos to match")
+      ->check(CLI::IsMember({"planned", "exhaustive"}));
+  command->add_option("--neighbors",
+                      args->options.sfm_neighbors,
+                      "Number of similar photos to match with each photo");
+  command->add_option(
+      "--max-features", args->options.sfm_max_features, "Maximum number of features per photo");
+  command->add_option("--threads", args->threads, "Number of threads; 0: one per core");
+  command->add_option("--keep", args->keep_folder, "Folder for COLMAP's files and sfm.log");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] { RunPoses(*args); });
 }
 

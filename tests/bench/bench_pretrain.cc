@@ -48,7 +48,7 @@ PhotoFolder ParseFolder(const std::string& text) {
   return {text.substr(0, equals), std::stod(text.substr(equals + 1))};
 }
 
-// Mean colour error and colourfulness over photographs that are never trained on.
+// Mean colour error and colourfulness over the validation photographs.
 nlohmann::ordered_json Validate(const PretrainArguments& args, const WeightMap& weights) {
   const auto colorizer = AutomaticColorizer::FromPretrained(weights);
   std::vector<AutomaticScore> scores;
@@ -72,7 +72,8 @@ std::vector<PhotoFolder> ParseFolders(const std::vector<std::string>& texts) {
 torch::Device DeviceOf(const std::string& name) {
   const bool cuda = torch::cuda::is_available();
   if (name == "cuda" && !cuda) {
-    throw Error(ErrorCode::kFailedPrecondition, "this LibTorch knows no CUDA device");
+    throw Error(ErrorCode::kFailedPrecondition,
+                "LibTorch has no CUDA device here; use --device cpu");
   }
   return name == "cpu" || !cuda ? torch::kCPU : torch::kCUDA;
 }
@@ -129,7 +130,7 @@ void RunPretrain(const PretrainArguments& args) {
     sum = {};
     averaged = 0;
   };
-  // Of the schedule, where it goes by time.
+  // Completed share of a schedule by time.
   const auto progress = [&]() -> std::optional<double> {
     if (args.seconds <= 0.0) return std::nullopt;
     return (before + Seconds() - start) / args.seconds;
@@ -149,46 +150,81 @@ void RunPretrain(const PretrainArguments& args) {
 void AddPretrainCommand(CLI::App& app) {
   auto args = std::make_shared<PretrainArguments>();
   CLI::App* command = app.add_subcommand(
-      "pretrain", "train the embedded encoder and automatic colourizer on colour photographs");
-  command->add_option("--photos", args->photos, "FOLDER or FOLDER=WEIGHT, repeatable")->required();
-  command->add_option("--clips", args->clips, "FOLDER[=WEIGHT] of folders of frames, repeatable");
-  command->add_option("--start", args->start_file, "weights to go on from, else random ones");
-  command->add_option("--validate", args->validate_folder, "photographs never trained on");
-  command->add_option("--validate-every", args->validate_every, "iterations")
-      ->check(CLI::Range(1, 1000000));
-  command->add_option("--validate-photos", args->validate_photos)->check(CLI::Range(1, 100000));
-  command->add_option("--teacher", args->teacher_file, "SqueezeNet 1.1 as ONNX, to distil from");
-  command->add_option("--checkpoint", args->checkpoint_file, "resumed when it exists")->required();
-  command->add_option("-o,--out", args->out_file, "weights, safetensors, half precision")
+      "pretrain", "Train the embedded encoder and automatic colourizer on colour photographs");
+  command
+      ->add_option(
+          "--photos", args->photos, "Folder of photographs: FOLDER[=WEIGHT]; may be repeated")
       ->required();
-  command->add_option("--iterations", args->options.iterations)->check(CLI::Range(1, 100000000));
-  command->add_option("--seconds", args->seconds, "of training in all, in place of --iterations")
+  command->add_option(
+      "--clips", args->clips, "Folder of folders of frames: FOLDER[=WEIGHT]; may be repeated");
+  command->add_option("--start", args->start_file, "Initial weights; default: random");
+  command->add_option("--validate", args->validate_folder, "Folder of photographs for validation");
+  command->add_option("--validate-every", args->validate_every, "Iterations between validations")
+      ->check(CLI::Range(1, 1000000));
+  command
+      ->add_option(
+          "--validate-photos", args->validate_photos, "Number of photographs to validate with")
+      ->check(CLI::Range(1, 100000));
+  command->add_option("--teacher", args->teacher_file, "SqueezeNet 1.1 (ONNX) to distil from");
+  command
+      ->add_option("--checkpoint",
+                   args->checkpoint_file,
+                   "Checkpoint file; training resumes from it if it exists")
+      ->required();
+  command
+      ->add_option("-o,--out", args->out_file, "File for the weights (safetensors, half precision)")
+      ->required();
+  command->add_option("--iterations", args->options.iterations, "Number of iterations")
+      ->check(CLI::Range(1, 100000000));
+  command
+      ->add_option(
+          "--seconds", args->seconds, "Duration of the whole training, s, instead of --iterations")
       ->check(CLI::PositiveNumber);
-  command->add_option("--copy-weight", args->options.copy_weight, "of copied colours; 0: off")
+  command
+      ->add_option("--copy-weight",
+                   args->options.copy_weight,
+                   "Weight of the loss of copied colours; 0: off")
       ->check(CLI::Range(0.0, 100.0));
   command
-      ->add_option("--contrast-weight", args->options.contrast_weight, "of cells being told apart")
+      ->add_option("--contrast-weight",
+                   args->options.contrast_weight,
+                   "Weight of the contrast between cells")
       ->check(CLI::Range(0.0, 100.0));
-  command->add_option("--distillation-weight", args->options.distillation_weight)
+  command
+      ->add_option(
+          "--distillation-weight", args->options.distillation_weight, "Weight of distillation")
       ->check(CLI::Range(0.0, 100.0));
-  command->add_option("--rebalancing", args->options.rebalancing_power, "of rare colours, 0..1")
+  command
+      ->add_option(
+          "--rebalancing", args->options.rebalancing_power, "Rebalancing of rare colours, 0 to 1")
       ->check(CLI::Range(0.0, 1.0));
-  command->add_option("--prior", args->options.prior_share, "share of that undone in guesses, 0..1")
+  command
+      ->add_option("--prior",
+                   args->options.prior_share,
+                   "Share of the rebalancing that inference undoes, 0 to 1")
       ->check(CLI::Range(0.0, 1.0));
-  command->add_option("--seed", args->options.seed);
-  command->add_option("--device", args->device, "auto: a GPU where LibTorch knows one")
+  command->add_option("--seed", args->options.seed, "Seed");
+  command->add_option("--device", args->device, "Device; auto: a GPU if LibTorch has one")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}));
-  command->add_flag("--half", args->options.half_precision, "networks in bfloat16 on the CPU");
-  command->add_option("--batch", args->options.batch)->check(CLI::Range(1, 4096));
-  command->add_option("--size", args->options.size_px, "px, first half")
+  command->add_flag(
+      "--half", args->options.half_precision, "Run the networks in bfloat16 on the CPU");
+  command->add_option("--batch", args->options.batch, "Pictures per batch")
+      ->check(CLI::Range(1, 4096));
+  command->add_option("--size", args->options.size_px, "Size of crops in the first half, px")
       ->check(CLI::Range(64, 512));
-  command->add_option("--late-size", args->options.late_size_px, "px, second half")
+  command
+      ->add_option(
+          "--late-size", args->options.late_size_px, "Size of crops in the second half, px")
       ->check(CLI::Range(64, 512));
-  command->add_option("--learning-rate", args->options.learning_rate)->check(CLI::Range(1e-6, 1.0));
-  command->add_option("--temperature", args->temperature, "of the shipped colour distribution")
+  command->add_option("--learning-rate", args->options.learning_rate, "Maximum learning rate")
+      ->check(CLI::Range(1e-6, 1.0));
+  command
+      ->add_option(
+          "--temperature", args->temperature, "Temperature of the colour distribution to store")
       ->check(CLI::Range(0.05, 2.0));
-  command->add_option("--threads", args->threads)->check(CLI::Range(1, 256));
-  command->add_option("--stop-after", args->stop_after_seconds, "seconds; resume later");
+  command->add_option("--threads", args->threads, "Number of threads")->check(CLI::Range(1, 256));
+  command->add_option(
+      "--stop-after", args->stop_after_seconds, "Stop after these seconds, to be resumed later");
   command->callback([args] { RunPretrain(*args); });
 }
 

@@ -1,5 +1,5 @@
-// color3d-bench suite: scenes x variants through `color3d-bench pipeline`, each in a process of its
-// own (equal start, no memory kept, a crash costs one run), resumable, with one table at the end.
+// color3d-bench suite: runs scenes x variants of `color3d-bench pipeline`, each in its own process,
+// so that a crash costs one run. Resumable. Prints a table at the end.
 #include <algorithm>
 #include <cstdio>
 #include <set>
@@ -46,8 +46,8 @@ std::vector<SuiteRun> PlannedRuns(const SuiteArguments& args) {
   std::set<std::string> names;
   for (const std::string& scene : args.scenes) {
     if (const SuiteRun named{scene}; !names.insert(named.SceneName()).second) {
-      throw InvalidArgument("two scenes are called " + named.SceneName() +
-                            "; their results would overwrite each other");
+      throw InvalidArgument("two scenes are named " + named.SceneName() +
+                            "; their results would overwrite each other: rename a folder");
     }
     for (const std::string& text : args.variants) {
       SuiteRun run;
@@ -55,7 +55,7 @@ std::vector<SuiteRun> PlannedRuns(const SuiteArguments& args) {
       const size_t end = text.find('=');
       run.variant = text.substr(0, end);
       if (!IsSafeRelativePath(run.variant) || run.variant.find('/') != std::string::npos) {
-        throw InvalidArgument("\"" + text + "\" is no variant; give NAME or NAME=OPTIONS");
+        throw InvalidArgument("\"" + text + "\" is not a variant; give NAME or NAME=OPTIONS");
       }
       run.arguments = Words(args.common);
       if (end != std::string::npos) {
@@ -70,12 +70,12 @@ std::vector<SuiteRun> PlannedRuns(const SuiteArguments& args) {
   return runs;
 }
 
-// False when the run failed; its log says why.
+// Returns false if the run failed; its log has the reason.
 bool RunOne(const SuiteArguments& args, SuiteRun* run) {
   const std::filesystem::path folder =
       std::filesystem::path(args.out_folder) / run->SceneName() / run->variant;
   std::filesystem::create_directories(folder);
-  std::filesystem::remove(folder / artifact::kMetrics);  // of an earlier try
+  std::filesystem::remove(folder / artifact::kMetrics);  // of an earlier run
   SubprocessOptions child;
   child.arguments = {std::filesystem::read_symlink("/proc/self/exe").string(),
                      "pipeline",
@@ -129,7 +129,7 @@ void RunSuite(const SuiteArguments& args) {
   std::printf("%s", table.c_str());
   if (failed > 0) {
     throw Error(ErrorCode::kAborted,
-                std::to_string(failed) + " runs failed; the same command tries them again");
+                std::to_string(failed) + " runs failed; repeat the command to retry them");
   }
 }
 
@@ -138,21 +138,23 @@ void RunSuite(const SuiteArguments& args) {
 void AddSuiteCommand(CLI::App& app) {
   auto args = std::make_shared<SuiteArguments>();
   CLI::App* command = app.add_subcommand(
-      "suite", "scenes x variants of `pipeline`, resumable, and one table over all");
-  command->add_option("--scene", args->scenes, "folders of photos")->required();
+      "suite", "Run variants of `pipeline` on several scenes, resumable, and tabulate the results");
+  command->add_option("--scene", args->scenes, "Folders of photos")->required();
+  command
+      ->add_option("--variant",
+                   args->variants,
+                   "Variant: NAME or NAME=OPTIONS of `pipeline`, e.g. \"paper=--paper\"; {scene} "
+                   "in it stands for the name of the scene. May be repeated")
+      ->required();
+  command->add_option("--common", args->common, "Options of all variants, e.g. \"--bound\"");
   command
       ->add_option(
-          "--variant",
-          args->variants,
-          "NAME or NAME=OPTIONS of `pipeline`, e.g. \"paper=--paper\"; several. {scene} in them "
-          "is the scene's name")
+          "--out", args->out_folder, "Folder for results.jsonl, table.md and SCENE/VARIANT/")
       ->required();
-  command->add_option("--common", args->common, "options of every variant, e.g. \"--bound\"");
-  command->add_option("--out", args->out_folder, "results.jsonl, table.md, SCENE/VARIANT/")
-      ->required();
-  command->add_option("--baseline", args->baseline, "variant that ratios refer to");
-  command->add_option("--timeout", args->timeout_seconds, "of one run, s")->capture_default_str();
-  command->add_flag("--table-only", args->table_only, "run nothing, show what is there");
+  command->add_option("--baseline", args->baseline, "Variant that ratios refer to");
+  command->add_option("--timeout", args->timeout_seconds, "Time limit of a run, s")
+      ->capture_default_str();
+  command->add_flag("--table-only", args->table_only, "Only print the table of existing results");
   command->callback([args] { RunSuite(*args); });
 }
 

@@ -1,5 +1,5 @@
-// color3d-bench weights: how long a weight file takes to load and how much memory at its peak, for
-// a file that the user has or for synthetic ones of DDColor-tiny's size in every format.
+// color3d-bench weights: time and peak memory of loading a given weight file, or synthetic ones of
+// the size of DDColor-tiny in every format.
 #include <fmt/core.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -29,8 +29,8 @@ struct WeightsOptions {
 
 struct LoadFigures {
   double seconds = 0.0;
-  int64_t peak_bytes = 0;   // above what the process had before
-  int64_t array_bytes = 0;  // what the arrays take as float32
+  int64_t peak_bytes = 0;   // above the memory before loading
+  int64_t array_bytes = 0;  // size of the arrays as float32
   int64_t arrays = 0;
 };
 
@@ -101,7 +101,7 @@ WeightMap DdcolorSizedWeights() {
   return weights;
 }
 
-// In a child, which gives the memory back: what this process holds counts in all measurements.
+// Writes them in a child process, since memory of this process counts in all measurements.
 void MakeFiles(const std::filesystem::path& folder) {
   const pid_t child = fork();
   if (child < 0) throw Error(ErrorCode::kResourceExhausted, "cannot start a process");
@@ -144,10 +144,11 @@ void AddWeightsCommand(CLI::App& app) {
   auto options = std::make_shared<WeightsOptions>();
   CLI::App* command = app.add_subcommand(
       "weights",
-      "seconds and peak memory of loading a weight file (default: synthetic ones of "
-      "DDColor-tiny's size, safetensors and PyTorch, single and half precision)");
-  command->add_option("--file", options->file, "a weight file of your own");
-  command->add_option("--json", options->json_file, "write the figures here, not to stdout");
+      "Measure time and peak memory of loading a weight file (default: synthetic ones of the size "
+      "of DDColor-tiny, safetensors and PyTorch, single and half precision)");
+  command->add_option("--file", options->file, "Weight file");
+  command->add_option(
+      "--json", options->json_file, "File for the result (JSON); default: standard output");
   command->callback([options] { RunWeights(*options); });
 }
 

@@ -1,4 +1,4 @@
-// Subcommands of color3d-bench. Each adds itself to the parser; JSON goes to --json or stdout.
+// Subcommands of color3d-bench. Each function adds its command to the parser.
 #pragma once
 
 #include <CLI/CLI.hpp>

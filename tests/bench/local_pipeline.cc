@@ -11,7 +11,7 @@
 namespace color3d {
 namespace {
 
-// Says errors and warnings as they come, and keeps the warnings.
+// Prints errors and warnings, and keeps the warnings.
 class PrintingObserver : public ProgressObserver {
  public:
   PrintingObserver(std::string kind, const std::function<void(const std::string&)>& say)

@@ -1,5 +1,5 @@
-// The stages of one scene run in this process, one after the other, with folders in place of blobs:
-// what the server does, without the server. For benchmarks and tests.
+// Runs the stages of one scene in this process, one after the other, with folders in place of
+// blobs. For benchmarks and tests.
 #pragma once
 
 #include <filesystem>
@@ -14,22 +14,22 @@ namespace color3d {
 
 class LocalPipeline {
  public:
-  // Artifacts are left in `out_folder`; messages go to `say` (may be empty).
+  // Artifacts are written to `out_folder`, messages to `say` (may be empty).
   LocalPipeline(std::filesystem::path scene_folder,
                 std::filesystem::path out_folder,
                 int threads,
                 uint64_t seed,
                 std::function<void(const std::string&)> say);
 
-  // The first stage, with every eighth view held out.
+  // Runs import, with every eighth view held out.
   void ImportScene();
-  // Runs `stage` as job kind `kind` with all artifacts made so far as inputs. `folder`: of its own
-  // artifacts, ends in "/"; empty: none.
+  // Runs `stage` as job kind `kind` with all artifacts written so far as inputs. `folder`: prefix
+  // of its own artifacts, ending in "/"; may be empty.
   void Run(const std::string& kind,
            const std::function<void(StageContext&)>& stage,
            const std::string& folder = "");
 
-  // What an earlier run left, as if its stage had run: one artifact, or all in `out_folder`.
+  // Adds one artifact of an earlier run, or all in `out_folder`, as if their stages had run.
   void Take(const std::string& name, const std::filesystem::path& file) { artifacts_[name] = file; }
   void TakeAll();
 

@@ -1,11 +1,11 @@
-// color3d-bench: measures the method library, each figure with its error and its seconds.
+// color3d-bench: runs and measures stages of the method library without a server.
 #include <cstdio>
 
 #include "core/base/error.h"
 #include "tests/bench/commands.h"
 
 int main(int argc, char** argv) {
-  CLI::App app("Benchmarks of Color3D");
+  CLI::App app("Runs and measures stages of Color3D without a server.");
   app.require_subcommand(1);
   color3d::AddAugmentationsCommand(app);
   color3d::AddAutomaticCommand(app);

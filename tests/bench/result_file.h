@@ -1,4 +1,4 @@
-// Where a benchmark's JSON goes.
+// Output of benchmarks.
 #pragma once
 
 #include <cstdio>
@@ -9,7 +9,7 @@
 
 namespace color3d {
 
-// To `json_file`, or to standard output when it is empty.
+// Writes to `json_file`, or to standard output if it is empty.
 inline void WriteResult(const nlohmann::ordered_json& result, const std::string& json_file) {
   const std::string text = result.dump(1) + "\n";
   if (json_file.empty()) {

@@ -67,7 +67,7 @@ std::vector<std::string> StageMetrics(const std::vector<SuiteRun>& runs) {
   return stages;
 }
 
-// Means over the runs that have the figure; a figure that only some have gets no mean.
+// Means of the figures that all runs have.
 Numbers MeanOf(const std::vector<Numbers>& all) {
   Numbers mean;
   std::map<std::string, size_t> count;

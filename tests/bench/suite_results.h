@@ -8,11 +8,11 @@
 
 namespace color3d {
 
-// One scene with one set of options.
+// A run of one scene with one set of options.
 struct SuiteRun {
   std::string scene;  // the folder as given
   std::string variant;
-  std::vector<std::string> arguments;  // of `color3d-bench pipeline`, beside scene and folder
+  std::vector<std::string> arguments;  // of `color3d-bench pipeline`, except scene and folder
   double seconds = 0.0;                // of the whole process
   nlohmann::ordered_json metrics;      // metrics.json; null before it has run
 
@@ -23,14 +23,14 @@ struct SuiteRun {
   }
 };
 
-// Lines that cannot be read (the last one of a suite that was killed) count as not there. No file:
-// none. Later lines win over earlier ones of the same work.
+// Reads the runs of a file, none if it does not exist. Ignores unreadable lines (the last one of a
+// killed suite). Later lines override earlier ones of the same work.
 std::vector<SuiteRun> ReadSuiteResults(const std::filesystem::path& jsonl);
-// Adds a line, durably.
+// Appends a line durably.
 void AppendSuiteResult(const std::filesystem::path& jsonl, const SuiteRun& run);
 
-// Markdown: a row per run, in order, then a row with the mean of each variant that has several
-// scenes. With a `baseline` variant, columns with the ratios of error and of seconds to it.
+// Returns Markdown: a row per run, in order, then a row with the mean of each variant with several
+// scenes. With a `baseline` variant: columns with the ratios of error and seconds to it.
 std::string SuiteTable(const std::vector<SuiteRun>& runs, const std::string& baseline);
 
 }  // namespace color3d

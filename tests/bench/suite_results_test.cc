@@ -27,7 +27,7 @@ TEST(SuiteResults, SurviveKillInMiddleOfLine) {
   AppendSuiteResult(file, RunOf("data/fox/", "fast", 4.0, 70.0));
   const auto runs = ReadSuiteResults(file);
   ASSERT_EQ(runs.size(), 2u);
-  EXPECT_EQ(runs[0].metrics.at("delta_e00_chroma_2d"), 2.0) << "the later run does not win";
+  EXPECT_EQ(runs[0].metrics.at("delta_e00_chroma_2d"), 2.0) << "an earlier run won";
   EXPECT_EQ(runs[1].SceneName(), "fox");
   EXPECT_TRUE(runs[1].SameWork(RunOf("data/fox/", "fast", 0.0, 0.0)));
   EXPECT_FALSE(runs[1].SameWork(RunOf("data/fox/", "paper", 0.0, 0.0)));

@@ -1,5 +1,5 @@
-// What constants are chosen on: errors of the training views that are not key views, whose own
-// colours nobody has seen. The held-out views stay for the report.
+// Errors of the training views other than key views, whose true colours are unused. Constants are
+// chosen on them, so that the held-out views remain for the report.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -8,8 +8,8 @@
 
 namespace color3d {
 
-// Mean over those views of ScoreView's values, and SourceErrors' by source for the photos and,
-// under "rendered_", for the renders. The scene folder holds the true colours; needs the artifacts
+// Returns the means of ScoreView over these views, and SourceErrors by source for the photos and,
+// under "rendered_", for the renders. The scene folder has the true colours. Requires the artifacts
 // of colorize_views and solve_chroma.
 nlohmann::ordered_json ScoreTrainingViews(StageContext& context);
 

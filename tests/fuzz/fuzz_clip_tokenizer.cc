@@ -1,5 +1,5 @@
-// Fuzz target: CLIP's tokenizer. The first byte says how much of the rest is the vocabulary; 0: the
-// rest is a prompt for a sound one, which is much quicker than making a tokenizer.
+// Fuzz target: CLIP's tokenizer. The first byte is the share of the rest that is the vocabulary; 0:
+// the rest is a prompt for a valid vocabulary, which is much faster than constructing a tokenizer.
 #include <cstdlib>
 #include <string_view>
 

@@ -1,5 +1,5 @@
-// Fuzz target: COLMAP's models, and the times of their photos. The first byte says text, binary or
-// times.txt, the next ones where a model's files cameras, images and points3D end.
+// Fuzz target: COLMAP's models, and the times of their photos. The first byte selects text, binary
+// or times.txt, the next ones are the ends of the files cameras, images and points3D.
 #include <unistd.h>
 
 #include <array>
@@ -47,7 +47,7 @@ int ReadTimes(const fs::path& file, std::string_view text) {
   return ReadOrRefuse([&] {
     std::vector<FrameTime> times;
     for (const auto& [name, time] : LoadColmapTimes(file)) times.push_back(time);
-    for (const std::optional<Moment>& moment : MomentsOf(times).moments) {
+    for (const std::optional<Moment>& moment : AssignMoments(times).moments) {
       if (moment && !std::isfinite(moment->time_s)) std::abort();
     }
   });
@@ -84,7 +84,7 @@ std::vector<std::string> FuzzSeeds() {
                                     uint64_t{1},
                                     uint32_t{1},
                                     uint32_t{0});
-  // With a mark, a line a photo, numbers that are not whole, and one beyond a double's.
+  // With a byte order mark, a line per photo, fractions, and a number beyond the range of double.
   const std::array<std::string, 3> foreign = {
       "\xef\xbb\xbf# comment\n1.0 PINHOLE 640.0 480.0 500 500 320 240\n",
       "1 1 0 0 0 0.5 0 1 1 l\\a.jpg\n2 1 0 0 0 0 0 2 1 0002\nnan 20 18446744073709551615\n",

@@ -1,4 +1,4 @@
-// Fuzz target: video files, read once through and then frame by frame, in order and back again.
+// Fuzz target: video files, read through and then frame by frame, forward and backward.
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -16,8 +16,8 @@
 namespace color3d {
 namespace {
 
-constexpr int64_t kDecodedPixels = 128 * 128;  // larger ones say no more, and take long
-constexpr int kFrames = 4;                     // that are read
+constexpr int64_t kDecodedPixels = 128 * 128;  // larger pictures are slow and test no more
+constexpr int kFrames = 4;                     // number of frames to read
 
 void CheckFrame(FilmReader& film, int frame) {
   try {
@@ -50,7 +50,7 @@ std::vector<std::string> FuzzSeeds() {
        {.encoder = "mpeg2video", .frames = 3, .group = 3, .b_frames = 0, .is_flat = true}}};
   std::vector<std::string> seeds;
   const auto add = [&](const std::filesystem::path& file) {
-    FilmReader(file).Read(0);  // one that is refused would be no seed
+    FilmReader(file).Read(0);  // throws if the seed is invalid
     seeds.push_back(ReadFile(file));
   };
   for (const auto& [name, film] : films) {
@@ -72,7 +72,7 @@ std::vector<std::string> FuzzSeeds() {
   for (const auto& [name, streams] : toned) {
     if (WriteToneFilm(folder.path() / name, streams)) add(folder.path() / name);
   }
-  // Films that name others: refused, whatever becomes of them.
+  // Films that name other files, which must be refused.
   seeds.push_back("#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nfilm\n#EXT-X-ENDLIST\n");
   seeds.push_back("ffconcat version 1.0\nfile film\n");
   return seeds;

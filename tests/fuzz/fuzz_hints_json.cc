@@ -1,4 +1,4 @@
-// Fuzz target: the hints that a user draws.
+// Fuzz target: hints.
 #include "core/keycolor/hints/hints.h"
 #include "tests/fuzz/fuzz_target.h"
 

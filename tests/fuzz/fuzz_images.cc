@@ -1,4 +1,5 @@
-// Fuzz target: pictures, as the server looks at their headers and as a worker decodes them.
+// Fuzz target: pictures. Their headers as read by the server, and their pixels as decoded by a
+// worker.
 #include <cmath>
 #include <string_view>
 
@@ -9,13 +10,13 @@
 #include "tests/support/formats/picture_files.h"
 #include "tests/support/scenes/test_exif.h"
 
-// libx265, which makes the seeds that are HEIC files, loses a block of its own at its end.
+// libx265, which encodes the HEIC seeds, leaks a block at exit.
 extern "C" const char* __lsan_default_suppressions() { return "leak:libx265\n"; }
 
 namespace color3d {
 namespace {
 
-constexpr int64_t kDecodedPixels = 4096;  // more says no more, and takes long
+constexpr int64_t kDecodedPixels = 4096;  // larger pictures are slow and test no more
 
 // 4 x 2 grey pixels in one strip, little-endian.
 std::string Tiff() {
@@ -38,7 +39,7 @@ std::string Tiff() {
   return file + "abcdefgh";
 }
 
-// Of no width when it claims to be larger than we take, which is another refusal.
+// Has width 0 if the header exceeds our limits, which are tested elsewhere.
 ImageInfo ProbeUnlessHuge(std::string_view bytes) {
   try {
     const ImageInfo info = ProbeImage(bytes, "picture");

@@ -1,4 +1,4 @@
-// Fuzz target: CreateJob requests: their checks and the planned graphs.
+// Fuzz target: CreateJob requests, their checks and planned graphs.
 #include "core/catalogue/stages.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/plan_scenes.h"
@@ -18,7 +18,7 @@ constexpr SceneFacts kFacts[] = {{.pictures = 20, .layout = CaptureLayout::kColm
                                  {.pictures = 90, .layout = CaptureLayout::kFilm},
                                  {.layout = CaptureLayout::kSplat}};
 
-// A job of each kind that others read.
+// A job of each kind that other jobs read.
 std::vector<JobRecord> InputsOf(const std::string& scene) {
   std::vector<JobRecord> inputs;
   for (const char* kind : {kind::kImportScene,

@@ -1,4 +1,4 @@
-// Fuzz target: ColorizeImages requests, as the server resolves them before a worker sees anything.
+// Fuzz target: ColorizeImages requests as the server resolves them, without a worker.
 #include <atomic>
 
 #include "core/base/files.h"
@@ -15,7 +15,7 @@ namespace {
 
 constexpr char kScene[] = "scenes/with-colorizer";
 
-// A store with one colorizer, and blobs that requests may name.
+// A store with a colorizer, and blobs that requests may name.
 struct Fixture {
   ScratchFolder scratch;
   FileBlobStore blobs{scratch.path() / "blobs", {0}};

@@ -1,4 +1,4 @@
-// Fuzz target: names, tokens and digests of requests, and the file of tokens.
+// Fuzz target: names, page tokens and digests of requests, and the file of access tokens.
 #include <string_view>
 
 #include "server/access/tokens.h"

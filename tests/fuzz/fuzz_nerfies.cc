@@ -1,5 +1,5 @@
-// Fuzz target: the JSON and the points of scenes of Nerfies and HyperNeRF. An input is the files
-// metadata.json, camera/a.json, camera/b.json and points.npy, with kBetween between them.
+// Fuzz target: JSON and points of scenes of Nerfies and HyperNeRF. An input consists of the files
+// metadata.json, camera/a.json, camera/b.json and points.npy, separated by kBetween.
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -31,7 +31,7 @@ class SceneFolder {
     }
   }
   const fs::path& path() const { return scratch_.path(); }
-  // Those that are missing at the end are not there.
+  // Files missing at the end do not exist.
   void Write(std::string_view input) const {
     for (const char* file : kFiles) {
       const size_t end = input.find(kBetween);

@@ -1,4 +1,4 @@
-// Fuzz target: the pickle machine and what is made of its values. The input is data.pkl of a sound
+// Fuzz target: the pickle machine and the use of its values. The input is data.pkl of a valid
 // archive with one storage; an odd first byte makes it TorchScript.
 #include <string_view>
 

@@ -1,4 +1,4 @@
-// Fuzz target: clouds of points in PLY files.
+// Fuzz target: point clouds in PLY files.
 #include <string_view>
 
 #include "core/scene/formats/point_ply.h"

@@ -1,4 +1,4 @@
-// Fuzz target: NumPy's files, and LLFF's poses_bounds.npy of films.
+// Fuzz target: NumPy files, and LLFF's poses_bounds.npy with films.
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kMaxValues = 1000;
 
-// Two films without a frame: only their names are read.
+// Two empty films, of which only the names are read.
 const std::filesystem::path& FolderOfFilms() {
   static const ScratchFolder scratch(MemoryFolder());
   static const bool made = [] {
@@ -44,7 +44,7 @@ void CheckFilm(const CameraFilm& film) {
 }  // namespace
 
 std::vector<std::string> FuzzSeeds() {
-  // Down, right, backwards, place, size and focal length.
+  // Down, right, backwards, position, size and focal length.
   std::vector<double> row = {0, 1, 0, 0.5, 64, -1, 0, 0, 0.25, 96, 0, 0, 1, 4, 60, 1, 9};
   std::vector<double> rows = row;
   rows.insert(rows.end(), row.begin(), row.end());

@@ -11,7 +11,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     color3d::WeightMetadata metadata;
     const color3d::WeightMap weights = color3d::ParseSafetensors(bytes, &metadata);
     color3d::CheckAccepted(weights, size);
-    // Weights that were read can be written, and read back the same.
+    // Weights survive writing and reading.
     const std::string written = color3d::SerializeSafetensors(weights, false, metadata);
     if (color3d::SerializeSafetensors(color3d::ParseSafetensors(written), false, metadata) !=
         written) {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr char kTransforms[] = R"({"frames": [{"file_path": "a.png"}]})";
 
-// With blobs that requests may name.
+// A store with blobs that requests may name.
 struct Fixture {
   ScratchFolder scratch;
   FileBlobStore blobs{scratch.path(), {0}};

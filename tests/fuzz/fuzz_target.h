@@ -1,5 +1,5 @@
-// The function that every fuzz target defines. libFuzzer drives it in builds with COLOR3D_FUZZ; in
-// all others replay_main.cc runs the seeds and seeded mutations of them as a test.
+// The functions that every fuzz target defines. libFuzzer drives them in builds with COLOR3D_FUZZ;
+// otherwise replay_main.cc runs the seeds and their seeded mutations as a test.
 #pragma once
 
 #include <cstddef>
@@ -11,16 +11,16 @@
 
 #include "core/base/error.h"
 
-// Returns 0; anything that is wrong aborts.
+// Returns 0; aborts on a finding.
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size);
 
 namespace color3d {
 
-// Inputs to start from: well formed and nearly well formed.
+// Seeds: inputs that are well formed, or nearly so.
 std::vector<std::string> FuzzSeeds();
 
-// Runs the reader on one input. The only thing that it may throw is Error{kInvalidArgument} with a
-// message of one line: anything else is a finding.
+// Runs the reader on one input. It may only throw Error{kInvalidArgument} with a message of one
+// line; anything else is a finding.
 template <typename Reader>
 int ReadOrRefuse(Reader&& reader) {
   try {

@@ -1,4 +1,4 @@
-// Fuzz target: a whole PyTorch archive, from the zip directory to the tensors.
+// Fuzz target: PyTorch archives, from the ZIP directory to the tensors.
 #include <string_view>
 
 #include "core/weights/weight_file.h"

@@ -1,5 +1,5 @@
-// Fuzz target: transforms.json, as the server looks at it, as a worker reads it, and as cameras to
-// render from.
+// Fuzz target: transforms.json as checked by the server, as read by a worker, and as cameras of a
+// render.
 #include <cmath>
 #include <string_view>
 
@@ -21,7 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   });
   return ReadOrRefuse([&] {
     const nlohmann::json root = ParseFrames(text, "transforms.json");
-    // The server refuses nothing that a worker accepts.
+    // The server accepts everything that a worker accepts.
     if (!outline.is_object) std::abort();
     for (const nlohmann::json& frame : root["frames"]) {
       if (outline.frames == 0) std::abort();

@@ -1,8 +1,8 @@
-// Runs a fuzz target without libFuzzer: on its seeds, on every prefix of them, on a corpus, and on
-// seeded mutations. The same inputs on every run.
-//   NAME_replay CORPUS [RUNS]   the folder's files are seeds, too; RUNS: number of mutations
-//   NAME_replay FILE...         only these
-//   NAME_replay --write FOLDER  writes the seeds there, for libFuzzer to start from
+// Runs a fuzz target without libFuzzer on its seeds, all their prefixes, a corpus, and seeded
+// mutations. All runs have the same inputs.
+//   NAME_replay CORPUS [RUNS]   also uses the files of the folder; RUNS: number of mutations
+//   NAME_replay FILE...         only these inputs
+//   NAME_replay --write FOLDER  writes the seeds to the folder, for libFuzzer
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -17,13 +17,13 @@
 namespace color3d {
 namespace {
 
-constexpr size_t kRuns = 50000;  // of mutations; of prefixes all, if they are not more
+constexpr size_t kRuns = 50000;  // number of mutations; maximum number of prefixes
 
 void RunOne(const std::string& input) {
   LLVMFuzzerTestOneInput(reinterpret_cast<const uint8_t*>(input.data()), input.size());
 }
 
-// Numbers at which readers go wrong.
+// Numbers that break readers.
 uint64_t StrangeNumber(Random& random) {
   constexpr uint64_t kStrange[] = {0,
                                    1,
@@ -66,7 +66,7 @@ void Mutate(const std::vector<std::string>& seeds, Random& random, std::string& 
       input.replace(place, size, reinterpret_cast<const char*>(&number), size);
       break;
     }
-    default: {  // the head of this and the tail of another
+    default: {  // head of this input and tail of another
       const std::string& other = seeds[random.NextBelow(static_cast<uint32_t>(seeds.size()))];
       const size_t tail = random.NextBelow(static_cast<uint32_t>(other.size()) + 1);
       input = input.substr(0, place) + other.substr(tail);
@@ -103,7 +103,7 @@ int ReplayCorpus(const std::filesystem::path& folder, size_t runs) {
   std::vector<std::string> corpus;
   for (const std::string& file : ListFiles(folder)) corpus.push_back(ReadFile(folder / file));
   if (corpus.empty()) {
-    std::fprintf(stderr, "%s holds no inputs\n", folder.c_str());
+    std::fprintf(stderr, "%s has no inputs\n", folder.c_str());
     return 1;
   }
   Replay(FuzzSeeds(), corpus, runs);

@@ -1,4 +1,4 @@
-// For fuzz targets of requests.
+// Checks of fuzz targets of requests.
 #pragma once
 
 #include <google/protobuf/stubs/logging.h>
@@ -14,7 +14,7 @@
 
 namespace color3d {
 
-// What clients are told is of one line, whatever they had sent, and blames the request: with
+// Checks that the error has a message of one line and a code that blames the request:
 // INVALID_ARGUMENT, NOT_FOUND, or one of `others`.
 template <class Reader>
 int AnswerOrRefuse(Reader&& reader, std::initializer_list<grpc::StatusCode> others = {}) {
@@ -30,7 +30,7 @@ int AnswerOrRefuse(Reader&& reader, std::initializer_list<grpc::StatusCode> othe
   return 0;
 }
 
-// False for bytes that are no such message; without a line in the log for each.
+// Returns false for bytes that are not such a message, without logging them.
 template <class Request>
 bool ParseRequest(const uint8_t* data, size_t size, Request* request) {
   static const auto kNoLog = google::protobuf::SetLogHandler(nullptr);

@@ -8,7 +8,8 @@
 
 namespace color3d {
 
-// Shapes and values agree, and the arrays take at most 8 times the input's bytes and a megabyte.
+// Shapes and values agree, and the arrays take at most 8 times the bytes of the input plus a
+// megabyte.
 inline void CheckAccepted(const WeightMap& weights, size_t input_bytes) {
   size_t values = 0;
   for (const auto& [name, array] : weights) {

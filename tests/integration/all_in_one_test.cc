@@ -1,5 +1,5 @@
-// `color3d job submit --all-in-one`: the personalize jobs of many scenes run in one worker
-// together, and survive its death.
+// `color3d job submit --all-in-one`: the personalize jobs of many scenes run together in one
+// worker, and survive its death.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 using std::chrono::seconds;
 
-// Many scenes (the long test): COLOR3D_ALL_IN_ONE_SCENES=140.
+// Number of scenes. The long test has COLOR3D_ALL_IN_ONE_SCENES=140.
 int SceneCount() {
   const char* text = std::getenv("COLOR3D_ALL_IN_ONE_SCENES");
   return text != nullptr ? std::atoi(text) : 5;
@@ -31,7 +31,7 @@ class AllInOneTest : public ServiceTest {
     room.height = 48;
     std::vector<std::string> scenes;
     for (int i = 0; i < count; ++i) {
-      room.seed = static_cast<uint64_t>(i) + 1;  // equal photos would be one scene
+      room.seed = static_cast<uint64_t>(i) + 1;  // equal photos would give one scene
       const std::string folder = Path("room" + std::to_string(i)).string();
       WriteProceduralScene(folder, room);
       const ProcessResult created = Client({"scene", "create", folder, "--json"});

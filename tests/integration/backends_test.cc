@@ -1,5 +1,5 @@
-// Model servers of users' kinds behind a real server: the examples in C++ and Python, and the
-// adapter to an image-edit server. Those in Python are skipped where its packages are missing.
+// Model servers behind a real server: the examples in C++ and Python, and the adapter to an
+// image-edit server. Skips those in Python if its packages are missing.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -46,16 +46,16 @@ std::string PythonScript(const std::string& name) {
 class BackendsTest : public ServiceTest {
  protected:
   void MakeScene();
-  // Submits and waits; the job as it ended.
+  // Submits a job, waits for its end and returns it.
   v1::Job Run(const std::string& kind, const json& spec);
-  // The key view coloured by the backend, and the job that did it.
+  // Colours the key view by the backend and returns the job.
   v1::Job ColorKeyView(const std::string& backend, const std::string& prompt = "", int seed = 1);
   fs::path Download(const v1::Job& job);
-  // Mean of a plane of Lab over the coloured key view.
+  // Mean of a Lab plane of the coloured key view.
   double MeanOf(const v1::Job& job, int plane);
-  // Runs generate_augmentations with four outpainted pictures of `backend` and judges them.
+  // Runs generate_augmentations with four outpainted pictures of `backend` and checks them.
   void ExpectPicturesOf(const std::string& backend, const v1::Job& key_color);
-  // Empty: the interpreter has these modules, and the protocol can be compiled for it.
+  // Returns why the interpreter cannot run the protocol with these modules; empty: it can.
   std::string MissingFor(const std::string& modules);
 
   std::string scene_;
@@ -122,7 +122,8 @@ void BackendsTest::ExpectPicturesOf(const std::string& backend, const v1::Job& k
     const Image picture =
         ReadImage(folder / "augmentations" / (sample.at("name").get<std::string>() + ".png"));
     EXPECT_FALSE(IsGray(picture));
-    EXPECT_NE(picture.data, before.data) << "each shows the key view in another corner";
+    EXPECT_NE(picture.data, before.data)
+        << "the pictures do not show the key view in different corners";
     before = picture;
   }
 }
@@ -184,7 +185,7 @@ TEST_F(BackendsTest, EditServerAdapterColorsAndGenerates) {
                           "mine"});
   StartServer({"--backend", "edit=" + backend.address(), "--retry-backoff-ms", "50"});
   MakeScene();
-  // Texts and numbers of the job's spec reach the edit server.
+  // The edit server receives texts and numbers of the job's spec.
   const v1::Job red = ColorKeyView("edit", "red brick"), blue = ColorKeyView("edit", "blue paint");
   EXPECT_GT(MeanOf(red, 1), 3.0);
   EXPECT_LT(MeanOf(blue, 2), -3.0);

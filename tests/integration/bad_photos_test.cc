@@ -1,4 +1,4 @@
-// Scenes that cannot work: each is refused in one clear line, and the server continues.
+// Unusable scenes are refused with a message of one line, and the server continues.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Nothing here trains anything.
+// No test here trains a model.
 constexpr std::chrono::seconds kLimit{150};
 
 class BadPhotosTest : public ServiceTest {
@@ -64,14 +64,16 @@ std::string PngChecksum(const std::string& bytes) {
   return big_endian;
 }
 
-TEST_F(BadPhotosTest, NoSuchFolder) { ExpectRefusal(Colorize(Path("nowhere")), 2, {"nowhere"}); }
+TEST_F(BadPhotosTest, RefusesMissingFolder) {
+  ExpectRefusal(Colorize(Path("nowhere")), 2, {"nowhere"});
+}
 
-TEST_F(BadPhotosTest, EmptyFolder) {
+TEST_F(BadPhotosTest, RefusesEmptyFolder) {
   fs::create_directories(Path("empty"));
   ExpectRefusal(Colorize(Path("empty")), 2, {"empty", "no photo"});
 }
 
-TEST_F(BadPhotosTest, OnePhoto) {
+TEST_F(BadPhotosTest, RefusesSinglePhoto) {
   const fs::path room = BareRoom();
   for (const char* name : {"view001.png", "view002.png", "view003.png"}) {
     fs::remove(room / "images" / name);
@@ -79,20 +81,20 @@ TEST_F(BadPhotosTest, OnePhoto) {
   ExpectRefusal(Colorize(room), 2, {"one photo", "view000.png"});
 }
 
-TEST_F(BadPhotosTest, TextFileNamedJpg) {
+TEST_F(BadPhotosTest, RefusesTextFileNamedJpg) {
   const fs::path room = BareRoom();
   Overwrite(room / "images" / "notes.jpg", "This is a list of things to photograph.\n");
   ExpectRefusal(Colorize(room), 2, {"notes.jpg", "not an image"});
 }
 
-TEST_F(BadPhotosTest, TruncatedJpeg) {
+TEST_F(BadPhotosTest, RefusesTruncatedJpeg) {
   const fs::path room = BareRoom();
   const std::string jpeg = EncodeJpeg(ReadImage(room / "images" / "view000.png"));
   Overwrite(room / "images" / "cut.jpg", jpeg.substr(0, jpeg.size() * 2 / 3));
   ExpectRefusal(Colorize(room), 2, {"cut.jpg", "truncated"});
 }
 
-TEST_F(BadPhotosTest, TwentyBytesNamedPng) {
+TEST_F(BadPhotosTest, RefusesPngOfTwentyBytes) {
   const fs::path room = BareRoom();
   // Signature, length and type of IHDR, and half of it: 60000 px wide.
   std::string bytes("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xea\x60", 20);
@@ -101,7 +103,7 @@ TEST_F(BadPhotosTest, TwentyBytesNamedPng) {
   ExpectRefusal(Colorize(room), 2, {"bomb.png"});
 }
 
-TEST_F(BadPhotosTest, PngHeaderOf60000Squared) {
+TEST_F(BadPhotosTest, RefusesPngHeaderOf60000By60000Px) {
   const fs::path room = BareRoom();
   std::string png = ReadFile(room / "images" / "view000.png");
   const std::string side("\0\0\xea\x60", 4);
@@ -113,14 +115,14 @@ TEST_F(BadPhotosTest, PngHeaderOf60000Squared) {
   ExpectRefusal(result, result.exit_code, {"bomb.png", "60000"});
 }
 
-TEST_F(BadPhotosTest, PhotoShapeDiffersFromCamera) {
+TEST_F(BadPhotosTest, RefusesPhotoOfOtherShapeThanCamera) {
   const fs::path room = PosedRoom();
   const Image photo = ReadImage(room / "images" / "view002.png");
   Overwrite(room / "images" / "view002.png", EncodePng8(Resize(photo, 120, 160)));
   ExpectRefusal(Colorize(room), 2, {"view002.png", "120", "160"});
 }
 
-TEST_F(BadPhotosTest, ModelWithoutItsPhotos) {
+TEST_F(BadPhotosTest, RefusesModelWithoutPhotos) {
   const fs::path room = PosedRoom();
   for (const std::string view : {"1", "2", "3"}) {
     fs::rename(room / "images" / ("view00" + view + ".png"),
@@ -129,7 +131,7 @@ TEST_F(BadPhotosTest, ModelWithoutItsPhotos) {
   ExpectRefusal(Colorize(room), 2, {"view001.png", "1 are among those given"});
 }
 
-TEST_F(BadPhotosTest, NanInPoints) {
+TEST_F(BadPhotosTest, RefusesNanInPoints) {
   const fs::path room = PosedRoom();
   const fs::path points = room / "sparse" / "0" / "points3D.txt";
   std::string text = ReadFile(points);
@@ -140,7 +142,7 @@ TEST_F(BadPhotosTest, NanInPoints) {
   ExpectRefusal(Colorize(room), 2, {"points3D.txt"});
 }
 
-TEST_F(BadPhotosTest, PoseWithoutARotation) {
+TEST_F(BadPhotosTest, RefusesPoseWithoutRotation) {
   const fs::path room = PosedRoom();
   const fs::path images = room / "sparse" / "0" / "images.txt";
   const std::string text = ReadFile(images);
@@ -152,13 +154,13 @@ TEST_F(BadPhotosTest, PoseWithoutARotation) {
   ExpectRefusal(Colorize(room), 2, {"images.txt"});
 }
 
-TEST_F(BadPhotosTest, IncompleteModel) {
+TEST_F(BadPhotosTest, RefusesIncompleteModel) {
   const fs::path room = PosedRoom();
   fs::remove(room / "sparse" / "0" / "cameras.txt");
   ExpectRefusal(Colorize(room), 2, {"cameras"});
 }
 
-TEST_F(BadPhotosTest, BenchmarkOfMonochromePhotos) {
+TEST_F(BadPhotosTest, RefusesBenchmarkOfMonochromePhotos) {
   ProceduralSceneOptions options = SmallRoom(4, /*gray=*/true);
   options.width = 160;
   options.height = 120;
@@ -166,8 +168,8 @@ TEST_F(BadPhotosTest, BenchmarkOfMonochromePhotos) {
   ExpectRefusal(Colorize(Path("gray")), 2, {"colour"});
 }
 
-// COLMAP runs, finds nothing in common, and the message says so.
-TEST_F(BadPhotosTest, PhotosWithoutOverlap) {
+// COLMAP runs and finds no matches, which the message states.
+TEST_F(BadPhotosTest, RefusesPhotosWithoutOverlap) {
   fs::create_directories(Path("noise"));
   for (int i = 0; i < 5; ++i) {
     Random random(static_cast<uint64_t>(i + 1));

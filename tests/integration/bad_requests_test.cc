@@ -1,4 +1,4 @@
-// Wrong options, key colours and surroundings: each is refused in one clear line.
+// Wrong options, key colours and environments are refused with a message of one line.
 #include <gtest/gtest.h>
 #include <sys/mount.h>
 
@@ -41,7 +41,7 @@ class BadRequestsTest : public ServiceTest {
   }
 };
 
-TEST_F(BadRequestsTest, KeyColorOfAnotherSize) {
+TEST_F(BadRequestsTest, RefusesKeyColorOfAnotherSize) {
   StartServer();
   GrayRoom();
   const Image truth = ReadImage(Path("room") / "truth" / "view002.png");
@@ -51,7 +51,7 @@ TEST_F(BadRequestsTest, KeyColorOfAnotherSize) {
                 {"100x75", "160x120"});
 }
 
-TEST_F(BadRequestsTest, KeyColorWithoutColor) {
+TEST_F(BadRequestsTest, RefusesKeyColorWithoutColor) {
   StartServer();
   const fs::path room = GrayRoom();
   ExpectRefusal(
@@ -61,14 +61,14 @@ TEST_F(BadRequestsTest, KeyColorWithoutColor) {
       {"no colour"});
 }
 
-TEST_F(BadRequestsTest, KeyColorIsNoImage) {
+TEST_F(BadRequestsTest, RefusesKeyColorThatIsNoImage) {
   StartServer();
   GrayRoom();
   WriteFileAtomic(Path("text.png"), "not a picture");
   ExpectRefusal(Colorize({"--key-color", Path("text.png").string()}), 2, {"text.png"});
 }
 
-TEST_F(BadRequestsTest, HintsOnNoPixel) {
+TEST_F(BadRequestsTest, RefusesHintsOutsideThePicture) {
   StartServer();
   GrayRoom();
   WriteFileAtomic(Path("hints.json"), R"([{"x": 5000, "y": 20, "radius": 3, "color": "#ff0000"}])");
@@ -76,7 +76,7 @@ TEST_F(BadRequestsTest, HintsOnNoPixel) {
       Colorize({"--key-view", "view001", "--hints", Path("hints.json").string()}), 2, {"hint"});
 }
 
-TEST_F(BadRequestsTest, EmptyHints) {
+TEST_F(BadRequestsTest, RefusesEmptyHints) {
   StartServer();
   GrayRoom();
   WriteFileAtomic(Path("hints.json"), "[]");
@@ -84,25 +84,25 @@ TEST_F(BadRequestsTest, EmptyHints) {
       Colorize({"--key-view", "view001", "--hints", Path("hints.json").string()}), 2, {"hint"});
 }
 
-TEST_F(BadRequestsTest, UnknownKeyView) {
+TEST_F(BadRequestsTest, RefusesUnknownKeyView) {
   StartServer();
   GrayRoom();
   ExpectRefusal(Colorize({"--key-view", "view099"}), 2, {"view099"});
 }
 
-TEST_F(BadRequestsTest, UnknownPreset) {
+TEST_F(BadRequestsTest, RefusesUnknownPreset) {
   StartServer();
   GrayRoom();
   ExpectRefusal(Colorize({"--preset", "heroic"}), 2, {"heroic"});
 }
 
-TEST_F(BadRequestsTest, OptionOutOfRange) {
+TEST_F(BadRequestsTest, RefusesOptionOutOfRange) {
   StartServer();
   GrayRoom();
   ExpectRefusal(Colorize({"--max-side", "3"}), 2, {"64"});
 }
 
-TEST_F(BadRequestsTest, TimeBudgetTooShort) {
+TEST_F(BadRequestsTest, RefusesTimeBudgetTooShort) {
   StartServer();
   ExpectRefusal(Client({"colorize",
                         GrayRoom().string(),
@@ -119,21 +119,21 @@ TEST_F(BadRequestsTest, TimeBudgetTooShort) {
                 {"time_budget_seconds is 12", "4 photos", "give at least"});
 }
 
-TEST_F(BadRequestsTest, UnreadableTimeBudget) {
+TEST_F(BadRequestsTest, RefusesUnreadableTimeBudget) {
   StartServer();
   GrayRoom();
   ExpectRefusal(Colorize({"--time-budget", "soon"}), 2, {"soon"});
 }
 
-TEST_F(BadRequestsTest, UnreachableServer) {
+TEST_F(BadRequestsTest, NamesUnreachableServer) {
   GrayRoom();
-  // Port 1 is never ours.
+  // No server listens on port 1.
   const ProcessResult result = Colorize({"--server", "127.0.0.1:1"});
   ExpectRefusal(result, 3, {"127.0.0.1:1"});
   EXPECT_LT(result.seconds, 30.0);
 }
 
-TEST_F(BadRequestsTest, PortInUse) {
+TEST_F(BadRequestsTest, RefusesPortInUse) {
   StartServer();
   const ProcessResult second =
       Serve({"--listen", server().address(), "--data-dir", Path("other").string()});
@@ -141,7 +141,7 @@ TEST_F(BadRequestsTest, PortInUse) {
   ExpectRefusal(second, second.exit_code, {server().address()});
 }
 
-TEST_F(BadRequestsTest, DataFolderInUse) {
+TEST_F(BadRequestsTest, RefusesDataFolderInUse) {
   StartServer();
   const ProcessResult second =
       Serve({"--listen", "127.0.0.1:0", "--data-dir", (Path("server") / "data").string()});
@@ -149,7 +149,7 @@ TEST_F(BadRequestsTest, DataFolderInUse) {
   ExpectRefusal(second, second.exit_code, {(Path("server") / "data").string()});
 }
 
-TEST_F(BadRequestsTest, ReadOnlyDataFolder) {
+TEST_F(BadRequestsTest, RefusesReadOnlyDataFolder) {
   WriteFileAtomic(Path("file"), "in the way");
   // Writing below a regular file fails, even for root.
   for (const std::string& folder : {(Path("file") / "data").string(), std::string("/proc/data")}) {
@@ -160,21 +160,21 @@ TEST_F(BadRequestsTest, ReadOnlyDataFolder) {
   }
 }
 
-TEST_F(BadRequestsTest, PublicAddressWithoutTls) {
+TEST_F(BadRequestsTest, RefusesPublicAddressWithoutTls) {
   const ProcessResult result =
       Serve({"--listen", "0.0.0.0:0", "--data-dir", Path("data").string()});
   EXPECT_NE(result.exit_code, 0);
   ExpectRefusal(result, result.exit_code, {"0.0.0.0"});
 }
 
-TEST_F(BadRequestsTest, DiskWithoutRoom) {
-  // More than any disk has must stay free.
+TEST_F(BadRequestsTest, RefusesDiskWithoutSpace) {
+  // The reserve is larger than any disk.
   StartServer({"--reserve-mib", "1000000000"});
   GrayRoom();
   ExpectRefusal(Colorize({}), 4, {"space"});
 }
 
-// A file system that is gone when the test is.
+// A mounted file system, unmounted by the destructor.
 class SmallDisk {
  public:
   explicit SmallDisk(const fs::path& folder) : folder_(folder) {
@@ -193,7 +193,7 @@ class SmallDisk {
   bool mounted_ = false;
 };
 
-TEST_F(BadRequestsTest, DiskFillsUpDuringAJob) {
+TEST_F(BadRequestsTest, FailsWhenDiskFillsUpDuringJob) {
   const SmallDisk disk(Path("server") / "data");
   if (!disk.mounted()) GTEST_SKIP() << "mounting a small file system is not allowed here";
   StartServer({"--reserve-mib", "2"});
@@ -205,7 +205,7 @@ TEST_F(BadRequestsTest, DiskFillsUpDuringAJob) {
   StopServer();
 }
 
-TEST_F(BadRequestsTest, ManifestPathsOutsideTheScene) {
+TEST_F(BadRequestsTest, RefusesManifestPathsOutsideScene) {
   StartServer();
   for (const char* path : {"../secret.png",
                            "images/../../secret.png",

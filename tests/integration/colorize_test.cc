@@ -40,7 +40,7 @@ void ColorizeTest::ExpectSameBytesFromArtifactDownload(const std::string& job) {
   EXPECT_GE(files, 6);
 }
 
-// `view` brings the page of a job and of its scene, and finds it in a folder of results.
+// `view` downloads the page of a job and of its scene, and finds it in a folder of results.
 void ColorizeTest::ExpectPageToLookAt(const v1::Job& job) {
   const std::string out = Path("page").string();
   const ProcessResult of_job = Client({"view", job.name(), "-o", out, "--no-open", "--json"});
@@ -131,7 +131,7 @@ void ExpectMetrics(const json& metrics) {
     ASSERT_TRUE(metrics[name].is_number()) << name;
     EXPECT_TRUE(std::isfinite(metrics[name].get<double>())) << name;
   }
-  // Far below the result of a full schedule, far above that of a fault.
+  // Far below the result of a full schedule, far above that of an error.
   EXPECT_GT(metrics["psnr_l"].get<double>(), 17.0);
   EXPECT_LT(metrics["delta_e00_chroma_2d"].get<double>(), metrics["delta_e00_gray"].get<double>());
   EXPECT_LT(metrics["delta_e00_chroma"].get<double>(), metrics["delta_e00_gray"].get<double>());
@@ -181,7 +181,7 @@ TEST_F(ColorizeTest, BenchmarkIsScoredThenServedFromTheCache) {
     EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << job.kind();
     EXPECT_EQ(job.attempt(), 1) << job.kind();
   }
-  // But for the import that selecting the key view has done before.
+  // Except the import, which ran for the selection of the key view.
   ASSERT_LE(CountCached(server().ListJobs()), 1);
 
   const ProcessResult second = Client(command("second"));
@@ -197,7 +197,7 @@ TEST_F(ColorizeTest, ColorsMonochromePhotosFromAPaintedKeyView) {
   const std::string room = Path("room").string(), out = Path("out").string();
   const ProcessResult select = Client({"colorize", room, "-o", out});
   ASSERT_EQ(select.exit_code, 0) << select.err;
-  EXPECT_NE(select.out.find("--key-color"), std::string::npos) << "it does not say how to go on";
+  EXPECT_NE(select.out.find("--key-color"), std::string::npos) << "the next command is not printed";
   const Image key = ReadImage(Path("out") / "key_view.png");
   EXPECT_EQ(key.width, 240);
   EXPECT_TRUE(IsGray(key));
@@ -206,7 +206,7 @@ TEST_F(ColorizeTest, ColorsMonochromePhotosFromAPaintedKeyView) {
   const std::string name = KeyView(Path("out"));
   EXPECT_EQ(ReadImage(Path("room") / "images" / name).data, key.data);
 
-  // The name of the coloured file says nothing of the view: OUT remembers it.
+  // The view does not follow from the name of the coloured file: OUT records it.
   fs::copy_file(Path("room") / "truth" / name, Path("painted.png"));
   const ProcessResult color =
       Client(std::vector<std::string>{
@@ -258,7 +258,7 @@ TEST_F(ColorizeTest, ColorsTheKeyViewByJsonHints) {
                 seconds(60)));
 }
 
-// Schedules of hours, cut to seconds: the result must still be whole.
+// Schedules of hours, cut to seconds: the result must still be complete.
 TEST_F(ColorizeTest, TimeBudgetShortensTheSchedules) {
   WriteProceduralScene(Path("room"), SmallRoom(6));
   const ProcessResult result = Client({"colorize",

@@ -43,7 +43,7 @@ class CorrectTest : public ServiceTest {
     EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
     return json::parse(result.out, nullptr, /*allow_exceptions=*/false);
   }
-  // The stages that were not found done already.
+  // The stages that ran, i.e. were not in the cache.
   std::set<std::string> Done(const json& answer) {
     std::set<std::string> kinds;
     for (const v1::Job& job : server().ListJobs()) {
@@ -57,7 +57,7 @@ class CorrectTest : public ServiceTest {
     EXPECT_NE(result.exit_code, 0) << why;
     EXPECT_THAT(result.err, HasSubstr(why));
   }
-  // Mean a of a render around a place, 0..1 of the picture.
+  // Mean a of a render around a position, in 0..1 of the picture.
   double RednessAt(const std::string& view, double x, double y) const {
     const Image lab = LabFromSrgb(ReadImage(Path("out") / "renders" / view));
     double sum = 0.0;
@@ -81,7 +81,7 @@ TEST_F(CorrectTest, ProposesPlacesAppliesAStrokeAndUndoesIt) {
   const Image photo = ReadImage(Path("room") / "images" / proposed_view);
   EXPECT_EQ(to_paint.width, photo.width);
   EXPECT_EQ(to_paint.height, photo.height);
-  EXPECT_EQ(ReadFile(Path("out") / "model.c3g"), before) << "nothing was to be changed";
+  EXPECT_EQ(ReadFile(Path("out") / "model.c3g"), before) << "proposals changed the model";
   EXPECT_EQ(Done(proposed), std::set<std::string>{"correct_colors"});
 
   // The user's paint is not overwritten.
@@ -126,7 +126,7 @@ TEST_F(CorrectTest, ChangesSaturationAndWhiteBalance) {
   EXPECT_LT(chroma / static_cast<double>(gray.PlaneSize()), 0.5);
   const double neutral = RednessAt(kView, 0.5, 0.6);
   const json tinted = Correct({"--tint", "20"});
-  EXPECT_GT(RednessAt(kView, 0.5, 0.6), neutral + 5.0) << "saturation stays as it was";
+  EXPECT_GT(RednessAt(kView, 0.5, 0.6), neutral + 5.0) << "saturation was lost";
   ExpectRefused({"--saturation", "9"}, "saturation");
 }
 
@@ -138,7 +138,7 @@ TEST_F(CorrectTest, RefusesBadInputWithARemedy) {
   ExpectRefused({"--view", "view002"}, "needs a correction");
   ExpectRefused({"--at", "5,5", "--color", "#ff0000"}, "--view is missing");
   ExpectRefused({"--undo", "some"}, "give a number, or all");
-  // A picture that was not painted on.
+  // A picture without paint.
   ExpectRefused(
       {"--view", "view001", "--image", (Path("room") / "images" / "view001.png").string()},
       "colour");

@@ -1,4 +1,4 @@
-// Films through the service: frames in, coloured frames and a movie out, or one clear line.
+// Films through the service: coloured frames and a movie, or a message of one line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 
 constexpr int kWidth = 192, kHeight = 128, kFrames = 17;
 
-// A camera pans over a wall of red and green before which a blue thing walks.
+// A camera pans over a red and green wall, in front of which a blue object moves.
 Image FrameOf(int frame) {
   Image image(kWidth, kHeight, 3);
   for (int y = 0; y < kHeight; ++y) {
@@ -57,7 +57,7 @@ class FilmTest : public ServiceTest {
       WriteFileAtomic(Path("frames") / ("n" + number + ".png"), EncodePng8(FrameOf(i)));
     }
   }
-  // Before it, a thing moves.
+  // In front of it an object moves.
   void WriteFramesOfAStillCamera() {
     fs::create_directories(Path("frames"));
     const Camera camera{320, 240, 330.0, 330.0, 160.0, 120.0};
@@ -221,7 +221,7 @@ TEST_F(FilmTest, ColorsAVideoFromOnePaintedFrame) {
   FilmReader movie(Path("out") / "scene.mp4");
   ASSERT_EQ(movie.times().size(), 13u);
   EXPECT_NEAR(movie.times()[1], 1.0 / 12.0, 0.01);
-  // The thing that walks is blue at the end as at the beginning.
+  // The moving object stays blue to the end.
   for (const int frame : {0, 12}) {
     const Image image = movie.Read(frame);
     const int x = 40 + 5 * frame;
@@ -229,7 +229,7 @@ TEST_F(FilmTest, ColorsAVideoFromOnePaintedFrame) {
   }
 }
 
-// Only the left half is painted, where the thing walks; the rest is open.
+// Only the left half, with the moving object, is painted; the rest is open.
 TEST_F(FilmTest, PartlyPaintedFrameColorsOnlyItsPaint) {
   WriteFrames();
   const Image truth = FrameOf(6);
@@ -247,7 +247,7 @@ TEST_F(FilmTest, PartlyPaintedFrameColorsOnlyItsPaint) {
     const Image image = movie.Read(frame);
     const int x = 40 + 5 * frame;
     EXPECT_GT(image.At(2, 70, x), image.At(0, 70, x) + 0.15f) << frame;
-    // The wall of the painted half, as far as it moves on to here.
+    // The wall of the painted half, as far as it is visible here.
     const int wall = 39 - 3 * frame / 2;
     const Image truth_here = FrameOf(frame);
     EXPECT_NEAR(image.At(0, 20, wall) - image.At(1, 20, wall),

@@ -10,7 +10,7 @@ import os
 import re
 import sys
 
-# As they lie about after a local build.
+# Files of a local build.
 BUILT = ["build/CMakeCache.txt", "build/bin/color3d", "build-tsan/CMakeCache.txt", "build-fuzz/x.o",
          ".git/config", ".cache/clangd/index", "tests/.npm/x", "a/b/node_modules/x.js",
          "tests/__pycache__/x.pyc"]
@@ -36,11 +36,11 @@ def main(root):
     with open(os.path.join(root, ".dockerignore")) as file:
         lines = [line.strip() for line in file if line.strip() and not line.startswith("#")]
     if any(line.startswith("!") for line in lines):
-        problems.append(".dockerignore has an exception ('!'), which this test does not know")
+        problems.append(".dockerignore has an exception ('!'), which this test does not support")
     patterns = [to_regex(line) for line in lines]
     is_ignored = lambda path: any(pattern.match(path) for pattern in patterns)
-    problems += [f"{path} would be copied into the image's build" for path in BUILT if not is_ignored(path)]
-    problems += [f"{path} is a source, and .dockerignore leaves it out" for path in sources(root)
+    problems += [f".dockerignore does not exclude {path}" for path in BUILT if not is_ignored(path)]
+    problems += [f"{path} is a source, but .dockerignore excludes it" for path in sources(root)
                  if is_ignored(path) and not path.endswith(".swp")]
     with open(os.path.join(root, "deploy", "Containerfile")) as file:
         text = file.read().replace("\\\n", " ")
@@ -50,10 +50,10 @@ def main(root):
             continue
         for path in words[1:-1]:
             if not os.path.exists(os.path.join(root, path)) or is_ignored(path):
-                problems.append(f"Containerfile: COPY {path}, which is not there")
-    # A build folder of another machine would be gone on with.
+                problems.append(f"Containerfile: COPY {path}, which does not exist")
+    # The image's build would continue in the build folder of another machine.
     if not re.search(r"cmake -S \. -B /", text):
-        problems.append("Containerfile: the build folder lies within the sources")
+        problems.append("Containerfile: the build folder is inside the sources")
     for problem in problems:
         print("image_test:", problem, file=sys.stderr)
     print("image_test:", "failed" if problems else "ok")

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What `cmake --install` leaves runs by itself: versions agree, and the server finds its worker.
+# Checks that the programs of `cmake --install` run: versions agree, and the server finds its worker.
 #   tests/integration/install_test.sh BUILD_DIR VERSION
 set -euo pipefail
 build=$1
@@ -20,7 +20,7 @@ fail() {
 cmake --install "$build" --prefix "$prefix" >/dev/null
 for program in color3d color3d-server color3d-worker; do
   said=$("$prefix/bin/$program" --version)
-  [ "$said" = "$version" ] || fail "$program --version says '$said', not $version"
+  [ "$said" = "$version" ] || fail "$program --version prints '$said', not $version"
 done
 for file in share/doc/color3d/README.md share/doc/color3d/deploy/README.md \
   share/doc/color3d/deploy/systemd/color3d.service share/color3d/proto/color3d/v1/job.proto; do
@@ -36,5 +36,5 @@ for _ in $(seq 100); do
 done
 [ -s "$prefix/address" ] || fail "the installed server did not start: $(tail -n 3 "$prefix/log")"
 info=$("$prefix/bin/color3d" --server "$(cat "$prefix/address")" server info)
-grep -q "$version" <<<"$info" || fail "server info does not say $version: $info"
+grep -q "$version" <<<"$info" || fail "server info does not print $version: $info"
 echo "install_test: ok"

@@ -1,4 +1,4 @@
-// Every way to colour the key view through a real server, with real model servers beside it.
+// All sources of the key view's colour, through a real server and real model servers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ using nlohmann::json;
 using std::chrono::seconds;
 using Lines = std::vector<std::string>;
 
-// color3d-example-backend on a port of its own.
+// color3d-example-backend on its own port.
 class ExampleBackend {
  public:
   ExampleBackend(const fs::path& folder, const std::string& listen, const Lines& flags = {})
@@ -197,7 +197,7 @@ TEST_F(KeyColorTest, CancellingTheJobStopsTheBackend) {
                 seconds(20)));
 }
 
-// The whole pipeline, from photos alone.
+// The whole pipeline, from photos only.
 TEST_F(KeyColorTest, AutoNeedsNoInput) {
   StartServer();
   WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
@@ -213,7 +213,7 @@ TEST_F(KeyColorTest, AutoNeedsNoInput) {
   EXPECT_TRUE(fs::is_regular_file(Path("out") / "scene.ply"));
 }
 
-// Red and blue swapped, allowed on the left half only.
+// Swaps red and blue, within a mask of the left half.
 TEST_F(KeyColorTest, EditChangesColorInsideItsMaskOnly) {
   StartServer();
   WriteProceduralScene(Path("room"), SmallRoom(4));
@@ -250,7 +250,7 @@ TEST_F(KeyColorTest, EditChangesColorInsideItsMaskOnly) {
     }
   }
   EXPECT_GT(inside, 20.0);
-  EXPECT_LT(outside, 2.5) << "8 bits round that much";
+  EXPECT_LT(outside, 2.5) << "more than rounding to 8 bits";
 }
 
 TEST_F(KeyColorTest, RefusesUnknownModelNamesAtOnce) {

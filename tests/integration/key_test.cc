@@ -1,4 +1,4 @@
-// `color3d key`: select, colour, look, accept, then colour the scene with the accepted key view.
+// `color3d key`: selects, colours and accepts a key view, then colours the scene with it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ class KeyTest : public ServiceTest {
     StartServer();
     WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
   }
-  // The command's answer as JSON; it must succeed.
+  // Runs a command, which must succeed, and returns its JSON.
   json RunJson(const std::vector<std::string>& arguments) {
     const ProcessResult result = Client(arguments + std::vector<std::string>{"--json"});
     EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
@@ -37,7 +37,8 @@ TEST_F(KeyTest, AcceptedKeyViewIsNotColoredAgain) {
   const ProcessResult select = Client({"key", "select", Path("room").string(), "-o", out});
   ASSERT_EQ(select.exit_code, 0) << select.out << select.err;
   EXPECT_NE(select.out.find("Best of "), std::string::npos) << select.out;
-  EXPECT_NE(select.out.find("key color scenes/"), std::string::npos) << "it does not say what next";
+  EXPECT_NE(select.out.find("key color scenes/"), std::string::npos)
+      << "the next command is not printed";
   EXPECT_TRUE(IsGray(ReadImage(Path("key") / "key_view.png")));
   EXPECT_EQ(ReadImage(Path("key") / "key_view_ranking.jpg").width, 1600);
 
@@ -76,7 +77,7 @@ TEST_F(KeyTest, AcceptedKeyViewIsNotColoredAgain) {
                                      "--detach"});
   ASSERT_EQ(more.exit_code, 0) << more.out << more.err;
   const v1::ColorizeSceneSpec spec = NewestJob("colorize_scene").spec().colorize_scene();
-  EXPECT_EQ(spec.carry_color().further_key_views_size(), 1) << "--add-key-view was not heeded";
+  EXPECT_EQ(spec.carry_color().further_key_views_size(), 1) << "--add-key-view had no effect";
   const v1::Job additional = NewestJob("colorize_key_view");
   EXPECT_EQ(additional.spec().colorize_key_view().view(), other);
   ExpectRefusal(Client({"key", "accept", scene, "--job", additional.name()}),
@@ -98,7 +99,7 @@ TEST_F(KeyTest, AcceptsAnotherViewAndAnOlderColor) {
   EXPECT_EQ(RunJson({"key", "accept", scene, "--job", first.at("job")}).at("key_view"),
             "view002.png");
   EXPECT_EQ(RunJson({"key", "accept", scene}).at("key_view"), "view004.png");
-  // Without --view the colour goes with the newest selection.
+  // Without --view the colour belongs to the newest selection.
   RunJson({"key", "select", scene, "--view", "view001", "-o", out});
   EXPECT_EQ(RunJson({"key", "color", scene, "--hints", Path("hints.json").string(), "-o", out})
                 .at("key_view"),

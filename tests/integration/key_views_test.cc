@@ -31,9 +31,9 @@ class KeyViewsTest : public ServiceTest {
   }
 };
 
-// Larger than what the colorizer trains on, so that carried colours and their confidences, which
-// are 1 in the additional key views, are reduced on the way (334 px to 267: the mean of ones rounds
-// to above 1).
+// Larger than the colorizer's pictures, so that carried colours and their confidences, which are 1
+// in the additional key views, are reduced (334 px to 267, where the mean of ones rounds to above
+// 1).
 TEST_F(KeyViewsTest, ColorsThreeKeyViewsOnceAndReportsThem) {
   ProceduralSceneOptions room = SmallRoom(6, /*gray=*/true);
   room.width = 500;
@@ -145,7 +145,8 @@ std::vector<float> GrayLevels(const Image& srgb) {
   return levels;
 }
 
-// A pixel of 16 bits with random chroma whose grey level is `level`; nothing when none is found.
+// Returns a pixel of 16 bits with random chroma and grey level `level`, or nullopt if none is
+// found.
 std::optional<std::array<float, 3>> RandomColor(float luminance, float level, Random* random) {
   const auto gray = [](const Image& pixel) {
     return static_cast<float>(GrayFromLuminance(LuminanceFromSrgb(pixel).data[0])) * 65535.0f;
@@ -157,7 +158,7 @@ std::optional<std::array<float, 3>> RandomColor(float luminance, float level, Ra
                 static_cast<float>(random->NextUniform(-50, 50))};
     Image pixel = SrgbFromLab(lab);
     for (float& value : pixel.data) value = std::round(value * 65535.0f) / 65535.0f;
-    // The largest green, then blue, which has a tenth of its weight, that stays below.
+    // The largest green, then blue, with a tenth of its weight, below the level.
     for (const int channel : {1, 2}) {
       int low = 0, high = 65535;
       while (low < high) {
@@ -171,7 +172,7 @@ std::optional<std::array<float, 3>> RandomColor(float luminance, float level, Ra
       }
       pixel.data[channel] = static_cast<float>(low) / 65535.0f;
     }
-    // Well within the interval that is rounded to the level.
+    // Inside the interval that is rounded to the level.
     if (std::abs(gray(pixel) - level) < 0.3f) {
       return std::array<float, 3>{pixel.data[0], pixel.data[1], pixel.data[2]};
     }
@@ -179,13 +180,13 @@ std::optional<std::array<float, 3>> RandomColor(float luminance, float level, Ra
   return std::nullopt;
 }
 
-// Random chroma in every pixel of a photo, the same grey copy.
+// Random chroma in every pixel of a photo, with an equal grey copy.
 Image Repainted(const Image& photo, uint64_t seed) {
   const std::vector<float> levels = GrayLevels(photo);
   const Image luminance = LuminanceFromSrgb(photo);
   Image out = photo;
   std::vector<char> wrong(levels.size(), 1);
-  // Rounding depends a little on where a pixel stands in its picture, so what came out is checked.
+  // Rounding depends on the position of a pixel in its picture, so the result is checked.
   for (uint64_t pass = 0; pass < 8; ++pass) {
     ThreadPool pool(2);
     pool.ForEach(photo.height, [&](int64_t y, int) {
@@ -211,7 +212,7 @@ std::string GrayCopy(const Image& srgb) {
 
 class GuardTest : public ServiceTest {
  protected:
-  // Digest of the coloured model that a benchmark leaves on a server of its own.
+  // Digest of the coloured model of a benchmark on its own server.
   std::string ModelOf(const std::string& room) {
     StopServer();
     std::filesystem::remove_all(Path("server"));
@@ -238,7 +239,7 @@ class GuardTest : public ServiceTest {
   }
 };
 
-// Nothing but the key view's colours may reach a benchmark's model.
+// Only the key view's colours may reach the model of a benchmark.
 TEST_F(GuardTest, ColorsOfOtherPhotosDoNotReachTheModel) {
   ProceduralSceneOptions options = SmallRoom(5);
   options.width = 160;
@@ -252,14 +253,14 @@ TEST_F(GuardTest, ColorsOfOtherPhotosDoNotReachTheModel) {
     WriteFileAtomic(Path("second") / name,
                     EncodePng16(Repainted(photo, static_cast<uint64_t>(i + 1))));
     const Image written = ReadImage(Path("second") / name);
-    ASSERT_TRUE(GrayCopy(written) == GrayCopy(photo)) << name << ": not the same L";
+    ASSERT_TRUE(GrayCopy(written) == GrayCopy(photo)) << name << ": L differs";
     size_t changed = 0;
     for (size_t k = 0; k < photo.data.size(); ++k) {
       changed += std::abs(written.data[k] - photo.data[k]) > 0.02f ? 1 : 0;
     }
     EXPECT_GT(changed, photo.data.size() / 2) << name;
   }
-  // Colour pictures that the job does not request.
+  // Colour pictures that the job must not request.
   for (const char* room : {"first", "second"}) {
     std::filesystem::create_directories(Path(room) / "augment");
     std::filesystem::copy_file(Path(room) / "images/view001.png", Path(room) / "augment/a.png");
@@ -270,7 +271,7 @@ TEST_F(GuardTest, ColorsOfOtherPhotosDoNotReachTheModel) {
   EXPECT_EQ(before.at("key_views"), json({"view003.png"}));
   EXPECT_TRUE(before.at("augmentations").empty());
   EXPECT_GT(before.at("share_seen_scored").get<double>(), 0.0);
-  EXPECT_NE(before.at("delta_e00"), after.at("delta_e00")) << "the truth is another";
+  EXPECT_NE(before.at("delta_e00"), after.at("delta_e00")) << "the truth did not change";
 }
 
 }  // namespace

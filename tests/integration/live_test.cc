@@ -1,4 +1,4 @@
-// Live colouring with the real programs: preview without training, and personalized colorizers.
+// Live colouring with real programs: preview without training, and personalized colorizers.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ class LiveTest : public ServiceTest {
     EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
     return json::parse(result.out, nullptr, /*allow_exceptions=*/false);
   }
-  // The scene with a colorizer of a few iterations.
+  // A scene with a colorizer of a few iterations.
   std::string Personalize() {
     const json colored = RunJson({"key",
                                   "color",
@@ -58,7 +58,7 @@ TEST_F(LiveTest, PreviewColorsPhotosWithoutAJob) {
   EXPECT_EQ(answer.at("files").size(), 5u);
   EXPECT_EQ(answer.at("colorizer"), "");
   for (const auto& name : answer.at("files")) {
-    EXPECT_NE(name, "view003.png") << "the key view itself is no news";
+    EXPECT_NE(name, "view003.png") << "the key view is among the previews";
     const Image colored = ReadImage(Path("out") / name);
     const Image photo = ReadImage(Path("room") / "images" / name);
     EXPECT_FALSE(IsGray(colored)) << name;
@@ -69,7 +69,7 @@ TEST_F(LiveTest, PreviewColorsPhotosWithoutAJob) {
       RunJson({"preview", Path("room").string(), "--key-color", key, "-o", Path("out").string()});
   EXPECT_LT(again.at("seconds"), 10.0);
   const std::vector<pid_t> family = Descendants(server().pid());
-  EXPECT_EQ(family.size(), 2u) << "a worker for jobs and the inference worker";
+  EXPECT_EQ(family.size(), 2u) << "expected a worker for jobs and the inference worker";
   EXPECT_EQ(server().Stop(), 0);
   for (const pid_t pid : family) EXPECT_FALSE(IsAlive(pid)) << "left behind";
 }
@@ -90,7 +90,7 @@ TEST_F(LiveTest, PersonalizedColorizerColorsOtherPhotos) {
     EXPECT_EQ(ReadFile(Path("a") / file), ReadFile(Path("b") / file)) << file;
     EXPECT_FALSE(IsGray(ReadImage(Path("a") / file))) << file;
   }
-  // The scene's own key view and photos: nothing is sent.
+  // The scene's own key view and photos are not uploaded again.
   const json preview = RunJson({"preview", scene, "-o", Path("c").string(), "--count", "3"});
   EXPECT_EQ(preview.at("files").size(), 3u);
 }
@@ -108,7 +108,7 @@ TEST_F(LiveTest, RefusalsNameTheRemedy) {
   ExpectRefusal(Client({"preview", scene, "-o", out}), 2, {"key color"});
   ExpectRefusal(
       Client({"colorizer", "apply", scene, room, "-o", out}), 2, {"has no colorizer yet"});
-  // One bad photo among good ones: the others are there.
+  // A bad photo does not prevent the results of the others.
   fs::create_directories(Path("mixed"));
   fs::copy_file(Path("room") / "images" / "view000.png", Path("mixed") / "good.png");
   WriteFileAtomic(Path("mixed") / "bad.png", ReadFile(Path("mixed") / "good.png").substr(0, 1000));

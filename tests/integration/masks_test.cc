@@ -1,5 +1,4 @@
-// Masks of photos through the service: masked pixels count neither in training nor in
-// scores.
+// Masks of photos through the service: masked pixels count neither in training nor in scores.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -23,7 +22,7 @@ class MasksTest : public ServiceTest {
  protected:
   void SetUp() override { StartServer(); }
 
-  // A room before which something of its own stands in every photo, and the masks that say so.
+  // A room with a different object in front of it in every photo, and masks of these objects.
   void WriteSpoiltRoom() {
     WriteProceduralScene(Path("room"), SmallRoom());
     fs::create_directories(Path("masks"));
@@ -65,7 +64,7 @@ TEST_F(MasksTest, LeavesOutMaskedForeground) {
   EXPECT_GT(masked_db, plain_db + 3.0);
   EXPECT_LT(Metrics("masked").at("delta_e00_chroma"), Metrics("plain").at("delta_e00_gray"));
   EXPECT_THAT(masked.out + masked.err, HasSubstr("photos have masks"));
-  // A stroke there would say nothing of the scene.
+  // No stroke is proposed on masked pixels.
   const ProcessResult stroke = Client({"correct",
                                        Path("masked").string(),
                                        "--view",

@@ -1,5 +1,4 @@
-// Workers keep to their memory limit: a job that needs more fails with the figures; others
-// continue.
+// Memory limit of workers: a job that needs more fails with the figures, other jobs continue.
 #include <gtest/gtest.h>
 #include <zlib.h>
 
@@ -28,7 +27,7 @@ std::string Chunk(const std::string& type, const std::string& data) {
          BigEndian(static_cast<uint32_t>(crc));
 }
 
-// A PNG of one value all over, grey or (3 channels) RGB: some hundred kilobytes, whatever its size.
+// A PNG of constant value, grey or RGB (3 channels): some hundred kilobytes at any size.
 void WriteFlatPng(const fs::path& file, int width, int height, int channels, char value) {
   std::string row(static_cast<size_t>(width) * channels + 1, value);
   row[0] = 0;  // no filter
@@ -68,7 +67,7 @@ class MemoryLimitTest : public ServiceTest {
     }
     return 0;
   }
-  // The most that the worker ever had, bytes.
+  // Peak memory of the worker, bytes.
   int64_t PeakOf(int pid) const {
     std::ifstream status("/proc/" + std::to_string(pid) + "/status");
     for (std::string line; std::getline(status, line);) {
@@ -124,7 +123,7 @@ TEST_F(MemoryLimitTest, HugePhotosFailWithFiguresAndSpareOtherJobs) {
   EXPECT_LT(PeakOf(pid), kLimitBytes);
   fs::remove_all(Path("room"));
   ExpectOtherJobsGoOn();
-  EXPECT_EQ(WorkerPid(), pid) << "the same worker went on";
+  EXPECT_EQ(WorkerPid(), pid) << "the worker was replaced";
 }
 
 // Small photos with a huge coloured picture.
@@ -141,7 +140,7 @@ TEST_F(MemoryLimitTest, HugeKeyPictureFailsWithFigures) {
                                       QuickOptions());
   ExpectRefusal(result, 4, {"16000 x 12000 px", "MiB", "are granted", "--worker-memory-mib"});
   EXPECT_LT(PeakOf(pid), kLimitBytes);
-  EXPECT_EQ(WorkerPid(), pid) << "the same worker went on";
+  EXPECT_EQ(WorkerPid(), pid) << "the worker was replaced";
 }
 
 }  // namespace

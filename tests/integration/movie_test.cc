@@ -39,7 +39,7 @@ TEST_F(MovieTest, RendersPathsOfResultsJobsAndScenes) {
   for (const Image& frame : movie.frames) {
     double mean = 0.0;
     for (const float value : frame.data) mean += value / static_cast<double>(frame.data.size());
-    EXPECT_GT(mean, 0.15) << "an empty frame";
+    EXPECT_GT(mean, 0.15) << "the frame is empty";
   }
 
   const v1::Job job = NewestJob("colorize_scene");
@@ -82,7 +82,7 @@ TEST_F(MovieTest, RendersPathsOfResultsJobsAndScenes) {
   ExpectBadInput();
 }
 
-// Wrong input ends with one line, exit code 2 and no file.
+// Wrong input gives one line, exit code 2 and no file.
 void MovieTest::ExpectBadInput() {
   const std::string file = Path("bad.mp4").string();
   ExpectRefusal(Client({"turntable", Path("nowhere").string()}), 2, {"there is no folder"});

@@ -1,5 +1,5 @@
-// Photos as phones, scanners and web pages leave them, through client, server and a locked-in
-// worker; and results in the folder of the photos.
+// Photos of phones, scanners and web pages, through client, server and a sandboxed worker; results
+// in the folder of the photos.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +28,7 @@ class PhotoFormatsTest : public ServiceTest {
     WriteProceduralScene(Path("room"), options);
   }
 
-  // The photo `stem` saved as `bytes` under another ending, also in the model.
+  // Replaces the photo `stem` by `bytes` with another ending, also in the model.
   void Replace(const std::string& stem, const std::string& ending, const std::string& bytes) {
     const fs::path images = Path("room") / "images";
     fs::remove(images / (stem + ".png"));
@@ -42,7 +42,7 @@ class PhotoFormatsTest : public ServiceTest {
   Image Photo(const std::string& stem) const {
     return ReadImage(Path("room") / "images" / (stem + ".png"));
   }
-  // `key select` of this view; what it printed.
+  // Runs `key select` of this view and returns its output.
   std::string Select(const std::string& view) {
     const ProcessResult result = Client({"key",
                                          "select",
@@ -54,7 +54,7 @@ class PhotoFormatsTest : public ServiceTest {
     EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
     return result.out + result.err;
   }
-  // Mean difference in luminance of a key view and the photo that it was before.
+  // Mean difference in luminance between a key view and the original photo.
   double Difference(const std::string& view, const Image& photo) const {
     const Image key = LuminanceFromSrgb(ReadImage(Path("key") / view / "key_view.png"));
     const Image expected = LuminanceFromSrgb(photo);
@@ -76,7 +76,7 @@ TEST_F(PhotoFormatsTest, SandboxedWorkerReadsEveryFormat) {
           ".TIF",
           TiffFile({{.image = Resize(photos[2], 40, 30), .subfile_type = 1, .photometric = 2},
                     {.image = photos[2], .photometric = 2}}));
-  // The same tones and other numbers.
+  // Equal tones, other pixel values.
   WriteFileAtomic(Path("room") / "images" / "view003.png",
                   WithPngProfile(EncodePng16(ConvertToProfile(photos[3], ProPhotoProfile())),
                                  ProPhotoProfile()));
@@ -107,7 +107,7 @@ TEST_F(PhotoFormatsTest, ResultsBesidePhotosAreNotPhotos) {
     }
   }
   for (const std::string& scene : scenes) EXPECT_EQ(scene, scenes[0]);
-  // Live answers have the names of the photos.
+  // Live answers are named like the photos.
   ExpectRefusal(Client({"preview",
                         images,
                         "--key-color",

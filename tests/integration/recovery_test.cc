@@ -1,4 +1,4 @@
-// Killed workers and servers: jobs resume at their last checkpoint.
+// Jobs resume from their last checkpoint after workers or servers are killed.
 #include <gtest/gtest.h>
 #include <signal.h>
 
@@ -50,7 +50,7 @@ class RecoveryTest : public ServiceTest {
     return {};
   }
 
-  // Until training has gone on for a while after its first checkpoint; the step that it is at.
+  // Waits until training has continued after its first checkpoint, and returns the step.
   int64_t WaitForTheMiddle(Process& client) {
     v1::Job job;
     EXPECT_TRUE(WaitUntil(
@@ -61,11 +61,11 @@ class RecoveryTest : public ServiceTest {
         },
         seconds(200)))
         << client.Err();
-    EXPECT_EQ(job.state(), v1::Job::STATE_RUNNING) << "training was over before it was interrupted";
+    EXPECT_EQ(job.state(), v1::Job::STATE_RUNNING) << "training ended before it was interrupted";
     return job.progress().step();
   }
 
-  // The step of the first sign of life of the next attempt.
+  // The first step that the next attempt reports.
   int64_t FirstStepOfAttempt(int attempt) {
     v1::Job job;
     EXPECT_TRUE(WaitUntil(
@@ -105,7 +105,7 @@ class RecoveryTest : public ServiceTest {
       }
       if (key.find("reconstruct_geometry") == std::string::npos) continue;
       ++rows;
-      EXPECT_TRUE(seen.insert(key).second) << key << " is there twice";
+      EXPECT_TRUE(seen.insert(key).second) << key << " occurs twice";
     }
     EXPECT_GT(rows, 3);
   }
@@ -133,7 +133,7 @@ TEST_F(RecoveryTest, KilledWorkersJobResumesFromItsCheckpoint) {
   ASSERT_EQ(kill(worker, SIGKILL), 0);
 
   const int64_t resumed = FirstStepOfAttempt(2);
-  EXPECT_GT(resumed, step / 4) << "it began again, killed at " << step;
+  EXPECT_GT(resumed, step / 4) << "training started again, killed at " << step;
   ExpectFinished(*client);
   EXPECT_EQ(Geometry().attempt(), 2);
   EXPECT_EQ(Geometry().state(), v1::Job::STATE_SUCCEEDED);
@@ -152,7 +152,7 @@ TEST_F(RecoveryTest, KilledServersJobResumesAfterRestart) {
         << "worker " << worker << " outlived its server";
     kill(worker, SIGKILL);
   }
-  // The same address, so that the client that waits finds it again.
+  // The same address, so that the waiting client reconnects.
   StartServer(QuickRecovery(), address);
   EXPECT_GT(FirstStepOfAttempt(1), step / 4);
   ExpectFinished(*client);

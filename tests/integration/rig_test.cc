@@ -1,4 +1,4 @@
-// Scenes that move through the service: films of cameras with poses, and pictures with times.
+// Dynamic scenes through the service: films of cameras with poses, and pictures with times.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -22,7 +22,7 @@ class RigTest : public ServiceTest {
  protected:
   void SetUp() override { StartServer(); }
 
-  // Every camera's pictures as one film, and its first pose.
+  // A film of each camera's pictures, with its first pose.
   void WriteFilms() {
     fs::create_directories(Path("rig"));
     WriteDynamicScene(Path("pictures"), made_);
@@ -83,12 +83,12 @@ TEST_F(RigTest, PosedFilmsBecomeADynamicScene) {
   EXPECT_EQ(metrics.at("motion"), "partly dynamic");
   EXPECT_GT(metrics.at("moving_share"), 0.0);
   EXPECT_TRUE(fs::exists(Path("out") / "scene.ply"));
-  // The key view's camera: its own frames in colour, and the scene as it saw it.
+  // The key view's camera: its coloured frames, and renders of the scene.
   EXPECT_THAT(result.out, HasSubstr("film.mp4"));
   for (const char* movie : {"film.mp4", "scene.mp4"}) {
     EXPECT_EQ(FilmReader(Path("out") / movie).times().size(), 9u) << movie;
   }
-  // And the frames of every camera, as a film and as pictures.
+  // The frames of every camera, as a film and as pictures.
   EXPECT_THAT(result.out, HasSubstr("films/"));
   for (const std::string camera : {"cam00", "cam01", "cam02"}) {
     const FilmReader film(Path("out") / "films" / (camera + ".mp4"));
@@ -102,16 +102,16 @@ TEST_F(RigTest, ReportsFilmOptionsThatDoNotApply) {
   WriteFilms();
   const ProcessResult films = Colorize("rig", {"--deflicker"});
   EXPECT_EQ(films.exit_code, 0) << films.err;
-  EXPECT_THAT(films.err, HasSubstr("film_deflicker is left aside: films whose poses are given"));
+  EXPECT_THAT(films.err, HasSubstr("film_deflicker is ignored: films with poses"));
   const ProcessResult pictures =
       Colorize("pictures", {"--set", "import_scene.film_frames_per_second=16"});
   EXPECT_EQ(pictures.exit_code, 0) << pictures.err;
   EXPECT_THAT(pictures.err,
-              HasSubstr("film_frames_per_second is left aside: pictures whose times and poses"));
+              HasSubstr("film_frames_per_second is ignored: pictures with times and poses"));
 }
 
 TEST_F(RigTest, ScoresAreGroupedByHeldOutKind) {
-  WriteFilms();  // and the pictures
+  WriteFilms();  // also the pictures
   const ProcessResult result = Colorize("pictures",
                                         {"--benchmark",
                                          "--key-view",
@@ -124,7 +124,7 @@ TEST_F(RigTest, ScoresAreGroupedByHeldOutKind) {
   const json metrics = json::parse(ReadFile(Path("out") / "metrics.json"));
   EXPECT_EQ(metrics.at("views_camera"), 9);
   EXPECT_EQ(metrics.at("views_block"), 4);  // the fourth and the fifth moment of two cameras
-  EXPECT_FALSE(metrics.contains("views_moment")) << "the eighth moment is one of the block";
+  EXPECT_FALSE(metrics.contains("views_moment")) << "the eighth time step is in the block";
   const double all = metrics.at("delta_e00_chroma"), camera = metrics.at("delta_e00_chroma_camera"),
                block = metrics.at("delta_e00_chroma_block");
   EXPECT_NEAR(all, (9 * camera + 4 * block) / 13, 1e-6);

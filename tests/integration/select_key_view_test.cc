@@ -1,4 +1,4 @@
-// Selection as a job runs it: frames that show nothing never win, features are computed once.
+// Selection as run by a job: useless frames are never selected, features are computed once.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -36,7 +36,7 @@ Image WithNoise(Image image, double deviation) {
   return image;
 }
 
-// Damaged photographs of a scene; `view` is one of its views, in grey.
+// Damaged photographs of a scene. `view` is one of its views, in grey.
 Image BadFrame(const std::string& kind, const Image& view) {
   Image frame(view.width, view.height, 1);
   if (kind == "white") return Image(view.width, view.height, 1, 1.0f);
@@ -86,7 +86,7 @@ class SelectTest : public ::testing::Test {
     return static_cast<int>(ListFiles(scratch_.path() / "cache" / "view_features").size());
   }
 
-  // Adds a bad frame made of the view `original`, with its camera and its tracks: the worst case.
+  // Adds a bad frame made of the view `original`, with its camera and tracks: the worst case.
   void AddBadFrame(const std::string& kind, int original, Scene* scene) {
     View bad = scene->views[original];
     const Image view = Gray(ReadImageWithin(scene_folder_ / bad.image_file, 640));
@@ -102,7 +102,7 @@ class SelectTest : public ::testing::Test {
     }
   }
 
-  // The scene, with its files in a folder of our own to which others can be added.
+  // Copies the scene to a folder, so that files can be added.
   Scene Import(const fs::path& folder) {
     QuietRun run;
     Scene scene = ImportScene(folder, scratch_.path(), {}, run.control()).scene;
@@ -113,7 +113,7 @@ class SelectTest : public ::testing::Test {
     return scene;
   }
 
-  // `singly`: each kind of bad frame on its own; else all at once.
+  // `singly`: one kind of bad frame at a time; else all at once.
   void ExpectNoBadFrameWins(const Scene& scene, bool singly) {
     for (KeyViewStrategy strategy : kStrategies) {
       const int best = scene.FindView(Chosen(scene, strategy));

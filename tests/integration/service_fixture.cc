@@ -100,7 +100,7 @@ int TestServer::Stop() {
   process_.Signal(SIGTERM);
   const std::optional<int> code = process_.Wait(kStopLimit);
   process_.Kill();
-  for (pid_t pid : family) kill(pid, SIGKILL);  // none is left, unless something is wrong
+  for (pid_t pid : family) kill(pid, SIGKILL);  // processes left in case of an error
   return code.value_or(-1);
 }
 
@@ -137,7 +137,7 @@ std::vector<v1::Job> TestServer::ListJobs() const {
 void ServiceTest::TearDown() {
   if (HasFailure() && server_ != nullptr) {
     const std::string log = server_->Log();
-    std::cerr << "--- the end of the server's log ---\n"
+    std::cerr << "--- end of the server's log ---\n"
               << log.substr(log.size() - std::min<size_t>(log.size(), 6000));
   }
   server_.reset();
@@ -162,7 +162,7 @@ v1::Job ServiceTest::NewestJob(const std::string& kind) const {
   for (const v1::Job& job : server_->ListJobs()) {
     if (job.kind() == kind) return job;
   }
-  ADD_FAILURE() << "there is no " << kind << " job";
+  ADD_FAILURE() << "no " << kind << " job";
   return {};
 }
 
@@ -189,7 +189,7 @@ void ServiceTest::ExpectRefusal(const ProcessResult& result,
   EXPECT_LT(complaints[0].size(), 600u) << complaints[0];
   for (const std::string& word : words) {
     EXPECT_NE(complaints[0].find(word), std::string::npos)
-        << "\"" << word << "\" is not in: " << complaints[0];
+        << "\"" << word << "\" missing in: " << complaints[0];
   }
   EXPECT_TRUE(server_ == nullptr || server_->IsHealthy());
 }

@@ -1,5 +1,5 @@
-// A server of our own for tests, with its workers and its client: real processes on a free port, in
-// a temporary folder. Everything is gone when the fixture is.
+// Server, workers and client for tests: real processes on a free port, in a temporary folder. The
+// fixture removes everything at its end.
 #pragma once
 
 #include <grpcpp/channel.h>
@@ -24,8 +24,8 @@ namespace color3d {
 std::string ServerProgram();
 std::string ClientProgram();
 
-// `color3d-server serve` with one worker of two threads; the constructor returns when it listens
-// and throws Error{kUnavailable} with the server's last words when it does not.
+// `color3d-server serve` with one worker of two threads. The constructor returns when the server
+// listens, or throws Error{kUnavailable} with its log.
 class TestServer {
  public:
   explicit TestServer(const std::filesystem::path& folder,
@@ -38,11 +38,11 @@ class TestServer {
   pid_t pid() const { return process_.pid(); }
   std::string Log() const { return process_.Err() + process_.Out(); }
   bool IsRunning() { return process_.IsRunning(); }
-  // Running, and answers within ten seconds.
+  // Returns true if the server answers within ten seconds.
   bool IsHealthy();
   v1::ServerInfo Info() const;
   std::vector<v1::Job> ListJobs() const;
-  // SIGTERM; the exit code, -1 when it had to be killed.
+  // Sends SIGTERM. Returns the exit code, or -1 if the server had to be killed.
   int Stop();
 
  private:
@@ -57,10 +57,10 @@ class TestServer {
 
 class ServiceTest : public testing::Test {
  protected:
-  // Prints the server's log when the test has failed.
+  // Prints the server's log if the test failed.
   void TearDown() override;
 
-  // The next one takes over the same data directory.
+  // The next server uses the same data folder.
   void StartServer(const std::vector<std::string>& flags = {},
                    const std::string& listen = "127.0.0.1:0");
   void StopServer() { server_.reset(); }
@@ -71,13 +71,13 @@ class ServiceTest : public testing::Test {
   ProcessResult Client(const std::vector<std::string>& arguments,
                        std::chrono::seconds limit = std::chrono::seconds(400)) const;
   std::vector<std::string> ClientCommand(const std::vector<std::string>& arguments) const;
-  // The newest job of this kind; fails the test when there is none.
+  // Returns the newest job of this kind; fails the test if there is none.
   v1::Job NewestJob(const std::string& kind) const;
-  // Creates a job and waits for its end; its name. Fails the test unless it succeeds.
+  // Creates a job, waits for its end and returns its name. Fails the test unless the job succeeds.
   std::string RunJob(const v1::JobSpec& spec) const;
 
-  // Expects a refusal: this exit code, one line of complaint on stderr, the last one, that
-  // holds all `words`, and a server that goes on.
+  // Expects a refusal: this exit code, and as the last line on stderr one message with all `words`.
+  // The server must continue.
   void ExpectRefusal(const ProcessResult& result,
                      int exit_code,
                      const std::vector<std::string>& words);
@@ -88,16 +88,16 @@ class ServiceTest : public testing::Test {
   std::unique_ptr<TestServer> server_;
 };
 
-// A small room in a folder of its own. `gray`: monochrome photos, colour ones in truth/.
+// Writes a small room. `gray`: monochrome photos, with the colour ones in truth/.
 ProceduralSceneOptions SmallRoom(int views = 10, bool gray = false);
 
-// Flags of a server that notices within seconds that a worker has died, and loses little by it.
+// Flags of a server that detects dead workers within seconds and writes checkpoints often.
 std::vector<std::string> QuickRecovery();
 
-// Options that make `color3d colorize` as quick as it can be.
+// Options for the quickest `color3d colorize`.
 std::vector<std::string> QuickOptions();
 
-// Appends.
+// Concatenation.
 std::vector<std::string> operator+(std::vector<std::string> left,
                                    const std::vector<std::string>& right);
 

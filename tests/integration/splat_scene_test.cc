@@ -1,4 +1,4 @@
-// Splats through the service: coloured without photos, or refused in one clear line.
+// Splats through the service: coloured without photos, or refused with a message of one line.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/splat/export/sog/sog.h"
-#include "core/splat/export/sog/zip.h"
 #include "core/splat/export/spz/spz.h"
 #include "core/splat/import/splat_file.h"
+#include "core/zip/zip.h"
 #include "tests/integration/service_fixture.h"
 #include "tests/support/scenes/splat_files.h"
 
@@ -50,7 +50,7 @@ TEST_F(SplatSceneServiceTest, ColorsAGraySplatInItsOwnFrame) {
   const ViewerGaussians colored = ReadSplat(ReadFile(Path("out") / "scene.ply"));
   ASSERT_EQ(colored.size(), 2999u);
   EXPECT_EQ(colored.sh_degree, 1);
-  // The first, and all behind the one that was left out.
+  // The first one, and all after the dropped one.
   for (int k = 0; k < 3; ++k) {
     EXPECT_EQ(colored.position[k], gray.position[k]);
     EXPECT_EQ(colored.position[3 + k], gray.position[6 + k]);

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The unit for systemd: systemd knows every line of it, the doors are closed, and it says what it must.
+# Checks the systemd unit: valid for systemd, with the required lines and a low exposure.
 # Exit status 77: skipped.
 #   tests/integration/unit_test.sh UNIT
 set -euo pipefail
@@ -17,12 +17,12 @@ if ! command -v systemd-analyze >/dev/null; then
   echo "unit_test: skipped, systemd-analyze (package systemd) is not installed"
   exit 77
 fi
-# The program need not be installed where this runs.
+# The program need not be installed.
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 sed 's|^ExecStart=.*|ExecStart=/bin/true|' "$unit" >"$folder/color3d.service"
 said=$(systemd-analyze verify "$folder/color3d.service" 2>&1 | grep -i 'color3d.service' || true)
-[ -z "$said" ] || fail "systemd does not understand it: $said"
+[ -z "$said" ] || fail "systemd rejects it: $said"
 systemd-analyze security --offline=yes --threshold=20 "$folder/color3d.service" >"$folder/said" 2>&1 ||
   fail "the exposure is above 2.0: $(tail -n 1 "$folder/said")"
 tail -n 1 "$folder/said"

@@ -1,5 +1,4 @@
-// Files for viewers, read by a tool that is not ours: splat-transform of npm, where it is
-// installed.
+// Files for viewers, read by npm's splat-transform if it is installed.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -20,10 +19,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr char kHowToInstall[] =
-    "splat-transform is not installed, so no other tool has read our files: npm install "
+    "splat-transform is not installed, so exported files were not checked with it: npm install "
     "--prefix " COLOR3D_NPM_FOLDER " @playcanvas/splat-transform, or COLOR3D_SPLAT_TRANSFORM=PATH";
 
-// A name that RunSubprocess finds.
+// Name or path of the tool.
 std::string SplatTransform() {
   if (const char* given = std::getenv("COLOR3D_SPLAT_TRANSFORM")) return given;
   const fs::path local = fs::path(COLOR3D_NPM_FOLDER) / "node_modules/.bin/splat-transform";
@@ -57,7 +56,7 @@ class ViewerToolsTest : public ::testing::Test {
   ScratchFolder scratch_;
 };
 
-// Gaussians in front of a camera, alike to those of a scene.
+// Gaussians in front of a camera, similar to those of a scene.
 GaussianModel Cloud(int degree) {
   GaussianModel model = RandomModel({3000, 3, degree, 0, /*chroma_size=*/0.03});
   const int coefficients = (degree + 1) * (degree + 1);

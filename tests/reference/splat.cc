@@ -16,11 +16,11 @@ using std::exp;
 using std::sqrt;
 
 constexpr int kShapeRows = kColorRow;  // position, log scale, rotation, opacity
-// A number with its derivatives by the shape rows: gradients come from the value's own formulas,
-// not from hand-derived ones that could repeat a kernel's mistake.
+// A number with its derivatives by the shape rows. Automatic differentiation, since derivatives by
+// hand could repeat an error of a kernel.
 using ShapeJet = Eigen::AutoDiffScalar<Eigen::Matrix<double, kShapeRows, 1>>;
 
-// A Gaussian on the screen; T is double, or a jet by the Gaussian's shape rows.
+// A projected Gaussian. T is double, or a jet by the Gaussian's shape rows.
 template <class T>
 struct Splat {
   int index = 0;
@@ -46,7 +46,7 @@ ShapeJet Sigmoid(const ShapeJet& x) {
   return ShapeJet(s, s * Sigmoid(-x.value()) * x.derivatives());
 }
 
-// Constant, so without derivative, outside of [low, high].
+// Clamps to [low, high], with derivative 0 outside.
 template <class T>
 T Limited(const T& x, double low, double high) {
   return ValueOf(x) < low ? T(low) : ValueOf(x) > high ? T(high) : x;
@@ -93,7 +93,7 @@ void ScreenAxes(const T* parameters, const RasterCamera& c, const T cam[3], T m[
 }
 
 // The determinant is the sum of the squared 2x2 minors of M and of the dilation's terms (Cauchy and
-// Binet); as xx yy - xy^2 even float64 would lose a needle of 1e8 px.
+// Binet). As xx yy - xy^2 even float64 would cancel for a needle of 1e8 px.
 template <class T>
 void Conic(const T m[2][3], Splat<T>& s) {
   const double dilation = kCovarianceDilation;
@@ -138,7 +138,7 @@ void Color(const ReferenceParameters& p,
   }
 }
 
-// False when the Gaussian is behind the near plane.
+// Returns false if the Gaussian is behind the near plane.
 template <class T>
 bool Project(const ReferenceParameters& p,
              const ColorSpec& color,
@@ -180,7 +180,7 @@ std::vector<Splat<double>> ProjectSorted(const ReferenceParameters& p,
   return splats;
 }
 
-// What one splat puts into one pixel.
+// Contribution of a splat to a pixel.
 struct Contribution {
   size_t splat = 0;
   double dx = 0.0, dy = 0.0;
@@ -189,7 +189,7 @@ struct Contribution {
   bool capped = false;
 };
 
-// Front to back; returns the transmittance that is left.
+// Blends front to back; returns the remaining transmittance.
 double Blend(const std::vector<Splat<double>>& splats,
              int x,
              int y,
@@ -260,7 +260,7 @@ void BlendBackward(const std::vector<Splat<double>>& splats,
   }
 }
 
-// From the screen to the parameters of Gaussian i.
+// Propagates gradients from the projection to the parameters of Gaussian i.
 void ProjectBackward(const ReferenceParameters& p,
                      const ColorSpec& color,
                      const RasterCamera& camera,

@@ -1,7 +1,7 @@
-// The rasterizer's slow, readable twin in float64: every pixel visits every Gaussian in depth
-// order. Formulas as in the publications (conic by matrix inverse, libm exponentials), not as in
-// the fast kernels; gradients by automatic differentiation of the projection and the plain adjoint
-// of the blending sum. The tests compare the two. Also a plain form of the training loss.
+// Slow, readable float64 twin of the rasterizer and the training loss, for tests. Every pixel
+// visits every Gaussian in depth order. Formulas are those of the publications (conic by matrix
+// inverse, libm exponentials); gradients are by automatic differentiation of the projection and the
+// plain adjoint of the blending sum.
 #pragma once
 
 #include <array>
@@ -42,8 +42,8 @@ struct ReferencePixel {
   std::array<double, 3> color{};
   double opacity = 0.0;
   double depth = 0.0;
-  // A Gaussian's alpha lies within the margin of 1/255 or 0.99, or the transmittance of 1e-4:
-  // rounding may decide there, so that two right answers differ.
+  // Alpha of a Gaussian lies within the margin of 1/255 or 0.99, or the transmittance within that
+  // of 1e-4, so that correct results may differ by rounding.
   bool near_threshold = false;
 };
 
@@ -65,7 +65,7 @@ ReferenceParameters ReferenceGradient(const ReferenceParameters& parameters,
                                       const std::vector<std::array<double, 3>>& d_color);
 
 // Largest ratio of the eigenvalues of a 2D covariance (dilation included) among the Gaussians in
-// front of the near plane; 1 when there is none.
+// front of the near plane; 1 if there are none.
 double ReferenceCovarianceCondition(const ReferenceParameters& parameters,
                                     const RasterCamera& camera);
 

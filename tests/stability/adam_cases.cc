@@ -13,7 +13,7 @@ constexpr float kRate = 1e-3f;
 
 using Gradient = std::function<double(int gaussian, int step)>;
 
-// One parameter, started at zero.
+// One parameter, initially zero.
 double ReferenceAdam(const Gradient& gradient, int gaussian) {
   double p = 0.0, first = 0.0, second = 0.0;
   for (int step = 1; step <= kSteps; ++step) {
@@ -55,7 +55,7 @@ StabilityResult Run(int count, const Gradient& gradient, double condition, Threa
   return result;
 }
 
-// AdamStep must say so when it meets such a gradient.
+// AdamStep must report such a gradient.
 StabilityResult RunSpoilt(float bad, ThreadPool& pool) {
   ParameterBlock g(2, 20), p(2, 20);
   AdamMoments moments{ParameterBlock(2, 20), ParameterBlock(2, 20)};

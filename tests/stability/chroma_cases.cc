@@ -1,5 +1,5 @@
-// Chroma on fixed geometry where the normal equations are singular: finite, and plausible colours
-// for what no pixel determines.
+// Chroma on fixed geometry with singular normal equations: results are finite, and plausible where
+// no pixel determines them.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,7 @@ namespace color3d {
 namespace {
 
 constexpr int kSide = 48;
-constexpr float kA = 35.0f, kB = -20.0f;  // of the targets, Lab units
+constexpr float kA = 35.0f, kB = -20.0f;  // targets, Lab units
 
 struct Fit {
   GaussianModel geometry = CloudOf(150, 9);
@@ -48,8 +48,9 @@ Fit Singular() {
   return f;
 }
 
-// Of the normal equations of one chroma channel's constant terms. Column i of the system is the
-// picture of Gaussian i alone in white; float32 columns show condition numbers up to about 1e14.
+// Condition number of the normal equations of one chroma channel's constant terms. Column i is the
+// picture of Gaussian i alone, in white; float32 columns resolve condition numbers up to about
+// 1e14.
 double NormalMatrixCondition(const Fit& f, ThreadPool& pool) {
   const int count = static_cast<int>(f.geometry.size());
   ParameterBlock p = ParametersFromModel(f.geometry);
@@ -64,7 +65,7 @@ double NormalMatrixCondition(const Fit& f, ThreadPool& pool) {
       std::fill_n(p.Row(kColorRow), count, 0.0f);
       p.Row(kColorRow)[i] = 1.0f;
       const float black = 0.0f;
-      pipeline.Forward(p, color, raster, &black, false, pool);
+      pipeline.Forward({p, color, raster}, &black, false, pool);
       for (int y = 0; y < kSide; ++y) {
         columns.col(i).segment(y * kSide, kSide) =
             Eigen::Map<const Eigen::VectorXf>(pipeline.color().Row(0, y), kSide).cast<double>();
@@ -78,7 +79,7 @@ double NormalMatrixCondition(const Fit& f, ThreadPool& pool) {
                                                : std::numeric_limits<double>::infinity();
 }
 
-// Largest chroma among the Gaussians, Lab units; spherical harmonics' constant term only.
+// Largest chroma among the Gaussians, Lab units, of the constant terms.
 double LargestChroma(const GaussianModel& model) {
   const double scale = 255.0 * kShDc;
   const size_t stride = model.sh_a.size() / std::max<size_t>(1, model.size());
@@ -104,7 +105,7 @@ StabilityResult Run(const Fit& f, ThreadPool& pool) {
   result.condition_of = "normal matrix";
   result.non_finite = CountNonFinite(model) + witness.non_finite;
   result.compared = static_cast<int64_t>(model.size());
-  // Garbage is chroma far beyond the targets': the gamut of Lab ends near 130.
+  // Implausible chroma is far beyond that of the targets; the gamut ends near 130.
   const double largest = LargestChroma(model);
   result.restores = witness.restores;
   result.held = model.channels == 3 && largest < 260.0;
@@ -132,7 +133,7 @@ Fit NothingSeen() {
   return f;
 }
 
-// Each Gaussian twice: only the sum of a pair's colours is determined.
+// Each Gaussian twice: only the sum of each pair's colours is determined.
 Fit WithDuplicates() {
   Fit f = Singular();
   const GaussianModel once = f.geometry;
@@ -186,7 +187,7 @@ void AddChromaCases(std::vector<StabilityCase>& cases) {
     return f;
   });
   add("one view, degree 1", [] {
-    Fit f = Singular();  // four coefficients of each Gaussian, one direction
+    Fit f = Singular();  // four coefficients per Gaussian, one direction
     f.cameras.resize(1);
     f.options.chroma_sh_degree = 1;
     return f;

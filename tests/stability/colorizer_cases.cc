@@ -1,6 +1,6 @@
-// The personalized colorizer on pictures and schedules at the edge: nothing that is not finite may
-// come out, and a key view that leaves no doubt must be learnt. Errors are mean CIEDE2000 of the
-// coloured key view against the colours that it was given, not relative ones.
+// The personalized colorizer on extreme pictures and schedules: results must be finite, and an
+// unambiguous key view must be learnt. Errors are the mean CIEDE2000 of the coloured key view to
+// its given colours, not relative ones.
 #include <algorithm>
 #include <cmath>
 
@@ -15,7 +15,7 @@ namespace color3d {
 namespace {
 
 constexpr int kSide = 96;
-// What the colour error is held to where the key view cannot be learnt in a few iterations.
+// Bound of the colour error if the key view cannot be learnt in a few iterations.
 constexpr double kAnyError = 200.0;
 
 struct Problem {
@@ -37,7 +37,7 @@ void Fill(Image* image, int channel, float value) {
   std::fill_n(image->Plane(channel), image->PlaneSize(), value);
 }
 
-// Smooth blobs, and noise: something to look at.
+// Smooth blobs and noise.
 Image Texture(int width, int height, uint64_t seed) {
   Random random(seed);
   Image l(width, height, 1);
@@ -76,7 +76,7 @@ StabilityResult Train(const Problem& p) {
   ThreadPool pool(2);
   const auto trained = TrainColorizer(
       encoder, {{"key", p.luminance, p.ab, p.weight}}, p.options, {pool, none, observer, go_on});
-  // What is stored and read again is what colours.
+  // Colours with the stored and reloaded model.
   const auto colorizer = LoadColorizer(trained->Serialize(), encoder, pool.thread_count());
   const Image key = colorizer->Colorize(p.luminance);
   Image other = p.unlike;
@@ -99,7 +99,7 @@ StabilityResult Train(const Problem& p) {
   return r;
 }
 
-// Must be refused with this code.
+// Expects an Error with this code.
 StabilityResult Refused(const Problem& p, ErrorCode code) {
   StabilityResult r;
   r.condition_of = "-";
@@ -149,7 +149,7 @@ StabilityResult SizeOf(int key_width, int key_height, int width, int height) {
   return Train(p);
 }
 
-// Neighbouring pixels at opposite ends of what ab can hold.
+// Neighbouring pixels at opposite ends of the range of ab.
 Problem Extremes(float most) {
   Problem p = Textured();
   for (int y = 0; y < kSide; ++y) {
@@ -215,11 +215,11 @@ void AddColorizerCases(std::vector<StabilityCase>& cases) {
   cases.push_back(Case("white key view", [] { return OneLuminance(100.0f); }));
   cases.push_back(
       Case("16x16 key view, 300x200 elsewhere", [] { return SizeOf(16, 16, 300, 200); }));
-  cases.push_back(Case("1x1 key view and elsewhere", [] { return SizeOf(1, 1, 1, 1); }));
+  cases.push_back(Case("1x1 key view and other picture", [] { return SizeOf(1, 1, 1, 1); }));
   cases.push_back(
       Case("2000x3 key view, 3x2000 elsewhere", [] { return SizeOf(2000, 3, 3, 2000); }));
   cases.push_back(Case(
-      "8k key view and elsewhere", [] { return SizeOf(7680, 4320, 7680, 4320); }, true));
+      "8k key view and other picture", [] { return SizeOf(7680, 4320, 7680, 4320); }, true));
   cases.push_back(Case("colours at the gamut's edge", GamutEdge));
   cases.push_back(Case("ab +-128 from pixel to pixel", [] { return Train(Extremes(128.0f)); }));
   cases.push_back(Case("ab +-1e6 from pixel to pixel",
@@ -228,7 +228,7 @@ void AddColorizerCases(std::vector<StabilityCase>& cases) {
   cases.push_back(Case("learning rate x1000", [] { return FastLearning(Recipe::kColor3d, 1.0); }));
   cases.push_back(Case("paper's recipe, learning rate x100",
                        [] { return FastLearning(Recipe::kPaper, 1e-2); }));
-  cases.push_back(Case("no pixel has weight", NoWeight));
+  cases.push_back(Case("all weights zero", NoWeight));
   cases.push_back(Case("a NaN in the key view's colour", NotFinite));
   cases.push_back(Case("colour of another size", OtherSize));
 }

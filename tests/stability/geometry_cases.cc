@@ -1,5 +1,5 @@
-// Whole trainings of luminance geometry on degenerate scenes: every parameter stays finite, or the
-// scene is refused with a reason.
+// Training of luminance geometry on degenerate scenes: every parameter stays finite, or the scene
+// is refused with a reason.
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -97,7 +97,7 @@ Training OfRate(double scale) {
   return t;
 }
 
-// Needles, pancakes, sizes and quaternions as no reconstruction should start.
+// Needles, pancakes, extreme sizes and quaternions.
 Training OfHardStart() {
   Training t = Ordinary();
   for (size_t i = 0; i < t.initial.size(); ++i) {
@@ -117,7 +117,7 @@ Training OfDuplicates() {
   return t;
 }
 
-// A pixel that is not a number, in one of the four photos.
+// A NaN pixel in one of the four photos.
 Training OfSpoiltPhoto() {
   Training t = Ordinary();
   t.picture = [](int view) {
@@ -128,7 +128,7 @@ Training OfSpoiltPhoto() {
   return t;
 }
 
-// From files: all sparse points are mirrored to behind their cameras.
+// Read from files; all sparse points are mirrored behind their cameras.
 StabilityResult PointsBehindCameras(ThreadPool& pool) {
   ProceduralSceneOptions options;
   options.views = 3;
@@ -172,7 +172,7 @@ void AddRefusals(std::vector<StabilityCase>& cases) {
       Train(t, silent, pool);
     });
   });
-  add("a sparse point that is not a number", [](ThreadPool&) {
+  add("a sparse point that is NaN", [](ThreadPool&) {
     return MustRefuse({ErrorCode::kInvalidArgument}, [] {
       Scene scene;
       scene.points.resize(3);

@@ -1,4 +1,4 @@
-// The picture loss: constant, black, white and tiny pictures, where SSIM's variances cancel.
+// The image loss of constant, black, white and tiny pictures, where SSIM's variances cancel.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -69,8 +69,8 @@ double SsimCondition(const PlaneBuffer& x, const PlaneBuffer& y) {
   return std::max(1.0, 2.0 * largest / kSsimC2);
 }
 
-// Central differences of the float64 loss at some pixels, corners first. The largest of them is the
-// scale, but at least the weight of SSIM on a pixel: between equal pictures all of them vanish.
+// Central differences of the float64 loss at some pixels, corners first. The scale is the largest
+// one, and at least the weight of SSIM on a pixel, since between equal pictures all vanish.
 double GradientError(const LossCase& l, Planes x, const Planes& y, const PlaneBuffer& gradient) {
   Random random(7);
   double worst = 0.0;
@@ -110,7 +110,7 @@ StabilityResult Run(const LossCase& l, ThreadPool& pool) {
   result.non_finite = CountNonFinite(gradient.data.data(), gradient.data.size()) +
                       (std::isfinite(value.total) ? 0 : 1);
   const double expected = ReferenceLoss(ToPlanes(x), ToPlanes(y), {}, l.width, l.height, l.weights);
-  // 1 - SSIM of equal pictures is a difference of numbers of size 1, times its weight.
+  // 1 - SSIM of equal pictures is a difference of numbers near 1, times its weight.
   result.value_error = std::abs(value.total - expected) /
                        std::max(std::abs(expected), static_cast<double>(l.weights.ssim));
   result.value_bound = std::clamp(kFloatEpsilon * result.condition, 1e-5, 1.0);

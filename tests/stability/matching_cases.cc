@@ -1,5 +1,5 @@
-// Colours from the cells that are most alike, near in space, against the definition in float64; and
-// the space that cells are compared in, where views differ by nothing or by one thing only.
+// Colours by the vote of similar cells near in space, compared with the definition in float64; and
+// whitening of features if views do not differ, or differ in one channel only.
 #include <torch/types.h>
 
 #include <algorithm>
@@ -24,7 +24,7 @@ struct Problem {
                 Known(torch::rand({kEntries, 3}))};
   CellQueries queries{torch::rand({kQueries, kFeatures}), Known(torch::rand({kQueries, 3}))};
   VoteOptions options{.position_weight = 1.5};
-  double condition = 1.0;  // of the squared distances: the largest to the least that matters
+  double condition = 1.0;  // ratio of the largest to the smallest relevant squared distance
 
   static torch::Tensor Known(const torch::Tensor& places) {
     return torch::cat({places, torch::ones({places.size(0), 1})}, 1);
@@ -74,7 +74,7 @@ StabilityResult RunWhitening(const torch::Tensor& samples,
   const Whitening whitening(blocks, 4, {}, {noise, torch::eye(2, torch::kFloat64)});
   const torch::Tensor found = whitening.Apply(blocks).contiguous();
   r.non_finite = CountNonFinite(found.data_ptr<float>(), static_cast<size_t>(found.numel()));
-  // Each kind of feature takes its share of the distance, whatever the noise.
+  // Each block of features has its share of the distance at any noise.
   const torch::Tensor variance = found.var(0, /*unbiased=*/false);
   const int64_t kept = std::min<int64_t>(WhiteningOptions().dims_per_block, samples.size(1));
   const double share = WhiteningOptions().tap_shares[1];
@@ -95,12 +95,12 @@ void AddMatchingCases(std::vector<StabilityCase>& cases) {
                        return RunVote(p, bound);
                      }});
   };
-  vote("places all over", 1e-4, [](Problem*) {});
+  vote("places everywhere", 1e-4, [](Problem*) {});
   vote("all in one place", 1e-4, [](Problem* p) {
     p->bank.positions.slice(1, 0, 3).fill_(2.9);
     p->queries.positions.slice(1, 0, 3).fill_(2.9);
   });
-  // Far from the middle of the scene, a thousandth of its radius apart.
+  // Far from the scene's middle, a thousandth of its radius apart.
   vote("places close together, far out", 1e-4, [](Problem* p) {
     for (torch::Tensor* places : {&p->bank.positions, &p->queries.positions}) {
       torch::Tensor xyz = places->slice(1, 0, 3);

@@ -1,5 +1,5 @@
-// Scenes that move and whose truth is exact: held-out moments drawn by geometry that may move
-// against the same geometry that may not. And Gaussians at moments far from their own.
+// Dynamic scenes with exact truth: held-out time steps rendered by geometry with a foreground,
+// compared with static geometry. And Gaussians at times far from their own.
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -15,7 +15,7 @@
 namespace color3d {
 namespace {
 
-constexpr int kHoldOutEvery = 5;  // moments, from the third on
+constexpr int kHoldOutEvery = 5;  // time steps, from the third on
 constexpr double kPeakPsnr = 99.0;
 
 struct MadeUp {
@@ -58,7 +58,7 @@ GeometryProblem ProblemOf(const MadeUp& made) {
 
 struct Psnr {
   double all = kPeakPsnr;
-  double movers = kPeakPsnr;  // of the pixels that show something that moves
+  double movers = kPeakPsnr;  // of the foreground's pixels
 };
 
 Psnr PsnrOf(const MadeUp& made,
@@ -115,7 +115,8 @@ StabilityResult RunMoving(DynamicCase which, ThreadPool& pool) {
   TrainingWitness witness;
   const Trained still = Train(problem, GeometryOptions::Motion::kStill, witness, pool);
   const Trained moving = Train(problem, GeometryOptions::Motion::kAuto, witness, pool);
-  // What crosses the picture within three moments cannot be foreseen at one that nobody saw.
+  // An object that crosses the picture within three time steps cannot be predicted at a held-out
+  // one.
   const bool foreseen = which != DynamicCase::kFast && which != DynamicCase::kOneStep;
   const std::vector<PosedCamera>& views = foreseen ? problem.held_out : problem.training;
   const Psnr before = PsnrOf(made, views, still.model, pool);
@@ -135,7 +136,7 @@ StabilityResult RunMoving(DynamicCase which, ThreadPool& pool) {
   char text[200];
   std::snprintf(text,
                 sizeof(text),
-                "%s moments %.1f dB (still %.1f), what moves %.1f dB (%.1f), %zu of %zu "
+                "%s time steps %.1f dB (static %.1f), foreground %.1f dB (%.1f), %zu of %zu "
                 "Gaussians move, %.2f x the seconds",
                 foreseen ? "held-out" : "seen",
                 after.all,
@@ -149,7 +150,7 @@ StabilityResult RunMoving(DynamicCase which, ThreadPool& pool) {
   return result;
 }
 
-// Gaussians at moments as far from their own as float32 goes: seen or not, all stays finite.
+// Gaussians at times up to the range of float32 from their own: visible or not, all stays finite.
 StabilityResult FarMoments(ThreadPool& pool) {
   constexpr int kRows = kBlockRows;
   ParameterBlock moving(kRows + kMotionRows, kBlockCount);
@@ -166,8 +167,8 @@ StabilityResult FarMoments(ThreadPool& pool) {
   result.condition_of = "-";
   for (const float t : {-1.0f, 0.0f, 1.0f, 1e4f}) {
     ParameterBlock at = parameters, gradient;
-    ApplyMotion(moving, kRows, t, 0, pool, at);
-    // Only what is drawn has a gradient.
+    ApplyMotion({moving, kRows, t, 0}, pool, at);
+    // Only rendered Gaussians have a gradient.
     ParameterBlock d_at = RandomBlock(7, 1.0);
     for (int64_t i = 0; i < kBlockCount; ++i) {
       if (at.Row(kOpacityRow)[i] > -9.0f) continue;
@@ -192,7 +193,7 @@ void AddMotionCases(std::vector<StabilityCase>& cases) {
                        return RunMoving(which, pool);
                      }});
   }
-  cases.push_back({"motion", "moments far away", false, FarMoments});
+  cases.push_back({"motion", "times far away", false, FarMoments});
 }
 
 }  // namespace color3d

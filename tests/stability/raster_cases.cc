@@ -1,4 +1,4 @@
-// Rasterizer and projection: shapes, sizes, depths, opacities and pictures at their extremes.
+// Rasterizer and projection at extreme shapes, sizes, depths, opacities and pictures.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ ColorSpec Channels(int channels) {
   return color;
 }
 
-// At the origin, looking along z; depths and directions are then exact in float32.
+// At the origin, looking along z, so that depths and directions are exact in float32.
 RasterCamera FrontCamera(int width, int height) {
   RasterCamera c;
   c.width = width;
@@ -61,7 +61,7 @@ RasterCase Ordinary(int count, int channels = 1, int width = 48, int height = 40
 
 void Fill(ParameterBlock& p, int row, float value) { std::fill_n(p.Row(row), p.count(), value); }
 
-// Scales `large` along some axes and `small` along the others, axes by turns.
+// Scales `large` along some axes and `small` along the others, in rotation.
 RasterCase Stretched(double large, double small, bool pancake) {
   RasterCase r = Ordinary(40);
   for (int i = 0; i < 40; ++i) {
@@ -196,8 +196,8 @@ RasterCase FarAway() {
   return r;
 }
 
-// Positions 1e6 units from the origin, kept as they are or relative to the cameras' mean as import
-// does (Scene::world_offset). The truth is the scene without rounding.
+// Positions 1e6 units from the origin, unchanged or relative to the cameras' mean as in import
+// (Scene::world_offset). The truth is the scene without rounding.
 RasterCase AtWorldOffset(bool recentred) {
   RasterCase r = Ordinary(40);
   const double offset[3] = {1.2e6, -0.8e6, 1.0e6};
@@ -205,7 +205,7 @@ RasterCase AtWorldOffset(bool recentred) {
   const double rotation[9] = {c, 0, -s, 0, 1, 0, s, 0, c};
   std::copy(rotation, rotation + 9, r.camera.rotation);
   r.truth = ReferenceParameters::From(r.parameters);
-  for (int i = 0; i < 40; ++i) {  // before the turned camera
+  for (int i = 0; i < 40; ++i) {  // in front of the turned camera
     const double x = r.truth->At(0, i), z = r.truth->At(2, i);
     r.truth->At(0, i) = c * x + s * z;
     r.truth->At(2, i) = -s * x + c * z;
@@ -214,7 +214,7 @@ RasterCase AtWorldOffset(bool recentred) {
   for (int k = 0; k < 3; ++k) {
     const double shift = recentred ? 0.0 : offset[k];
     for (int i = 0; i < 40; ++i) {
-      // In float64 as import has it: the offset comes off before the number is rounded to float32.
+      // In float64, as in import: the offset is subtracted before rounding to float32.
       const double world = r.truth->At(k, i) + offset[k];
       r.parameters.Row(k)[i] = static_cast<float>(world - (recentred ? offset[k] : 0.0));
     }
@@ -234,7 +234,7 @@ RasterCase AtWorldOffset(bool recentred) {
   return r;
 }
 
-// Four more Gaussians, that are nowhere: they must neither be drawn nor spoil their neighbours.
+// Four Gaussians that are not finite: they must neither be rendered nor affect their neighbours.
 RasterCase WithBadPositions() {
   RasterCase r = Ordinary(21);
   r.truth = ReferenceParameters::From(r.parameters);
@@ -315,10 +315,10 @@ void AddScenes(const Adder& add) {
   add("centres on tile corners", [=] { return OnTileBorders(); });
   add("larger than the picture", [=] { return LargerThanThePicture(); });
   add("opaque walls", [=] { return OpaqueWall(); });
-  add("positions that are huge or not numbers", [=] { return WithBadPositions(); });
+  add("positions that are huge or not finite", [=] { return WithBadPositions(); });
   add("distances of 1e5", [=] { return FarAway(); });
   add("world offset 1e6, recentred", [=] { return AtWorldOffset(true); });
-  add("world offset 1e6, as it is", [=] { return AtWorldOffset(false); });
+  add("world offset 1e6, unchanged", [=] { return AtWorldOffset(false); });
 }
 
 }  // namespace

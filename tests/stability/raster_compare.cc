@@ -9,7 +9,7 @@ namespace color3d {
 namespace {
 
 constexpr float kBackground[3] = {0.2f, 0.5f, 0.6f};
-// Denominators of buffers that are zero: far below the eps of Adam, 1e-15.
+// Denominator for buffers of zeros: far below the eps of Adam, 1e-15.
 constexpr double kVanishing = 1e-20;
 
 // Largest |fast - reference| and |reference| of a buffer.
@@ -86,7 +86,7 @@ double GradientError(const ReferenceParameters& parameters,
   return worst;
 }
 
-// Random weights of the pixels, in both forms.
+// Random weights of the pixels, for both renderers.
 void MakeAdjoint(const std::vector<ReferencePixel>& pixels,
                  int channels,
                  PlaneBuffer& planes,
@@ -127,7 +127,7 @@ StabilityResult CompareRaster(const RasterCase& raster_case, ThreadPool& pool) {
   result.left_out = static_cast<int64_t>(sampled - pixels.size());
 
   SplatPipeline pipeline;
-  pipeline.Forward(r.parameters, r.color, r.camera, kBackground, true, pool);
+  pipeline.Forward({r.parameters, r.color, r.camera}, kBackground, true, pool);
   result.value_error = ValueError(pipeline, r.color.channels, pixels);
   result.non_finite = NonFinite(pipeline.color().data) + NonFinite(pipeline.transmittance().data);
 
@@ -137,9 +137,11 @@ StabilityResult CompareRaster(const RasterCase& raster_case, ThreadPool& pool) {
   ParameterBlock gradient;
   DensifyStatistics statistics;
   statistics.Reset(r.parameters.count());
-  pipeline.Forward(r.parameters, r.color, r.camera, kBackground, false, pool);
-  pipeline.Backward(
-      r.parameters, r.color, r.camera, adjoint, GradientScope::kAll, pool, gradient, &statistics);
+  pipeline.Forward({r.parameters, r.color, r.camera}, kBackground, false, pool);
+  pipeline.Backward({r.parameters, r.color, r.camera},
+                    adjoint,
+                    pool,
+                    {GradientScope::kAll, gradient, &statistics});
   result.gradient_error = GradientError(
       truth, gradient, ReferenceGradient(truth, r.color, camera, background, pixels, adjoint_list));
   result.non_finite += NonFinite(gradient.values()) + NonFinite(statistics.gradient) +

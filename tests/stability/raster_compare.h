@@ -1,4 +1,4 @@
-// One picture drawn by the kernels, forward and backward, against the float64 reference.
+// Compares one picture of the kernels, forward and backward, with the float64 reference.
 #pragma once
 
 #include <optional>
@@ -14,13 +14,13 @@ struct RasterCase {
   ParameterBlock parameters;
   ColorSpec color;
   RasterCamera camera;
-  // What should have been drawn; the same as above when absent.
+  // The expected picture; default: that of the scene above.
   std::optional<ReferenceParameters> truth;
   std::optional<RasterCamera> truth_camera;
   // Relative distance from a threshold below which a pixel is left out.
   double threshold_margin = 1e-4;
-  int max_pixels = 4000;   // compared; evenly spread over the picture
-  double condition = 0.0;  // 0: of the worst 2D covariance
+  int max_pixels = 4000;   // number of compared pixels, evenly spread
+  double condition = 0.0;  // 0: that of the worst 2D covariance
   std::string condition_of = "2D covariance";
   double value_bound = 2e-5;
   double gradient_bound = 1e-3;

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-// kNotCompared passes: comparisons themselves never give NaN (see raster_compare.h).
+// kNotCompared passes; comparisons never return NaN (see raster_compare.h).
 bool Within(double error, double bound) { return std::isnan(error) || error <= bound; }
 
 }  // namespace

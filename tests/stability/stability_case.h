@@ -11,8 +11,7 @@
 // transmittance 1e-4) have two right answers: they are left out of both sides, values and
 // gradients, and counted.
 //
-// A bound is what the case is held to. Where the condition number leaves float32 no chance it is
-// about eps * condition, and says so by being large.
+// Bounds are about eps * condition where the condition number is too large for float32.
 #pragma once
 
 #include <cstdint>
@@ -30,7 +29,7 @@ inline constexpr double kFloatEpsilon = std::numeric_limits<float>::epsilon();
 
 struct StabilityResult {
   double condition = 1.0;
-  std::string condition_of;  // what the condition number belongs to
+  std::string condition_of;  // quantity with that condition number
   double value_error = kNotCompared;
   double value_bound = 0.0;
   double gradient_error = kNotCompared;
@@ -38,9 +37,9 @@ struct StabilityResult {
   int64_t non_finite = 0;
   int64_t compared = 0;  // pixels or numbers
   int64_t left_out = 0;  // near a threshold
-  int64_t restores = 0;  // of the last good state, as the curves report them
-  bool held = true;      // what else the case demands
-  std::string outcome;   // in words, for cases that are more than a comparison
+  int64_t restores = 0;  // of the last good state, according to the curves
+  bool held = true;      // other requirements of the case
+  std::string outcome;   // in words, for cases other than comparisons
   double seconds = 0.0;
 
   bool Passed() const;
@@ -53,15 +52,15 @@ struct StabilityCase {
   std::function<StabilityResult(ThreadPool&)> run;
 };
 
-// In the table's order.
+// In the order of the table.
 std::vector<StabilityCase> StabilityCases();
 
-// Runs with the clock; an exception that the case did not expect becomes a failed result.
+// Runs a case and measures its time. An unexpected exception gives a failed result.
 StabilityResult RunStabilityCase(const StabilityCase& stability_case, ThreadPool& pool);
 
 int64_t CountNonFinite(const float* values, size_t count);
 
-// The groups, for StabilityCases.
+// Groups of StabilityCases.
 void AddRasterCases(std::vector<StabilityCase>& cases);
 void AddLossCases(std::vector<StabilityCase>& cases);
 void AddAdamCases(std::vector<StabilityCase>& cases);

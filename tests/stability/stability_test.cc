@@ -1,4 +1,4 @@
-// Runs the fast cases of the table, and checks that the comparison itself can fail.
+// Runs the fast cases, and checks that the comparison can fail.
 #include <gtest/gtest.h>
 
 #include <cctype>
@@ -35,13 +35,13 @@ INSTANTIATE_TEST_SUITE_P(Cases,
                          [](const testing::TestParamInfo<StabilityCase>& info) {
                            std::string name = info.param.group + "_" + info.param.name;
                            for (char& c : name) {
-                             if (c == '-') c = 'm';  // 1e-8 is not 1e8
+                             if (c == '-') c = 'm';  // distinguishes 1e-8 from 1e8
                              if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
                            }
                            return name;
                          });
 
-// Twelve Gaussians before a turned camera, with all spherical harmonics.
+// Twelve Gaussians in front of a turned camera, with all spherical harmonics.
 RasterCase SmallCase() {
   RasterCase r;
   r.camera.width = 20;

@@ -1,4 +1,4 @@
-// Small training problems without files, for the cases about whole trainings.
+// Small training problems without files.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@
 
 namespace color3d {
 
-// Counts what a trainer reports.
+// Counts the reports of a trainer.
 class TrainingWitness : public ProgressObserver {
  public:
   void OnProgress(int64_t, int64_t, const std::string&) override {}
@@ -29,18 +29,18 @@ class TrainingWitness : public ProgressObserver {
 };
 
 // A camera of width x height px at `angle_rad` around the y axis, three units from the origin,
-// which it looks at; `turned` by half a turn it looks away.
+// which it faces. `turned`: it faces away.
 PosedCamera OrbitCamera(int view, int width, int height, double angle_rad, bool turned = false);
 
 // `count` Gaussians of random colour in a cube of half side 0.8 around the origin.
 GaussianModel CloudOf(int count, uint64_t seed);
 
-// L in 0..100, smooth; another one for every view.
+// L in 0..100, smooth, different for every view.
 Image Texture(int width, int height, int view);
 
 int64_t CountNonFinite(const GaussianModel& model);
 
-// A case that must end in an Error of one of these codes.
+// A case that must throw an Error with one of these codes.
 StabilityResult MustRefuse(const std::vector<ErrorCode>& codes, const std::function<void()>& run);
 
 }  // namespace color3d

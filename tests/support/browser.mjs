@@ -1,9 +1,9 @@
-// A headless Chromium that tests drive by the Chrome DevTools Protocol over a pipe. Needs no npm package.
+// A headless Chromium driven by the Chrome DevTools Protocol over a pipe. Needs no npm package.
 //   const browser = openBrowser(CHROMIUM, FLAGS, isError);
 //   await browser.open(); await browser.send('Page.navigate', ...); await browser.evaluate('...');
 //   await browser.close();
-// errors: texts of the console, as far as isError(type) accepts them, and of exceptions; requests: URLs of
-// requests that leave the page.
+// errors: texts of exceptions and of console messages for which isError(type); requests: URLs of external
+// requests.
 import { spawn } from 'node:child_process';
 import { mkdtempSync, rmSync } from 'node:fs';
 import { tmpdir } from 'node:os';
@@ -46,7 +46,7 @@ export const openBrowser = (chromium, flags, isError = () => true) => {
     waiting.set(next, { done, failed });
     process_.stdio[3].write(JSON.stringify({ id: next++, method, params, sessionId: session }) + '\0');
   });
-  // Opens an empty page, to which all that follows is sent.
+  // Opens an empty page, the target of all commands that follow.
   const open = async () => {
     session = undefined;
     const { targetId } = await send('Target.createTarget', { url: 'about:blank' });

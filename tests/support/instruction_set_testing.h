@@ -1,4 +1,4 @@
-// Tests that run once per instruction set of this machine.
+// Parameters for tests that run once per instruction set of the machine.
 #pragma once
 
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
-// For tests that write many small files.
+// A folder for tests that write many small files.
 #pragma once
 
 #include <filesystem>
 
 namespace color3d {
 
-// Where files cost no disk, if the machine has such a place.
+// Returns a folder in memory, if the machine has one.
 inline std::filesystem::path MemoryFolder() {
   std::error_code error;
   const std::filesystem::path memory = "/dev/shm";

@@ -1,5 +1,4 @@
-// Run control of a computation without progress, cancellation or checkpoints, for tests and
-// benchmarks.
+// RunControl without progress, cancellation or checkpoints, for tests and benchmarks.
 #pragma once
 
 #include "core/base/run_control.h"
@@ -8,13 +7,13 @@ namespace color3d {
 
 class QuietRun {
  public:
-  // `threads`: as ThreadPool's.
+  // `threads`: as in ThreadPool.
   explicit QuietRun(int threads = 0) : pool_(threads) {}
 
   ThreadPool& pool() { return pool_; }
   CancellationToken& cancel() { return cancel_; }
   RunControl control() { return {pool_, checkpoints_, progress_, cancel_}; }
-  // With an observer, which must outlive the computation.
+  // `observer` must outlive the computation.
   RunControl ReportingTo(ProgressObserver& progress) {
     return {pool_, checkpoints_, progress, cancel_};
   }

@@ -1,4 +1,4 @@
-// A block of random parameters, for tests of code that works on parameters row by row.
+// A block of random parameters, for tests of row-wise code.
 #pragma once
 
 #include <cstdint>

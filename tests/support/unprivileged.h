@@ -1,5 +1,5 @@
-// Tests that run as root are stopped by no permission. While one of these lives, this thread and
-// those that it starts use files as a user without rights.
+// Drops file permissions of root for its lifetime, in this thread and those that it starts, for
+// tests of permissions that run as root.
 #pragma once
 
 #include <sys/fsuid.h>

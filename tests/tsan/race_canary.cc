@@ -1,5 +1,4 @@
-// Two threads write the same number without a lock. A build for ThreadSanitizer must report it: one
-// that does not would be silent about everything else, too.
+// Two threads write the same number without a lock, which a build for ThreadSanitizer must report.
 #include <cstdio>
 #include <thread>
 

@@ -11,7 +11,7 @@ bool IsInherited(std::string_view variable) {
                                       "LC_",
                                       "TZ=",
                                       "HOME=",
-                                      "TMPDIR=",  // where things are
+                                      "TMPDIR=",  // locations
                                       "LD_LIBRARY_PATH=",
                                       "LD_PRELOAD=",
                                       "GLIBC_TUNABLES=",

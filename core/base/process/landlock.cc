@@ -26,7 +26,7 @@ constexpr uint64_t kSignals = 1ull << 1;
 struct RulesetAttributes {
   uint64_t files = 0;
   uint64_t network = 0;  // since ABI 4
-  uint64_t scoped = 0;   // since ABI 6: only to what is in the same sandbox
+  uint64_t scoped = 0;   // since ABI 6: restricted to the same sandbox
 };
 
 constexpr uint64_t kRead =

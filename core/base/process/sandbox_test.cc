@@ -26,8 +26,8 @@ namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 
-// What `attempt` gives in a process of its own that is locked in: its errno, 0 for success, 255
-// when the process came to another end.
+// Runs `attempt` in a sandboxed process. Returns its errno, 0 for success, or 255 if the process
+// ended otherwise.
 int InSandbox(const SandboxRules& rules, const std::function<bool()>& attempt) {
   const Sandbox sandbox(rules);
   const pid_t child = ::fork();
@@ -49,7 +49,7 @@ bool CanOpen(const fs::path& path, int flags) {
 
 bool CanMakeSocket(int family) { return ::socket(family, SOCK_STREAM, 0) >= 0; }
 
-// Connects to a port of ours that listens.
+// Connects to a listening port of this process.
 bool CanConnect(uint16_t port) {
   const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in address{};
@@ -98,7 +98,7 @@ TEST_F(SandboxTest, DeniesFilesOutsideRules) {
       EACCES);
   EXPECT_EQ(InSandbox(rules_, [&] { return ::unlink((scratch_.path() / "secret").c_str()) == 0; }),
             EACCES);
-  // A way around by a name of one's own for it.
+  // A symbolic link does not bypass the rules.
   fs::create_symlink(scratch_.path() / "secret", own / "link");
   EXPECT_EQ(InSandbox(rules_, [&] { return CanOpen(own / "link", O_RDONLY); }), EACCES);
 
@@ -129,7 +129,7 @@ TEST_F(SandboxTest, FollowsSocketRules) {
 
   EXPECT_EQ(InSandbox(rules_, [] { return CanMakeSocket(AF_UNIX); }), EPERM);
   EXPECT_EQ(InSandbox(rules_, [] { return CanMakeSocket(AF_INET); }), EPERM);
-  // The kernel looks at the lower half of the number only.
+  // The kernel reads only the lower half of the number.
   const auto with_high_bits = [] {
     return ::syscall(SYS_socket, (1L << 32) | AF_INET, SOCK_STREAM, 0) >= 0;
   };

@@ -41,7 +41,7 @@ TEST(Subprocess, ReportsExitCodeLogTimeoutAndCancellation) {
   }
 }
 
-// What a shell program comes to under these limits.
+// Runs a shell script under these limits.
 SubprocessResult RunShell(const std::string& script,
                           const ProcessLimits& limits,
                           const std::filesystem::path& log) {
@@ -106,7 +106,7 @@ TEST(Subprocess, SandboxedProgramReachesOwnFolderOnly) {
                            (other.path() / "out").string() + "'"};
   options.sandbox = SandboxRules();
   options.sandbox->writable = {scratch.path()};
-  options.log_path = other.path() / "log";  // opened by us
+  options.log_path = other.path() / "log";  // opened by the parent
   EXPECT_NE(RunSubprocess(options, CancellationToken()).exit_code, 0);
   EXPECT_EQ(ReadFile(scratch.path() / "in"), "in\n");
   EXPECT_FALSE(std::filesystem::exists(other.path() / "out"));

@@ -20,10 +20,10 @@
 namespace color3d {
 namespace {
 
-// What a decoder could only want for an attack: other processes, mounts and namespaces, the kernel
-// itself, keys, clocks, ways around the checks of paths and sockets.
+// System calls that a decoder does not need: other processes, mounts and namespaces, the kernel
+// itself, keys, clocks, and calls that bypass the checks of paths and sockets.
 constexpr const char* kRefused[] = {
-#ifndef __SANITIZE_ADDRESS__  // whose search for leaks is a debugger
+#ifndef __SANITIZE_ADDRESS__  // its leak detector is a debugger
     "ptrace",
 #endif
     "process_vm_readv",

@@ -13,7 +13,7 @@ namespace color3d {
 HostPort SplitHostPort(const std::string& text) {
   const size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon + 1 == text.size()) {
-    throw InvalidArgument("'{}' is no address: it must be HOST:PORT, e.g. 127.0.0.1:50551", text);
+    throw InvalidArgument("'{}' is not an address; give HOST:PORT, e.g. 127.0.0.1:50551", text);
   }
   std::string host = text.substr(0, colon);
   if (host.size() > 1 && host.front() == '[' && host.back() == ']') {

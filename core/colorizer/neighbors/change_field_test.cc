@@ -77,7 +77,7 @@ TEST(ChangeFieldTest, ChangesNothingWithoutCorrections) {
   EXPECT_EQ(answer.share.max().item<double>(), 0.0);
 }
 
-TEST(ChangeFieldTest, LaterOfContradictingStrokesCounts) {
+TEST(ChangeFieldTest, UsesLaterOfContradictingStrokes) {
   torch::Tensor changes = torch::zeros({2, 2});
   changes[0][0] = 30.0;
   changes[1][0] = -10.0;

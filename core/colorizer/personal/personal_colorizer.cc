@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/base/byte_source.h"
 #include "core/base/error.h"
 #include "core/colorizer/model/named_tensors.h"
 #include "core/colorizer/model/padding.h"
@@ -19,7 +20,6 @@
 #include "core/image/fill_holes.h"
 #include "core/image/guided_upsample.h"
 #include "core/image/image_checks.h"
-#include "core/weights/byte_source.h"
 
 namespace color3d {
 namespace {

@@ -55,21 +55,21 @@ void CheckPicture(const TrainingPicture& picture) {
     // Far beyond any colour. Values stored in half precision would overflow.
     if (std::abs(value) > kMaxGivenAb) {
       throw InvalidArgument(
-          "{} holds the chroma {}; a and b are Lab units, at most {}", name, value, kMaxGivenAb);
+          "{} has a chroma of {} Lab units; the maximum is {}", name, value, kMaxGivenAb);
     }
   }
   for (float value : picture.weight.data) {
     if (value < 0.0f || value > 1.0f) {
-      throw InvalidArgument("the weights of {} contain {}; allowed are 0 to 1", name, value);
+      throw InvalidArgument("the weights of {} contain {}, which is outside 0..1", name, value);
     }
   }
   if (!(picture.share >= 0.0 && picture.share <= 1e6)) {
-    throw InvalidArgument("the share of {} is {}; allowed are 0 to 1e6", name, picture.share);
+    throw InvalidArgument("the share of {} is {}, which is outside 0..1e6", name, picture.share);
   }
 }
 
 void CheckPictures(const std::vector<TrainingPicture>& pictures) {
-  if (pictures.empty()) throw InvalidArgument("no picture to personalize on");
+  if (pictures.empty()) throw InvalidArgument("there is no picture to train on");
   double shares = 0.0;
   for (const TrainingPicture& picture : pictures) {
     CheckPicture(picture);

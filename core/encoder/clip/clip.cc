@@ -110,7 +110,8 @@ std::shared_ptr<const ClipModel> ClipModel::FromWeightFile(const std::filesystem
   WeightMap weights = ReadWeightFile(path);
   if (!HoldsClip(weights)) {
     throw InvalidArgument(
-        "{} holds no CLIP with a ViT (it has {} arrays, none called visual.class_embedding)",
+        "{} contains no CLIP model with a ViT (it has {} arrays, none called "
+        "visual.class_embedding)",
         path.string(),
         weights.size());
   }

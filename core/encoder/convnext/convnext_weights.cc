@@ -54,7 +54,7 @@ ConvNextConfig ReadConfig(const WeightMap& weights) {
         weights, fmt::format("downsample_layers.{}.{}.weight", stage, stage == 0 ? 0 : 1));
     if (shape.size() != 4) break;
     if (shape[0] < 1 || shape[0] > kMaxChannels) {
-      throw InvalidArgument("the ConvNeXt's stage {} has {} channels; at most {} are taken",
+      throw InvalidArgument("the ConvNeXt's stage {} has {} channels; at most {} are supported",
                             stage,
                             shape[0],
                             kMaxChannels);

@@ -1,4 +1,4 @@
-// Formats that we read and do not write, and files that a decoder would follow to other files.
+// Formats that are read but not written, and files that refer to other files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -87,7 +87,7 @@ TEST(ForeignFormats, ReadsBmpsOfAllHeaders) {
       bmp.substr(0, 10) + std::string("\x1A\0\0\0\x0C\0\0\0\x05\0\x04\0\x01\0\x18\0", 16);
   os2 += bmp.substr(54);
   EXPECT_LT(WorstDifference(DecodeImage(os2, "a.bmp"), image), 0.003);
-  // Grey by a palette.
+  // Grey palette.
   std::vector<uchar> gray;
   cv::imencode(".bmp", cv::Mat(4, 5, CV_8UC1, cv::Scalar(77)), gray);
   const Image read = DecodeImage({reinterpret_cast<char*>(gray.data()), gray.size()}, "a.bmp");
@@ -146,7 +146,7 @@ TEST(ForeignFormats, UnreadableHeicNamesRemedy) {
   std::string avif = heic;
   avif.replace(avif.find("hvc1"), 4, "av01");
   EXPECT_THAT(Refusal(avif, "a.heic"), HasSubstr("is an AVIF picture"));
-  // The picture's place as one in another file, which the box "dref" would name.
+  // The picture's location in another file, which the box "dref" names.
   std::string outside = heic;
   const size_t places = outside.find("iloc") + 4;
   const int version = outside[places];
@@ -162,7 +162,7 @@ TEST(ForeignFormats, CmykIsRejectedWithRemedy) {
   EXPECT_THAT(Refusal(cmyk, "print.jpg"), HasSubstr("print.jpg is in CMYK"));
 }
 
-// OpenCV, with GDAL and GDCM behind it, would look for a decoder by itself.
+// OpenCV would choose among its decoders, GDAL and GDCM included.
 TEST(ForeignFormats, FilesWithReferencesReachNoDecoder) {
   const ScratchFolder folder;
   const std::string secret = (folder.path() / "secret.png").string();

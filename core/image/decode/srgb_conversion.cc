@@ -14,7 +14,7 @@
 namespace color3d {
 namespace {
 
-// Half a step more than what rounding to 8 bits changes.
+// Rounding to 8 bits and half a step.
 constexpr float kSame = 1.5f / 255.0f;
 constexpr int kIntent = INTENT_RELATIVE_COLORIMETRIC;
 constexpr cmsUInt32Number kKeepBlack = cmsFLAGS_BLACKPOINTCOMPENSATION;
@@ -44,7 +44,7 @@ bool IsGray(const ColorTag& tag) {
   return !tag.profile.empty() && std::string_view(tag.profile).substr(16, 4) == "GRAY";
 }
 
-// Of what a file says by numbers.
+// Profile of the chromaticities and the gamma in a file.
 Profile ProfileOfNumbers(const ColorTag& tag) {
   const Chromaticities c =
       tag.primaries.value_or(Chromaticities{0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06});
@@ -56,8 +56,7 @@ Profile ProfileOfNumbers(const ColorTag& tag) {
   return Profile(cmsCreateRGBProfile(&white, &primaries, curves));
 }
 
-// Null, with `problem` said, when the tag cannot be followed; null without when there is nothing to
-// follow.
+// Returns null if there is nothing to convert or, with `problem` set, if the tag cannot be used.
 Profile OpenProfile(const ColorTag& tag, std::string* problem) {
   *problem = tag.problem;
   if (!problem->empty()) return nullptr;
@@ -73,7 +72,7 @@ Profile OpenProfile(const ColorTag& tag, std::string* problem) {
     *problem = "its colour profile is damaged";
     return nullptr;
   }
-  // Asked of the bytes: what Little CMS answers is an enum, which a damaged profile is not in.
+  // Read from the bytes, because Little CMS returns an enum that cannot hold a damaged value.
   const std::string_view bytes = tag.profile;
   const std::string_view kind = bytes.substr(12, 4), space = bytes.substr(16, 4);
   const bool is_device = kind == "scnr" || kind == "mntr" || kind == "prtr" || kind == "spac";
@@ -86,7 +85,7 @@ Profile OpenProfile(const ColorTag& tag, std::string* problem) {
 
 float Clamped(float v) { return v > 0.0f ? std::min(v, 1.0f) : 0.0f; }  // NaN: 0
 
-// What the grey i / (count - 1) becomes, for all i; empty when the profile cannot be followed.
+// Converted values of the greys i / (count - 1); empty if the profile cannot be used.
 std::vector<float> ToneTable(const Profile& profile, bool gray, size_t count) {
   const Profile target(gray ? SrgbGray() : Profile(cmsCreate_sRGBProfile()));
   const cmsUInt32Number format = gray ? TYPE_GRAY_FLT : TYPE_RGB_FLT;
@@ -136,11 +135,11 @@ bool AreNear(const std::vector<float>& x, const std::vector<float>& y, float dif
   });
 }
 
-// What most profiles are, three curves and a matrix, worked out by tables: as exact as Little CMS's
-// floats, and nine times as quick.
+// Three curves and a matrix, the kind of most profiles, evaluated with tables: as exact as Little
+// CMS's floats, and nine times as fast.
 class MatrixShaper {
  public:
-  // Null for other profiles, and for those that this does not follow to 1e-4.
+  // Returns null for other profiles, and for those that the tables do not reproduce to 1e-4.
   static std::unique_ptr<MatrixShaper> Of(const Profile& profile, const Transform& exact) {
     if (!cmsIsMatrixShaper(profile.get())) return nullptr;
     std::unique_ptr<MatrixShaper> shaper(new MatrixShaper());
@@ -213,7 +212,7 @@ class MatrixShaper {
   float matrix_[3][3] = {};
 };
 
-// Little CMS has a quick way for 8 bits, and an exact one for floats.
+// For 8 bits Little CMS has a fast path.
 void ConvertRow8(const Transform& transform,
                  size_t row,
                  std::vector<uint8_t>& in,
@@ -242,7 +241,7 @@ void ConvertRowExactly(const Transform& transform,
   }
 }
 
-// False when the profile cannot be followed.
+// Returns false if the profile cannot be used.
 bool ConvertColors(const Profile& profile, int bits, Image* image) {
   const Profile srgb(cmsCreate_sRGBProfile());
   const Transform exact(
@@ -269,7 +268,7 @@ bool ConvertColors(const Profile& profile, int bits, Image* image) {
   return true;
 }
 
-// False when the profile cannot be followed.
+// Returns false if the profile cannot be used.
 bool ConvertTones(const Profile& profile, bool gray, int bits, int channels, Image* image) {
   const std::vector<float> table = ToneTable(profile, gray, bits > 8 ? 65536 : 256);
   if (table.empty()) return false;
@@ -289,7 +288,7 @@ std::string Saved(const Profile& profile) {
   }
   std::string bytes(size, '\0');
   cmsSaveProfileToMem(profile.get(), bytes.data(), &size);
-  // The date of its making: equal pictures are to be equal files.
+  // A fixed creation date, so that equal pictures give equal files.
   constexpr size_t kDateAt = 24;
   const std::string date("\x07\xE8\0\x01\0\x01\0\0\0\0\0\0", 12);
   return bytes.replace(kDateAt, date.size(), date);

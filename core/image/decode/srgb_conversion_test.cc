@@ -20,7 +20,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Colours that all of the spaces hold, away from their edges.
+// Colours inside all of the spaces, away from their edges.
 Image Colors(int channels) {
   Image image(12, 9, channels);
   Random random(3);
@@ -41,7 +41,7 @@ double WorstDifference(const Image& x, const Image& y) {
 struct Container {
   const char* name;
   std::function<std::string(const Image&, const std::string& profile)> write;
-  double step;  // what it rounds to, of 0..1
+  double step;  // rounding step, of 0..1
 };
 std::vector<Container> Containers() {
   const auto tiff = [](int bits) {
@@ -87,7 +87,7 @@ TEST(SrgbConversion, GrayPicturesKeepOneChannelWithSrgbTones) {
   const Image srgb = Colors(1);
   for (const Container& container : Containers()) {
     const std::string name = container.name;
-    if (name == "WebP" || name == "BMP") continue;  // have no grey
+    if (name == "WebP" || name == "BMP") continue;  // without grey
     for (const std::string& profile :
          {GrayGammaProfile(1.8), GrayGammaProfile(2.2), DotGainProfile(20.0)}) {
       const Image other = ConvertToProfile(srgb, profile);
@@ -110,7 +110,7 @@ TEST(SrgbConversion, GrayPictureFollowsColorProfile) {
   EXPECT_LT(WorstDifference(read, srgb), 2e-4);
 }
 
-// Ours without their profile.
+// Our JPEG without its profile.
 std::string UntaggedJpeg(const Image& image) {
   const std::string jpeg = EncodeJpeg(image, 98);
   const size_t at = jpeg.find("\xFF\xE2");
@@ -163,7 +163,7 @@ std::string BigEndian(std::initializer_list<uint32_t> values) {
   return bytes;
 }
 
-// A PNG that says nothing: ours without its sRGB chunk.
+// Our PNG without its sRGB chunk.
 std::string Untagged(const Image& image) {
   const std::string png = EncodePng16(image);
   return png.substr(0, 33) + png.substr(33 + 13);

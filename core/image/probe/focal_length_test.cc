@@ -16,7 +16,7 @@ std::string JpegWith(const std::vector<ExifTag>& tags) {
 }
 
 TEST(FocalLength, FilmEquivalentKeepsDiagonal) {
-  // 28 mm before 36 x 24 mm film.
+  // 28 mm on 36 x 24 mm film.
   EXPECT_NEAR(ReadFocalLengthPx(JpegWith({{41989, 3, 28}}), 3600, 2400), 2800.0, 0.5);
   EXPECT_NEAR(
       ReadFocalLengthPx(JpegWith({{41989, 3, 28}}), 4000, 3000), 28.0 / 43.2666 * 5000.0, 0.5);
@@ -39,7 +39,7 @@ TEST(FocalLength, UnknownAndAbsurdValuesAreZero) {
   EXPECT_EQ(ReadFocalLengthPx(JpegWith({{37386, 5, 35, 0}, {41486, 5, 1, 1}}), 3600, 2400), 0.0);
 }
 
-// Any byte may be wrong: the answer is a sane number, and nothing outside of the file is read.
+// With any wrong byte the result is plausible, and nothing outside the file is read.
 TEST(FocalLength, DamagedFilesAreHarmless) {
   const std::string jpeg = JpegWith({{37386, 5, 350, 10}, {41486, 5, 1000, 1}});
   for (size_t at = 2; at < 120; ++at) {

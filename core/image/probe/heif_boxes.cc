@@ -48,7 +48,7 @@ std::vector<Box> ListBoxes(const ProbeContext& context, std::string_view bytes, 
   size_t at = 0;
   while (at < bytes.size() && boxes.size() < kMaxEntries) {
     if (!reader.Has(at, 8)) {
-      if (is_file && !boxes.empty()) break;  // some bytes behind the last one
+      if (is_file && !boxes.empty()) break;  // a few trailing bytes
       throw context.Truncated("it ends inside a box");
     }
     uint64_t size = reader.U32(at);
@@ -112,7 +112,7 @@ class MetaReader {
       Fields entry(context_, box.body);
       const uint32_t entry_version = entry.Take32(1);
       entry.Take(3);
-      if (entry_version < 2) continue;  // of no kind that has a type
+      if (entry_version < 2) continue;  // items of these versions have no type
       HeifItem& item = found_.items[entry.Take32(entry_version == 2 ? 2 : 4)];
       item.is_protected = entry.Take(2) != 0;
       item.type = entry.TakeText(4);

@@ -19,10 +19,8 @@ Error ProbeContext::Damaged(const std::string& what) const {
 }
 
 Error ProbeContext::InCmyk() const {
-  return InvalidArgument(
-      "{} is in CMYK, colours of print, which are not read; convert it to RGB (sRGB) and save it "
-      "again",
-      file_name);
+  return InvalidArgument("{} is in CMYK, which is not supported; convert it to RGB (sRGB)",
+                         file_name);
 }
 
 void ProbeContext::CheckSize(int64_t width, int64_t height) const {

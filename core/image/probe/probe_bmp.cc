@@ -25,10 +25,11 @@ void CheckKind(const ProbeContext& context, uint32_t bits, uint32_t compression)
   const bool runs = (compression == kRle8 && bits == 8) || (compression == kRle4 && bits == 4);
   if (plain || fields || runs) return;
   if (compression <= kAlphaBitFields) {
-    throw InvalidArgument("{} is a BMP of a rare kind ({} bits, compression {}); save it as PNG",
-                          context.file_name,
-                          bits,
-                          compression);
+    throw InvalidArgument(
+        "{} is a BMP of an unsupported kind ({} bits, compression {}); save it as PNG",
+        context.file_name,
+        bits,
+        compression);
   }
   throw context.Damaged("it claims {} bits a pixel and compression {}", bits, compression);
 }

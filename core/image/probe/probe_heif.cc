@@ -38,7 +38,7 @@ void CheckItem(const ProbeContext& context,
   const bool is_derived = item.type == "grid" || item.type == "iden" || item.type == "iovl";
   const bool is_coded = item.type == "hvc1" || item.type == "hev1";
   if ((!is_coded && !is_derived) || item.is_protected || item.construction > 1) {
-    throw InvalidArgument("{} is a HEIC picture of a rare kind; convert it to JPEG or PNG",
+    throw InvalidArgument("{} is a HEIC picture of an unsupported kind; convert it to JPEG or PNG",
                           context.file_name);
   }
   if (!item.is_whole) throw context.Truncated("a part of the picture lies behind its end");

@@ -42,8 +42,8 @@ void ReadFrameHeader(const ProbeContext& context,
 
 }  // namespace
 
-// Another marker has to follow at once: what begins otherwise is no JPEG to OpenCV, which would try
-// its readers of other formats (DICOM, all of GDAL's) on it.
+// Requires another marker at once: OpenCV does not recognize other files as JPEG and would try its
+// readers of other formats (DICOM, all of GDAL's).
 bool IsJpeg(std::string_view bytes) {
   return bytes.substr(0, 3) == "\xFF\xD8\xFF" || bytes == "\xFF\xD8";
 }
@@ -57,8 +57,8 @@ ImageInfo ProbeJpeg(const ProbeContext& context) {
   size_t at = 2;
   while (true) {
     // Entropy-coded data (after a scan header) runs up to the next real marker: FF 00 is a stuffed
-    // byte, FF D0..D7 a restart, and FF FF padding. Before the first scan nothing may stand between
-    // segments, but decoders skip it, and so do we.
+    // byte, FF D0..D7 a restart, and FF FF padding. Bytes between segments before
+    // the first scan are invalid but skipped, as decoders do.
     at = context.bytes.find('\xFF', at);
     if (at == std::string_view::npos || !reader.Has(at, 2)) {
       throw context.Truncated("it ends before its end-of-image marker");
@@ -70,7 +70,7 @@ ImageInfo ProbeJpeg(const ProbeContext& context) {
     }
     at += 2;
     if (marker == 0x00 || StandsAlone(marker)) continue;
-    if (marker == kEndOfImage) break;  // what follows is not ours
+    if (marker == kEndOfImage) break;  // trailing bytes are ignored
     if (marker == 0xD8) throw context.Damaged("a second image starts inside it");
     if (!reader.Has(at, 2)) throw context.Truncated("it ends inside its header");
     const size_t length = reader.U16(at);

@@ -107,7 +107,7 @@ TEST(Probe, ReadsTheHeaderOfEveryFormat) {
 TEST(Probe, NamesEveryTruncatedFile) {
   for (const Sample& sample : Samples()) {
     for (size_t length = 0; length < sample.bytes.size(); ++length) {
-      // A heap copy of the exact size, so that an address sanitizer sees the first byte too many.
+      // A heap copy of the exact size, so that an address sanitizer reports the first byte beyond.
       const std::vector<char> cut(sample.bytes.begin(), sample.bytes.begin() + length);
       const std::string_view view(cut.data(), cut.size());
       const std::string said = Refusal([&] { ProbeImage(view, sample.name); });
@@ -164,7 +164,7 @@ TEST(Probe, RejectsOtherFiles) {
               HasSubstr("BigTIFF"));
 }
 
-// A PNG of one chunk with a right checksum.
+// A PNG of one chunk with a valid checksum.
 std::string PngClaiming(uint32_t width, uint32_t height) {
   std::string header("IHDR", 4);
   for (uint32_t v : {width, height}) {
@@ -190,7 +190,7 @@ TEST(Probe, RejectsBombsByHeader) {
   limits.max_pixels = 300;
   const std::string small = EncodePng8(Noise(23, 17, 1));
   EXPECT_THAT(Refusal([&] { ProbeImage(small, "a.png", limits); }), HasSubstr("23 x 17"));
-  // A right header with hardly any data behind it.
+  // A valid header with hardly any data after it.
   const std::string iend("\0\0\0\0IEND\xAE\x42\x60\x82", 12);
   EXPECT_THAT(Refusal([&] { ProbeImage(PngClaiming(10000, 10000) + iend, "thin.png"); }),
               HasSubstr("holds no image data"));

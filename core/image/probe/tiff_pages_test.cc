@@ -20,7 +20,7 @@ Image Plain(int width, int height, float value, int channels = 1) {
   return Image(width, height, channels, value);
 }
 
-// The picture is 40 x 30 px of 0.8, whatever else there is.
+// Expects the page of 40 x 30 px of value 0.8.
 void ExpectThePicture(const std::string& tiff, const std::string& what) {
   const ImageInfo info = ProbeImage(tiff, "scan.tif");
   EXPECT_EQ(info.width, 40) << what;
@@ -92,7 +92,7 @@ TEST(TiffPagesTest, CyclesAndBadPointersEndPageList) {
   ASSERT_EQ(pages.pages.size(), 2u);
   const auto first = static_cast<char>(pages.pages[0].directory & 255u);
   const auto second_byte = static_cast<char>(pages.pages[0].directory >> 8 & 255u);
-  // The last four bytes of the file name the page behind the second one.
+  // The last four bytes of the file are the offset of the page after the second one.
   std::string cycle = tiff;
   cycle[cycle.size() - 4] = first;
   cycle[cycle.size() - 3] = second_byte;
@@ -112,7 +112,7 @@ TEST(TiffPagesTest, RejectsRawAndCmykWithRemedy) {
     }
     return "";
   };
-  // A preview in front of a sensor's data is not the picture.
+  // The preview before a sensor's data is not the picture.
   EXPECT_THAT(refusal(TiffFile({{.image = Plain(10, 8, 0.2f)},
                                 {.image = Plain(40, 30, 0.8f), .photometric = 32803}})),
               HasSubstr("a.tif holds a camera's raw data; develop it"));

@@ -53,7 +53,8 @@ ColorQueries::ColorQueries(const std::vector<int64_t>& feature_channels, WeightR
   width_ = queries.size() == 2 ? queries[1] : 0;
   if (width_ % (2 * kHeads) != 0) {
     throw InvalidArgument(
-        "the DDColor weights have colour queries of width {}, which is no multiple of 16", width_);
+        "the DDColor weights have colour queries of width {}, which is not a multiple of 16",
+        width_);
   }
   query_feat_ = TakeTensor(reader, prefix + "query_feat.weight", {query_count, width_});
   query_embed_ = TakeTensor(reader, prefix + "query_embed.weight", {query_count, width_});

@@ -92,7 +92,8 @@ std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::FromWeightFile(
   WeightMap weights = ReadWeightFile(ddcolor_weights);
   if (!Ddcolor::Recognizes(weights)) {
     throw InvalidArgument(
-        "{} holds no DDColor (it has {} arrays, none called refine_net.0.0.weight_orig); give a "
+        "{} contains no DDColor model (it has {} arrays, none called refine_net.0.0.weight_orig); "
+        "give a "
         "published DDColor file",
         ddcolor_weights.string(),
         weights.size());

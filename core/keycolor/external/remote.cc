@@ -54,7 +54,7 @@ Image PictureToSend(const Image& luminance, const RemoteOptions& options, const 
   if (info.max_pixels > 0 && pixels > info.max_pixels) {
     if (info.max_pixels < kMinPixels) {
       Refuse(options,
-             fmt::format("accepts at most {} pixels a picture, but {} are needed",
+             fmt::format("accepts at most {} pixels per picture, but at least {} are needed",
                          info.max_pixels,
                          kMinPixels));
     }
@@ -130,7 +130,7 @@ Image ReadAnswer(const std::string& bytes, const Image& sent, const RemoteOption
   Image answer;
   try {
     const ImageInfo probe = ProbeImage(bytes, what, limits);
-    if (probe.format != ImageFormat::kPng) throw InvalidArgument("{} is no PNG", what);
+    if (probe.format != ImageFormat::kPng) throw InvalidArgument("{} is not a PNG file", what);
     answer = DecodeImage(bytes, what);
   } catch (const Error& error) {
     Refuse(options, std::string("did not answer with a usable picture: ") + error.what());

@@ -126,7 +126,7 @@ TEST_F(RemoteTest, ScalesLargePhotoWithItsPointsAndMask) {
   EXPECT_THAT(solution.warnings[0], HasSubstr("83x55"));
 }
 
-TEST_F(RemoteTest, SendsOnlyClaimedInputs) {
+TEST_F(RemoteTest, SendsOnlySupportedInputs) {
   options_.prompt = "red";
   EXPECT_THAT(
       Complaint(),
@@ -150,7 +150,7 @@ TEST_F(RemoteTest, RefusesUnusableAnswers) {
   const std::string sent = EncodePng16(gray);
   EXPECT_THAT(complaint("garbage"), HasSubstr("is not an image"));
   EXPECT_THAT(complaint(""), HasSubstr("usable picture"));
-  EXPECT_THAT(complaint(EncodeJpeg(Image(kWidth, kHeight, 3, 0.5f))), HasSubstr("is no PNG"));
+  EXPECT_THAT(complaint(EncodeJpeg(Image(kWidth, kHeight, 3, 0.5f))), HasSubstr("is not a PNG"));
   const std::string whole = Sepia(sent, kWidth, kHeight);
   EXPECT_THAT(complaint(whole.substr(0, whole.size() / 2)), HasSubstr("truncated"));
   EXPECT_THAT(complaint(Sepia(sent, kHeight, kWidth)),

@@ -88,7 +88,7 @@ TEST_F(ScriptTest, NamesUnusableOutput) {
   expect("  return torch.cat([x, torch.ones(1)], 1)\n", "failed");
 }
 
-TEST_F(ScriptTest, RefusesFilesThatAreNoScript) {
+TEST_F(ScriptTest, RefusesOtherFiles) {
   WriteFileAtomic(file_, "this is not a zip archive");
   EXPECT_THROW(KeyColorFromScript(luminance_, file_), Error);
   std::filesystem::remove(file_);

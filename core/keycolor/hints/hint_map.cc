@@ -60,7 +60,7 @@ class HintDrawer {
         DrawLabel();
         break;
     }
-    if (drawn_ == 0) throw InvalidArgument("{} holds no pixel of the photo", Name());
+    if (drawn_ == 0) throw InvalidArgument("{} covers no pixel of the photo", Name());
   }
 
   void WarnOfContradictions(ProgressObserver& progress) const {
@@ -165,7 +165,7 @@ class HintDrawer {
     const std::vector<Point>& points = hint_->points_px;
     if (points.size() < 3) {
       throw InvalidArgument(
-          "{} is a region of {} points, but needs 3 at least", Name(), points.size());
+          "{} is a region of {} points, but needs at least 3", Name(), points.size());
     }
     for (const Point& point : points) CheckPoint(point[0], point[1], /*border_is_inside=*/true);
     std::vector<double> crossings;

@@ -182,10 +182,10 @@ TEST(HintsTest, NamesRefusedRegionsAndLabels) {
     EXPECT_NE(message.find(say), std::string::npos) << message;
   };
   expect(R"({"label": 3, "color": "#ff0000"})", {}, "no label picture");
-  expect(R"({"label": 3, "color": "#ff0000"})", {&labels, nullptr}, "holds no pixel");
+  expect(R"({"label": 3, "color": "#ff0000"})", {&labels, nullptr}, "covers no pixel");
   expect(R"({"x": 1, "y": 1, "keep": "auto"})", {}, "automatic");
   expect(R"({"region": [[0, 0], [70, 0], [0, 9]], "color": "#ff0000"})", {}, "outside");
-  expect(R"({"region": [[0, 0], [9, 0]], "color": "#ff0000"})", {}, "3 at least");
+  expect(R"({"region": [[0, 0], [9, 0]], "color": "#ff0000"})", {}, "at least 3");
   EXPECT_NE(message_of((first + R"({"label": 0, "color": "#ff0000"}])").c_str(), {&wrong, nullptr})
                 .find("61x40"),
             std::string::npos);

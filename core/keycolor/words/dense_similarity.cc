@@ -137,7 +137,7 @@ Image DenseSimilarity(const TextImageModel& model,
     cancel.ThrowIfCancelled();
     progress.OnProgress(static_cast<int64_t>(i),
                         static_cast<int64_t>(windows.size()),
-                        "looking for the prompt's things");
+                        "locating the phrases of the prompt");
     const Window& window = windows[i];
     const Image part = Crop(srgb, window.left, window.top, window.width, window.height);
     Blend(Cosines(model.PatchFeatures(part), texts), window, scale, sum, weights);

@@ -219,7 +219,7 @@ class HintPlacer {
 };
 
 Error NoRegionFound(const std::vector<PromptRegion>& regions) {
-  std::string text = "none of the prompt's things was found in the key view:";
+  std::string text = "none of the things in the prompt was found in the key view:";
   for (const PromptRegion& region : regions) {
     text += fmt::format(" \"{}\" (best score {:.3g})", region.phrase.thing, region.score);
   }

@@ -112,7 +112,7 @@ Pose MakeColmapPose(const double (&q)[4], const double (&t)[3], const std::strin
   if (!std::isfinite(norm) || !translation.allFinite()) {
     throw InvalidArgument("{} has a pose that is not finite", place);
   }
-  RequireWithinReach(translation, place);
+  CheckPositionRange(translation, place);
   if (norm < 1e-6) throw InvalidArgument("{} has a zero rotation quaternion", place);
   Pose pose;
   pose.rotation = rotation.normalized();

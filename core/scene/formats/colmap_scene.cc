@@ -82,7 +82,7 @@ FrameMoments ReadMoments(const fs::path& scene_folder,
         SummarizeNames(without, 3),
         frames[0].file);
   }
-  return MomentsOf(frames);
+  return AssignMoments(frames);
 }
 
 // Orders views by the names of their photos, so that the result does not depend on COLMAP's

@@ -83,7 +83,7 @@ void ReadCamera(const json& root, const std::string& file, View* view) {
   view->cam_from_world.rotation = Eigen::Quaterniond(NearestRotation(axes)).normalized();
   const std::vector<double> position = ReadNumbers(fields, "position", 3);
   const Eigen::Vector3d place(position[0], position[1], position[2]);
-  RequireWithinReach(place, file);
+  CheckPositionRange(place, file);
   view->cam_from_world.translation = -(view->cam_from_world.rotation * place);
   const std::vector<double> size = ReadNumbers(fields, "image_size", 2);
   const std::vector<double> center = ReadNumbers(fields, "principal_point", 2);
@@ -188,7 +188,7 @@ Scene ReadNerfies(const fs::path& scene_folder,
         frames.size(),
         scene.views.size());
   }
-  AddMoments(MomentsOf(times), &scene, warnings, cameras);
+  AddMoments(AssignMoments(times), &scene, warnings, cameras);
   if (warnings != nullptr && !missing.empty()) {
     warnings->push_back(
         fmt::format("{} of the {} frames of {} have no picture in rgb/ and were left out: {}",

@@ -19,7 +19,7 @@ bool IsNerfiesFolder(const std::filesystem::path& folder);
 // frames left out because their picture is missing, `cameras` (may be null) the camera names by
 // Moment::shot. Throws Error{kInvalidArgument} that names the file if a file is missing or not
 // JSON, a field is missing or not finite, a camera is too far away, there are fewer than two
-// frames, or points are malformed; and as MomentsOf.
+// frames, or points are malformed; and as AssignMoments.
 Scene ReadNerfies(const std::filesystem::path& scene_folder,
                   std::vector<std::string>* warnings = nullptr,
                   std::vector<std::string>* cameras = nullptr);

@@ -45,7 +45,7 @@ View MakeView(const double* row, const std::string& place) {
                           height,
                           focal);
   }
-  RequireWithinReach(column(3), place);
+  CheckPositionRange(column(3), place);
   View view;
   view.captured_camera = {static_cast<int>(std::lround(width)),
                           static_cast<int>(std::lround(height)),

@@ -28,7 +28,7 @@ std::optional<ColmapChoice> ChooseColmapModel(const std::filesystem::path& scene
 // are left out, the cameras whose intrinsics do not fit their observations, and a times.txt that
 // names no photo of the model; `cameras` (may be null) the camera names by Moment::shot. Throws
 // Error{kInvalidArgument} naming file and place if there are fewer than two photos, only some
-// photos have a line in times.txt, or a name leaves the scene's folder; and as MomentsOf.
+// photos have a line in times.txt, or a name leaves the scene's folder; and as AssignMoments.
 Scene ReadColmapModel(const std::filesystem::path& model_folder,
                       const std::filesystem::path& scene_folder,
                       std::vector<std::string>* warnings = nullptr,

@@ -163,7 +163,7 @@ Pose ReadTransform(const FrameFields& fields) {
                           fields.place(),
                           axes.determinant());
   }
-  RequireWithinReach(m.col(3), fields.place());
+  CheckPositionRange(m.col(3), fields.place());
   // Nearest rotation, then y and z reversed.
   const Eigen::Matrix3d world_from_cam =
       NearestRotation(axes) * Eigen::Vector3d(1.0, -1.0, -1.0).asDiagonal();

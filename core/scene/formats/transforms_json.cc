@@ -177,7 +177,7 @@ Scene ReadTransformsJson(const std::vector<fs::path>& json_files,
     scene.views.push_back(ReadView(fields, files[i], scene_folder));
   }
   NoteMissing(missing, frames.size(), scene.views.size(), file_name, warnings);
-  AddMoments(MomentsOf(times), &scene, warnings, cameras);
+  AddMoments(AssignMoments(times), &scene, warnings, cameras);
   std::ranges::sort(scene.views, {}, &View::name);
   if (sources.size() > 1 && warnings != nullptr) {
     warnings->push_back(fmt::format("the frames of {} are taken together", file_name));

@@ -11,7 +11,7 @@ namespace color3d {
 
 // Throws Error{kInvalidArgument} that names `place` if a position is so far from the origin that
 // sums of coordinates would overflow.
-inline void RequireWithinReach(const Eigen::Vector3d& position, const std::string& place) {
+inline void CheckPositionRange(const Eigen::Vector3d& position, const std::string& place) {
   constexpr double kFarthest = 1e100;
   if (position.cwiseAbs().maxCoeff() < kFarthest) return;
   throw InvalidArgument("{}: the camera stands too far away ({:g}, {:g}, {:g})",

@@ -307,7 +307,7 @@ ImportResult ImportScene(const fs::path& scene_folder,
   }
   if (result.layout != CaptureLayout::kColmap) WarnOfUnreadTimes(scene_folder, &result);
   FinishPosedScene(options, &result);
-  for (std::string& note : NotesOnPictures(scene_folder, result.scene.views, run.cancel)) {
+  for (std::string& note : CollectPictureNotes(scene_folder, result.scene.views, run.cancel)) {
     result.warnings.push_back(std::move(note));
   }
   return result;

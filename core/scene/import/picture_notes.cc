@@ -10,9 +10,9 @@
 
 namespace color3d {
 
-std::vector<std::string> NotesOnPictures(const std::filesystem::path& scene_folder,
-                                         const std::vector<View>& views,
-                                         const CancellationToken& cancel) {
+std::vector<std::string> CollectPictureNotes(const std::filesystem::path& scene_folder,
+                                             const std::vector<View>& views,
+                                             const CancellationToken& cancel) {
   constexpr size_t kMostLookedAt = 500;
   struct Photos {
     std::string first;

@@ -28,7 +28,7 @@ TEST(PictureNotesTest, MergesEqualNotes) {
     view.image_file = name;
   }
   EXPECT_THAT(
-      NotesOnPictures(folder.path(), views, {}),
+      CollectPictureNotes(folder.path(), views, {}),
       ElementsAre("a.tif has 2 pages; the largest is read (40 x 30 px); the same of 2 more photos",
                   "e.png is read as sRGB: its colour profile is damaged"));
 }

@@ -36,9 +36,8 @@ class ChromaTrainer {
         parameters_(parameters),
         in_time_(fitting.geometry, fitting.run.pool) {
     state_.parameters = parameters.block;
-    const int rows = state_.parameters.rows();
-    const int64_t count = state_.parameters.count();
-    state_.moments = {ParameterBlock(rows, count), ParameterBlock(rows, count)};
+    const ParameterBlock zeros = state_.parameters.ZerosOfSameShape();
+    state_.moments = {zeros, zeros};
     state_.random = Random(options_.seed, 1);
   }
 
@@ -60,7 +59,7 @@ class ChromaTrainer {
       Report();
       if (run_.checkpoints.WantsSave()) {
         CheckpointWriter writer(Fingerprint());
-        WriteState(state_, writer);
+        VisitState(writer, state_);
         run_.checkpoints.Save(std::move(writer).Finish());
       }
     }
@@ -85,7 +84,7 @@ class ChromaTrainer {
     if (!saved) return;
     CheckpointReader reader(*saved, Fingerprint());
     TrainingState read;
-    if (reader.ok()) ReadState(reader, read);
+    if (reader.ok()) VisitState(reader, read);
     if (reader.ok()) {
       state_ = std::move(read);
     } else {
@@ -127,7 +126,7 @@ class ChromaTrainer {
     const ColorSpec& color = parameters_.color;
     ThreadPool& pool = run_.pool;
     const ParameterBlock& now = in_time_.At(state_.parameters, view.time_s);
-    pipeline_.Forward(now, color, camera, background, false, pool);
+    pipeline_.Forward({now, color, camera}, background, false, pool);
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
@@ -135,7 +134,8 @@ class ChromaTrainer {
     const LossValue loss =
         loss_.Evaluate(pipeline_.color(), target_ab_, &target->weight, weights, pool, d_color_);
     if (!std::isfinite(loss.total)) return false;
-    pipeline_.Backward(now, color, camera, d_color_, GradientScope::kColorOnly, pool, gradient_);
+    pipeline_.Backward(
+        {now, color, camera}, d_color_, pool, {GradientScope::kColorOnly, gradient_});
     if (!AdamStep(gradient_,
                   LearningRates(),
                   state_.iteration + 1,

@@ -67,7 +67,7 @@ TEST(ChromaAdjustment, WhiteBalanceIsVonKriesInXyz) {
         x_ratio = x;
         z_ratio = z;
       }
-      // The same factors whatever the colour.
+      // The factors are the same for every colour.
       EXPECT_NEAR(x / x_ratio, 1.0, 1e-5);
       EXPECT_NEAR(z / z_ratio, 1.0, 1e-5);
     }

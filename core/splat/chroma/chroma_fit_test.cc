@@ -1,4 +1,4 @@
-// Chroma of a room whose colours are known, and of systems that have no unique answer.
+// Chroma of a room with known colours, and of systems without a unique solution.
 #include "core/splat/chroma/chroma_fit.h"
 
 #include <gmock/gmock.h>
@@ -43,8 +43,8 @@ class FiniteErrors : public NullObserver {
   }
 };
 
-// Walls at their true places, from dense points.
-GaussianModel GreyRoom(const ProceduralScene& s) {
+// Walls at their true positions, from dense points.
+GaussianModel GrayRoom(const ProceduralScene& s) {
   GaussianModel model = InitialGaussians(s.scene);
   for (float& o : model.opacity_logit) o = 2.0f;
   return model;
@@ -86,7 +86,7 @@ TEST(FitChromaTest, AdamImprovesOnClosedForm) {
     options.chroma_sh_degree = run;
     FiniteErrors errors_seen;
     const GaussianModel model = FitChroma(
-        GreyRoom(s), RoomProblem(s), options, {pool, none, errors_seen, CancellationToken()});
+        GrayRoom(s), RoomProblem(s), options, {pool, none, errors_seen, CancellationToken()});
     EXPECT_EQ(model.channels, 3);
     EXPECT_EQ(model.chroma_sh_degree, run);
     errors[run] = AbError(model, s, 2, pool);
@@ -97,8 +97,8 @@ TEST(FitChromaTest, AdamImprovesOnClosedForm) {
 
 TEST(FitChromaTest, UnseenGaussiansTakeNeighborColors) {
   const ProceduralScene s = MakeRoomCorner(4, 64, 48, 1500);
-  GaussianModel geometry = GreyRoom(s);
-  // One far behind all cameras, and one on the floor before them but transparent.
+  GaussianModel geometry = GrayRoom(s);
+  // One far behind all cameras, and a transparent one on the floor in front of them.
   geometry.position.insert(geometry.position.end(), {0.0f, 0.0f, -40.0f});
   geometry.log_scale.insert(geometry.log_scale.end(), {-3.0f, -3.0f, -3.0f});
   geometry.rotation.insert(geometry.rotation.end(), {1.0f, 0.0f, 0.0f, 0.0f});
@@ -133,7 +133,7 @@ TEST(FitChromaTest, IgnoresPixelsOfZeroWeight) {
   ChromaOptions options;
   options.iterations = 30;
   const GaussianModel model =
-      FitChroma(GreyRoom(s), problem, options, {pool, none, observer, CancellationToken()});
+      FitChroma(GrayRoom(s), problem, options, {pool, none, observer, CancellationToken()});
   EXPECT_LT(AbError(model, s, 2, pool), 8.0);
 }
 
@@ -145,7 +145,7 @@ TEST(FitChromaTest, ConfidenceIsMeanOverVisiblePixels) {
   ChromaOptions options;
   options.iterations = 5;
   ChromaProblem problem = RoomProblem(s);
-  GaussianModel geometry = GreyRoom(s);
+  GaussianModel geometry = GrayRoom(s);
   geometry.position.insert(geometry.position.end(), {0.0f, 0.0f, -40.0f});  // behind all cameras
   geometry.log_scale.insert(geometry.log_scale.end(), {-3.0f, -3.0f, -3.0f});
   geometry.rotation.insert(geometry.rotation.end(), {1.0f, 0.0f, 0.0f, 0.0f});
@@ -168,9 +168,9 @@ TEST(FitChromaTest, ConfidenceIsMeanOverVisiblePixels) {
   ASSERT_EQ(even.size(), geometry.size());
   double sum = 0.0;
   for (const float c : even) sum += c;
-  EXPECT_NEAR(sum / even.size(), 0.5, 0.1);  // half of the views are sure
-  EXPECT_EQ(even.back(), 0.0f) << "nobody saw it";
-  // What counts less for the colour counts less for its confidence.
+  EXPECT_NEAR(sum / even.size(), 0.5, 0.1);  // half of the views have confidence 1
+  EXPECT_EQ(even.back(), 0.0f) << "not seen";
+  // Pixels of lower weight count less for the confidence, too.
   guessed_weight = 0.0;
   const std::vector<float> sure = fit().confidence;
   double ones = 0.0;
@@ -191,7 +191,7 @@ TEST(FitChromaTest, RejectsTargetOfWrongSize) {
     target->ab = Image(10, 10, 2);
     return target;
   };
-  EXPECT_THROW(FitChroma(GreyRoom(s), problem, {}, {pool, none, observer, CancellationToken()}),
+  EXPECT_THROW(FitChroma(GrayRoom(s), problem, {}, {pool, none, observer, CancellationToken()}),
                Error);
 }
 

@@ -69,8 +69,9 @@ class ChromaSolver {
     int32_t sweep = 0;      // sweeps that are done
     int32_t round = 0;      // rounds of reweighting that are done
     int64_t iteration = 0;  // passes over all views
-    double last_l1 = 0.0;   // of the round before
+    double last_l1 = 0.0;   // of the previous round
   };
+  static_assert(sizeof(State) == 24, "no padding in checkpoints");
   using Pair = std::array<double, 2>;  // of a', b'
 
   double Seconds() const { return earlier_seconds_ + fitting_.clock.Seconds(); }
@@ -229,10 +230,7 @@ class ChromaSolver {
     if (!run_.checkpoints.WantsSave()) return;
     CheckpointWriter writer(Fingerprint());
     writer.Block(parameters_.block);
-    writer.Value(state_.sweep);
-    writer.Value(state_.round);
-    writer.Value(state_.iteration);
-    writer.Value(state_.last_l1);
+    writer.Value(state_);
     writer.Value(Seconds());
     run_.checkpoints.Save(std::move(writer).Finish());
   }
@@ -241,15 +239,13 @@ class ChromaSolver {
     const std::optional<std::string> saved = run_.checkpoints.Load();
     if (!saved) return;
     CheckpointReader reader(*saved, Fingerprint());
-    ParameterBlock block = reader.Block();
+    ParameterBlock block;
     State state;
-    state.sweep = reader.Value<int32_t>();
-    state.round = reader.Value<int32_t>();
-    state.iteration = reader.Value<int64_t>();
-    state.last_l1 = reader.Value<double>();
-    const double seconds = reader.Value<double>();
-    if (!reader.ok() || block.rows() != parameters_.block.rows() ||
-        block.count() != parameters_.block.count()) {
+    double seconds = 0.0;
+    reader.Block(block);
+    reader.Value(state);
+    reader.Value(seconds);
+    if (!reader.ok() || !block.HasShapeOf(parameters_.block)) {
       run_.progress.OnWarning(
           "chroma: the checkpoint belongs to other options or is damaged; fitting starts afresh");
       return;

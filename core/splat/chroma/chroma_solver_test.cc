@@ -25,7 +25,7 @@ using chroma_problems::Fit;
 using chroma_problems::RandomGaussians;
 using chroma_problems::RandomProblem;
 
-// W of one view by the float64 renderer: a picture per coefficient, which is set to 1 alone.
+// W of one view by the float64 renderer: one picture per coefficient, with the others 0.
 Eigen::MatrixXd DenseWeights(const GaussianModel& geometry, int degree, const PosedCamera& view) {
   const ChromaParameters p = ChromaParameters::From(geometry, degree);
   const int n = p.coefficients();
@@ -149,8 +149,8 @@ TEST(FitChromaTest, MemoryBudgetDoesNotChangeBytes) {
   }
 }
 
-// However many views there are, what is kept of them is within the budgets; the rest is asked for
-// again, by each pass.
+// The caches stay within their budgets for any number of views; each pass requests the other
+// targets again.
 TEST(FitChromaTest, CacheSizeIsIndependentOfViewCount) {
   const GaussianModel geometry = RandomGaussians(60, 4);
   constexpr int64_t kBudget = 150'000, kTargetBudget = 40'000;

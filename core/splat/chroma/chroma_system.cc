@@ -79,7 +79,7 @@ void ChromaSystem::ResetSums(Sums& sums) const {
 }
 
 void ChromaSystem::BinView(const RasterCamera& camera) {
-  ProjectSplats(*at_, color_, false, camera, pool_, splats_);
+  ProjectSplats({*at_, color_, camera}, false, pool_, splats_);
   binner_.Bin(splats_, camera.width, camera.height, pool_, lists_);
 }
 
@@ -189,6 +189,7 @@ void ChromaSystem::ForTiles(View& view, const ChromaPlanes* planes, const Visito
 }
 
 void ChromaSystem::Basis(const RasterCamera& camera, int64_t i, float* basis) const {
+  if (coefficients_ == 1) return EvaluateSh(1, 0.0f, 0.0f, 1.0f, basis);
   float d[3], square = 0.0f;
   for (int k = 0; k < 3; ++k) {
     d[k] = at_->Row(kPositionRow + k)[i] - camera.center[k];
@@ -204,9 +205,8 @@ void ChromaSystem::SetValues(const RasterCamera& camera,
   value.resize(2 * static_cast<size_t>(count()));
   pool_.ForRanges(count(), [&](int64_t begin, int64_t end, int) {
     float basis[kMaxShCoefficients];
-    if (coefficients_ == 1) EvaluateSh(1, 0.0f, 0.0f, 1.0f, basis);
     for (int64_t i = begin; i < end; ++i) {
-      if (coefficients_ > 1) Basis(camera, i, basis);
+      Basis(camera, i, basis);
       double a = 0.0, b = 0.0;
       for (int k = 0; k < coefficients_; ++k) {
         a += basis[k] * x[(i * coefficients_ + k) * 2];
@@ -232,7 +232,6 @@ ChromaSystem::PixelSums ChromaSystem::SumOfThreads() {
 void ChromaSystem::AddSums(const RasterCamera& camera, Sums& sums, ChromaVector& y) {
   pool_.ForRanges(count(), [&](int64_t begin, int64_t end, int) {
     float basis[kMaxShCoefficients];
-    if (coefficients_ == 1) EvaluateSh(1, 0.0f, 0.0f, 1.0f, basis);
     for (int64_t i = begin; i < end; ++i) {
       double a = 0.0, b = 0.0;
       for (AlignedFloats& s : sums) {
@@ -241,7 +240,7 @@ void ChromaSystem::AddSums(const RasterCamera& camera, Sums& sums, ChromaVector&
         s[2 * i] = s[2 * i + 1] = 0.0f;
       }
       if (a == 0.0 && b == 0.0) continue;
-      if (coefficients_ > 1) Basis(camera, i, basis);
+      Basis(camera, i, basis);
       for (int k = 0; k < coefficients_; ++k) {
         y[(i * coefficients_ + k) * 2] += basis[k] * a;
         y[(i * coefficients_ + k) * 2 + 1] += basis[k] * b;
@@ -254,7 +253,6 @@ void ChromaSystem::AddBlocks(const RasterCamera& camera, std::vector<double>& bl
   const int n = coefficients_;
   pool_.ForRanges(count(), [&](int64_t begin, int64_t end, int) {
     float basis[kMaxShCoefficients];
-    if (n == 1) EvaluateSh(1, 0.0f, 0.0f, 1.0f, basis);
     for (int64_t i = begin; i < end; ++i) {
       double sum[2] = {0.0, 0.0};
       for (AlignedFloats& s : squares_) {
@@ -264,7 +262,7 @@ void ChromaSystem::AddBlocks(const RasterCamera& camera, std::vector<double>& bl
         }
       }
       if (sum[0] == 0.0 && sum[1] == 0.0) continue;
-      if (n > 1) Basis(camera, i, basis);
+      Basis(camera, i, basis);
       for (int c = 0; c < 2; ++c) {
         double* block = blocks.data() + (i * 2 + c) * n * n;
         for (int k = 0; k < n; ++k) {
@@ -285,7 +283,6 @@ void ChromaSystem::Step(const RasterCamera& camera,
   const double per_view = 1.0 / static_cast<double>(views_.size());
   pool_.ForRanges(count(), [&](int64_t begin, int64_t end, int) {
     float basis[kMaxShCoefficients];
-    EvaluateSh(1, 0.0f, 0.0f, 1.0f, basis);
     for (int64_t i = begin; i < end; ++i) {
       double sum[2] = {0.0, 0.0}, row[2] = {0.0, 0.0};
       for (size_t t = 0; t < sums_.size(); ++t) {
@@ -296,7 +293,7 @@ void ChromaSystem::Step(const RasterCamera& camera,
         }
       }
       if (seen[i] == 0 || (row[0] == 0.0 && row[1] == 0.0)) continue;
-      if (n > 1) Basis(camera, i, basis);
+      Basis(camera, i, basis);
       double norm = basis[0] * basis[0];
       for (int k = 1; k < n; ++k) norm += rest_weight * basis[k] * basis[k];
       for (int c = 0; c < 2; ++c) {

@@ -79,7 +79,7 @@ bool LoadChromaPlanes(const ChromaProblem& problem, const PosedCamera& view, Chr
 
 std::shared_ptr<const ChromaPlanes> ChromaTargets::Get(const PosedCamera& view) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto found = kept_.find(view.view);
     if (found != kept_.end()) return found->second;
   }
@@ -93,7 +93,7 @@ void ChromaTargets::Offer(const PosedCamera& view, ChromaPlanes planes) {
   planes.confidence = {};
   const auto bytes =
       static_cast<int64_t>((planes.ab.data.size() + planes.weight.data.size()) * sizeof(float));
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   if (kept_bytes_ + bytes > budget_bytes_) return;
   if (!kept_.emplace(view.view, std::make_shared<const ChromaPlanes>(std::move(planes))).second) {
     return;
@@ -102,7 +102,7 @@ void ChromaTargets::Offer(const PosedCamera& view, ChromaPlanes planes) {
 }
 
 int64_t ChromaTargets::kept_bytes() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const MutexLock lock(mutex_);
   return kept_bytes_;
 }
 

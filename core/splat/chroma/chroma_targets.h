@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 
+#include "core/base/mutex.h"
 #include "core/simd/plane_buffer.h"
 #include "core/splat/chroma/chroma_fit.h"
 
@@ -39,9 +39,9 @@ class ChromaTargets {
  private:
   const ChromaProblem& problem_;
   const int64_t budget_bytes_;
-  mutable std::mutex mutex_;  // guards all below
-  int64_t kept_bytes_ = 0;
-  std::map<int, std::shared_ptr<const ChromaPlanes>> kept_;  // by view
+  mutable Mutex mutex_;
+  int64_t kept_bytes_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  std::map<int, std::shared_ptr<const ChromaPlanes>> kept_ COLOR3D_GUARDED_BY(mutex_);  // by view
 };
 
 }  // namespace color3d

@@ -37,11 +37,11 @@ TEST_P(TileWeightsTest, ProductsAgreeWithRasterizer) {
   ThreadPool pool(1);
   SplatPipeline pipeline;
   const float background[2] = {0.0f, 0.0f};
-  pipeline.Forward(p.block, p.color, camera, background, false, pool);
+  pipeline.Forward({p.block, p.color, camera}, background, false, pool);
   SplatBuffer splats;
   TileBinner binner;
   TileLists lists;
-  ProjectSplats(p.block, p.color, false, camera, pool, splats);
+  ProjectSplats({p.block, p.color, camera}, false, pool, splats);
   binner.Bin(splats, camera.width, camera.height, pool, lists);
   for (int tile = 0; tile < lists.tile_count(); ++tile) {
     TileWeights w;

@@ -88,7 +88,7 @@ class Refiner {
     loss.worst_view = 0;
     for (size_t v = 0; v < views_.size(); ++v) {
       run_.cancel.ThrowIfCancelled();
-      pipeline_.Forward(parameters_, color_, cameras_[v], kBlack, false, run_.pool);
+      pipeline_.Forward({parameters_, color_, cameras_[v]}, kBlack, false, run_.pool);
       const double psnr = Psnr(Residual(v));
       loss.mean_psnr_db += psnr / static_cast<double>(views_.size());
       if (psnr < loss.worst_psnr_db) {
@@ -105,8 +105,7 @@ class Refiner {
     for (size_t v = 0; v < views_.size(); ++v) {
       if (views_[v].fitted) order.push_back(v);
     }
-    AdamMoments moments{ParameterBlock(parameters_.rows(), parameters_.count()),
-                        ParameterBlock(parameters_.rows(), parameters_.count())};
+    AdamMoments moments{parameters_.ZerosOfSameShape(), parameters_.ZerosOfSameShape()};
     Random random(options_.seed);
     const int64_t total = static_cast<int64_t>(order.size()) * options_.epochs;
     int64_t step = 0;
@@ -116,15 +115,12 @@ class Refiner {
       }
       for (const size_t v : order) {
         run_.cancel.ThrowIfCancelled();
-        pipeline_.Forward(parameters_, color_, cameras_[v], kBlack, false, run_.pool);
+        pipeline_.Forward({parameters_, color_, cameras_[v]}, kBlack, false, run_.pool);
         if (!std::isfinite(Residual(v))) return false;
-        pipeline_.Backward(parameters_,
-                           color_,
-                           cameras_[v],
+        pipeline_.Backward({parameters_, color_, cameras_[v]},
                            residual_,
-                           GradientScope::kColorOnly,
                            run_.pool,
-                           gradient_);
+                           {GradientScope::kColorOnly, gradient_});
         const double done = static_cast<double>(step) / static_cast<double>(total);
         if (!AdamStep(gradient_, Rates(done), ++step, run_.pool, parameters_, moments))
           return false;

@@ -58,7 +58,7 @@ TEST(RefineRgbHarmonicsTest, ReducesErrorOfRgbBlending) {
   EXPECT_EQ(refined.harmonics.sh.size(), start.sh.size());
   const RgbRefinement again = RefineRgbHarmonics(m, start, ThreeViews(), options, run);
   EXPECT_EQ(again.harmonics.sh, refined.harmonics.sh);
-  // Nothing to gain: the start comes back as it was.
+  // No epochs return the start unchanged.
   options.epochs = 0;
   const RgbRefinement unchanged = RefineRgbHarmonics(m, start, ThreeViews(), options, run);
   EXPECT_EQ(unchanged.harmonics.sh, start.sh);

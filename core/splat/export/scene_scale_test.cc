@@ -1,4 +1,4 @@
-// Scenes of any size and place train alike and come back in their own frame.
+// Training is invariant to the scale and origin of the scene; exports are in its frame.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Automatic exposure of the camera in each training photo: photo = gain * scene + offset, fitted
 // with the geometry so that the geometry does not absorb it. Internal to the splat module.
-// Deterministic whatever the thread count.
+// Deterministic for every thread count.
 #pragma once
 
 #include <cstdint>

@@ -10,15 +10,6 @@
 namespace color3d {
 namespace {
 
-// An evenly spaced part when there are more than the cap allows.
-ParameterBlock AtMost(int64_t count, ParameterBlock p) {
-  if (p.count() <= count) return p;
-  std::vector<uint32_t> kept(count);
-  for (int64_t i = 0; i < count; ++i) kept[i] = static_cast<uint32_t>(i * p.count() / count);
-  p.Gather(kept);
-  return p;
-}
-
 // Spherical harmonics of `from`, channel by channel, cut or extended to `coefficients` each. A
 // single channel serves for all.
 ParameterBlock WithColors(const GaussianModel& from, int channels, int coefficients) {
@@ -42,7 +33,12 @@ ParameterBlock FirstParameters(const GaussianModel& from,
                                int channels,
                                int coefficients,
                                int64_t most) {
-  return AtMost(most, WithColors(from, channels, coefficients));
+  ParameterBlock p = WithColors(from, channels, coefficients);
+  if (p.count() <= most) return p;
+  std::vector<uint32_t> kept(most);
+  for (int64_t i = 0; i < most; ++i) kept[i] = static_cast<uint32_t>(i * p.count() / most);
+  p.Gather(kept);
+  return p;
 }
 
 }  // namespace color3d

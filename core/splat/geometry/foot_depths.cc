@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-constexpr int kFramesBeside = 8;  // before and behind, that tell of a thing's depth
+constexpr int kFramesOnEitherSide = 8;  // for the median of an object's depth
 
 // A moving region, or several that form one object.
 struct MovingObject {
@@ -27,29 +27,29 @@ struct MovingObjects {
 MovingObjects RegionsOf(const SurveyedView& view) {
   const Image& moving = view.moving;
   const double usual = MedianDepth(view);
-  MovingObjects things;
-  things.of_pixel.assign(moving.data.size(), -1);
+  MovingObjects objects;
+  objects.of_pixel.assign(moving.data.size(), -1);
   std::vector<int> region;
   for (int start = 0; start < static_cast<int>(moving.data.size()); ++start) {
-    if (moving.data[start] == 0.0f || things.of_pixel[start] >= 0) continue;
-    const auto number = static_cast<int>(things.list.size());
-    MovingObject thing{moving.width, -1, -1};
+    if (moving.data[start] == 0.0f || objects.of_pixel[start] >= 0) continue;
+    const auto number = static_cast<int>(objects.list.size());
+    MovingObject object{moving.width, -1, -1};
     int foot_pixel = start;
     const auto reach = [&](int x, int y) {
       if (x < 0 || y < 0 || x >= moving.width || y >= moving.height) return;
       const int pixel = y * moving.width + x;
-      if (moving.data[pixel] == 0.0f || things.of_pixel[pixel] >= 0) return;
-      things.of_pixel[pixel] = number;
+      if (moving.data[pixel] == 0.0f || objects.of_pixel[pixel] >= 0) return;
+      objects.of_pixel[pixel] = number;
       region.push_back(pixel);
     };
     region.clear();
     reach(start % moving.width, start / moving.width);
     for (size_t k = 0; k < region.size(); ++k) {
       const int x = region[k] % moving.width, y = region[k] / moving.width;
-      thing.left = std::min(thing.left, x);
-      thing.right = std::max(thing.right, x);
-      if (y > thing.foot) {
-        thing.foot = y;
+      object.left = std::min(object.left, x);
+      object.right = std::max(object.right, x);
+      if (y > object.foot) {
+        object.foot = y;
         foot_pixel = region[k];
       }
       reach(x - 1, y);
@@ -58,60 +58,60 @@ MovingObjects RegionsOf(const SurveyedView& view) {
       reach(x, y + 1);
     }
     const float at_foot = view.depth.data[foot_pixel];
-    thing.depth = at_foot > 0.0f ? at_foot : usual;
-    things.list.push_back(thing);
+    object.depth = at_foot > 0.0f ? at_foot : usual;
+    objects.list.push_back(object);
   }
-  return things;
+  return objects;
 }
 
 int SharedColumns(const MovingObject& a, const MovingObject& b) {
   return std::max(0, std::min(a.right, b.right) - std::max(a.left, b.left) + 1);
 }
 
-int Columns(const MovingObject& thing) { return thing.right - thing.left + 1; }
+int Columns(const MovingObject& object) { return object.right - object.left + 1; }
 
 // Torn-off limbs, and the shadow below, belong to the object above which they hang.
-void MergeStackedRegions(MovingObjects* things) {
-  std::vector<int> joined(things->list.size());
-  std::vector<int> order(things->list.size());
+void MergeStackedRegions(MovingObjects* objects) {
+  std::vector<int> joined(objects->list.size());
+  std::vector<int> order(objects->list.size());
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-    return things->list[a].foot > things->list[b].foot;
+    return objects->list[a].foot > objects->list[b].foot;
   });
   std::vector<MovingObject> list;
-  for (const int region : order) {  // the lowest first: theirs is the foot
-    const MovingObject& thing = things->list[region];
+  for (const int region : order) {  // the lowest first: it has the foot
+    const MovingObject& object = objects->list[region];
     const auto below = std::find_if(list.begin(), list.end(), [&](const MovingObject& other) {
-      return 2 * SharedColumns(thing, other) >= Columns(thing);
+      return 2 * SharedColumns(object, other) >= Columns(object);
     });
     joined[region] = static_cast<int>(below - list.begin());
     if (below == list.end()) {
-      list.push_back(thing);
+      list.push_back(object);
       continue;
     }
-    below->left = std::min(below->left, thing.left);
-    below->right = std::max(below->right, thing.right);
+    below->left = std::min(below->left, object.left);
+    below->right = std::max(below->right, object.right);
   }
-  for (int& number : things->of_pixel) {
+  for (int& number : objects->of_pixel) {
     if (number >= 0) number = joined[number];
   }
-  things->list = std::move(list);
+  objects->list = std::move(list);
 }
 
 // Depth of the object at the same position in `frame`; 0 without one.
-double OverlappingDepth(const MovingObject& thing, const MovingObjects& frame) {
+double OverlappingDepth(const MovingObject& object, const MovingObjects& frame) {
   double depth = 0.0;
   int most = 0;
   for (const MovingObject& other : frame.list) {
-    const int shared = SharedColumns(thing, other);
-    if (shared <= most || 2 * shared < std::min(Columns(thing), Columns(other))) continue;
+    const int shared = SharedColumns(object, other);
+    if (shared <= most || 2 * shared < std::min(Columns(object), Columns(other))) continue;
     most = shared;
     depth = other.depth;
   }
   return depth;
 }
 
-std::vector<size_t> InOrderOfTime(const std::vector<SurveyedView>& views) {
+std::vector<size_t> OrderByTime(const std::vector<SurveyedView>& views) {
   std::vector<size_t> order(views.size());
   std::iota(order.begin(), order.end(), size_t{0});
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
@@ -120,23 +120,24 @@ std::vector<size_t> InOrderOfTime(const std::vector<SurveyedView>& views) {
   return order;
 }
 
-void SteadyDepths(const std::vector<size_t>& order, std::vector<MovingObjects>* frames) {
+void SmoothDepthsOverTime(const std::vector<size_t>& order, std::vector<MovingObjects>* frames) {
   const std::vector<MovingObjects> before = *frames;
   const auto count = static_cast<int>(order.size());
   for (int i = 0; i < count; ++i) {
-    for (MovingObject& thing : (*frames)[order[i]].list) {
-      std::vector<double> depths{thing.depth};
-      for (int k = std::max(0, i - kFramesBeside); k <= std::min(count - 1, i + kFramesBeside);
+    for (MovingObject& object : (*frames)[order[i]].list) {
+      std::vector<double> depths{object.depth};
+      for (int k = std::max(0, i - kFramesOnEitherSide);
+           k <= std::min(count - 1, i + kFramesOnEitherSide);
            ++k) {
-        const double depth = k == i ? 0.0 : OverlappingDepth(thing, before[order[k]]);
+        const double depth = k == i ? 0.0 : OverlappingDepth(object, before[order[k]]);
         if (depth > 0.0) depths.push_back(depth);
       }
-      thing.depth = Median(std::move(depths));
+      object.depth = Median(std::move(depths));
     }
   }
 }
 
-bool AreOfOnePose(const std::vector<SurveyedView>& views) {
+bool HaveOnePose(const std::vector<SurveyedView>& views) {
   const Pose& first = views.front().posed.cam_from_world;
   return std::all_of(views.begin(), views.end(), [&](const SurveyedView& view) {
     const Pose& pose = view.posed.cam_from_world;
@@ -160,13 +161,13 @@ double MedianDepth(const SurveyedView& view) {
 std::vector<Image> FootDepths(const std::vector<SurveyedView>& views, ThreadPool& pool) {
   if (views.empty()) return {};
   const auto count = static_cast<int64_t>(views.size());
-  const bool are_of_one_pose = AreOfOnePose(views);
+  const bool have_one_pose = HaveOnePose(views);
   std::vector<MovingObjects> frames(views.size());
   pool.ForEach(count, [&](int64_t i, int) {
     frames[i] = RegionsOf(views[i]);
-    if (are_of_one_pose) MergeStackedRegions(&frames[i]);
+    if (have_one_pose) MergeStackedRegions(&frames[i]);
   });
-  if (are_of_one_pose) SteadyDepths(InOrderOfTime(views), &frames);
+  if (have_one_pose) SmoothDepthsOverTime(OrderByTime(views), &frames);
   std::vector<Image> depths(views.size());
   pool.ForEach(count, [&](int64_t i, int) {
     Image& depth = depths[i] = Image(views[i].moving.width, views[i].moving.height, 1);

@@ -8,7 +8,7 @@ namespace {
 constexpr int kWidth = 40;
 constexpr int kHeight = 30;
 
-// Ground that comes nearer by 0.1 from row to row.
+// Ground whose depth decreases by 0.1 per row.
 float GroundDepth(int row) { return 5.0f - 0.1f * static_cast<float>(row); }
 
 SurveyedView ViewAt(double time_s, double x = 0.0) {
@@ -67,7 +67,7 @@ TEST_F(FootDepthsTest, StaticCameraJoinsTornLimbs) {
 TEST_F(FootDepthsTest, StaticCameraDepthIsSmoothOverTime) {
   for (int i = 0; i < 9; ++i) {
     views_.push_back(ViewAt(0.1 * i));
-    const int foot = i == 4 ? 15 : 24;  // the legs were not seen to move
+    const int foot = i == 4 ? 15 : 24;  // the legs were not detected as moving
     Move(5 + i / 2, 12 + i / 2, 8, foot, &views_.back());
     Move(30, 33, 8, 12, &views_.back());
   }

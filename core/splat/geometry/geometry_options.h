@@ -45,7 +45,7 @@ struct GeometryTuning {
   double share_motion = 0.05;  // ShareMotion, at this interval of iterations; 0: never
   int share_motion_every = 10;
   int motion_neighbors = 24;
-  int mover_sh_degree = 0;  // of moving Gaussians: few views see each, from directions of their own
+  int mover_sh_degree = 0;  // of moving Gaussians, which few views see
   double last_rate = 0.2;  // all rates but the position's fall to this multiple after densification
 
   bool operator==(const GeometryTuning&) const = default;
@@ -105,7 +105,7 @@ struct GeometryOptions {
   double densify_gradient = 5e-5;    // NDC units, 1e-9..1e9 (3DGS: 2e-4, for 30k iterations)
   double learning_rate_scale = 1.0;  // on all learning rates, 1e-3..1e3
   uint64_t seed = 1;
-  std::optional<GeometryTuning> tuning;  // in place of the recipe's, for measurements
+  std::optional<GeometryTuning> tuning;  // replaces the recipe's, for measurements
 
   void Validate() const;  // throws Error{kInvalidArgument}
   bool operator==(const GeometryOptions&) const = default;

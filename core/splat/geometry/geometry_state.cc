@@ -5,6 +5,22 @@
 #include <utility>
 
 namespace color3d {
+namespace {
+
+template <class Archive, class State>
+void VisitGeometryState(Archive& archive, State& state) {
+  VisitState(archive, state);
+  archive.Vector(state.statistics.gradient);
+  archive.Vector(state.statistics.count);
+  archive.Vector(state.statistics.radius);
+  archive.Block(state.moving.parameters);
+  archive.Block(state.moving.moments.first);
+  archive.Block(state.moving.moments.second);
+  archive.Value(state.densified_at);
+  archive.Vector(state.exposures);
+}
+
+}  // namespace
 
 std::string GeometryFingerprint(const GeometryProblem& problem,
                                 const GeometryOptions& options,
@@ -40,16 +56,7 @@ std::string GeometryFingerprint(const GeometryProblem& problem,
 
 std::string SerializeGeometryState(const GeometryState& state, std::string_view fingerprint) {
   CheckpointWriter writer(fingerprint);
-  WriteState(state, writer);
-  writer.Vector(state.statistics.gradient);
-  writer.Vector(state.statistics.count);
-  writer.Vector(state.statistics.radius);
-  writer.Block(state.moving.parameters);
-  writer.Block(state.moving.moments.first);
-  writer.Block(state.moving.moments.second);
-  writer.Value(state.densified_at);
-  writer.Value<uint64_t>(state.exposures.size());
-  for (const PhotoExposure& exposure : state.exposures) writer.Value(exposure);
+  VisitGeometryState(writer, state);
   return std::move(writer).Finish();
 }
 
@@ -59,16 +66,7 @@ bool ParseGeometryState(std::string_view bytes,
   CheckpointReader reader(bytes, fingerprint);
   if (!reader.ok()) return false;
   GeometryState read;
-  ReadState(reader, read);
-  read.statistics.gradient = reader.Vector();
-  read.statistics.count = reader.Vector();
-  read.statistics.radius = reader.Vector();
-  read.moving.parameters = reader.Block();
-  read.moving.moments.first = reader.Block();
-  read.moving.moments.second = reader.Block();
-  read.densified_at = reader.Value<int64_t>();
-  read.exposures.resize(reader.Count(sizeof(PhotoExposure)));
-  for (PhotoExposure& exposure : read.exposures) exposure = reader.Value<PhotoExposure>();
+  VisitGeometryState(reader, read);
   if (!reader.ok()) return false;
   state = std::move(read);
   return true;

@@ -25,9 +25,9 @@ namespace color3d {
 namespace {
 
 constexpr double kErrorReports = 100.0;
-constexpr int64_t kMinDensifyInterval = 10;  // iterations: fewer say little about gradients
+constexpr int64_t kMinDensifyInterval = 10;  // iterations: gradients of fewer are noise
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
-constexpr double kSurveyAt = 0.15;  // of the schedule: where motion is looked for
+constexpr double kSurveyAt = 0.15;  // fraction of the schedule at which motion is searched for
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
 class GeometryTrainer {
@@ -51,9 +51,9 @@ class GeometryTrainer {
         still_(problem.still, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask) {
     state_.parameters = FirstParameters(
         problem.initial, channels_, ShCoefficients(options.sh_degree), options.max_gaussians);
-    const int rows = state_.parameters.rows();
     initial_count_ = state_.parameters.count();
-    state_.moments = {ParameterBlock(rows, initial_count_), ParameterBlock(rows, initial_count_)};
+    const ParameterBlock zeros = state_.parameters.ZerosOfSameShape();
+    state_.moments = {zeros, zeros};
     state_.statistics.Reset(initial_count_);
     state_.random = Random(options.seed);
     if (schedule_.tuning().exposure_rate > 0.0) state_.exposures.resize(problem.training.size());
@@ -167,7 +167,7 @@ class GeometryTrainer {
     const RasterCamera camera = CameraAt(view, level);
     const ColorSpec color = Colors();
     const ParameterBlock& now = At(view, schedule_.HiddenTime(state_.iteration, times_.Interval()));
-    pipeline_.Forward(now, color, camera, kBackground, false, run_.pool, DroppingNow());
+    pipeline_.Forward({now, color, camera}, kBackground, false, run_.pool, DroppingNow());
     LossWeights weights;
     weights.ssim = static_cast<float>(options_.ssim_weight);
     weights.l1 = 1.0f - weights.ssim;
@@ -175,8 +175,8 @@ class GeometryTrainer {
     clock_.Enter(Phase::kLoss);
     const bool exposed = !state_.exposures.empty();
     if (exposed) Expose(state_.exposures[drawn], pipeline_.color(), run_.pool, exposed_);
-    const LossValue loss = Compare(
-        exposed ? exposed_ : pipeline_.color(), target, TrainingTarget(view, level), weights);
+    const LossValue loss =
+        Compare(exposed ? exposed_ : pipeline_.color(), target, TrainingMask(view, level), weights);
     if (!std::isfinite(loss.total)) return false;
     if (exposed) {
       FitExposure(pipeline_.color(),
@@ -187,14 +187,10 @@ class GeometryTrainer {
                   state_.exposures[drawn]);
       Recenter(state_.exposures);
     }
-    pipeline_.Backward(now,
-                       color,
-                       camera,
+    pipeline_.Backward({now, color, camera},
                        d_color_,
-                       GradientScope::kAll,
                        run_.pool,
-                       gradient_,
-                       &state_.statistics);
+                       {GradientScope::kAll, gradient_, &state_.statistics});
     if (!Update(view)) return false;
     state_.mean_error += (state_.mean_error == 0.0 ? 1.0 : 0.02) * (loss.l1 - state_.mean_error);
     return true;
@@ -206,7 +202,7 @@ class GeometryTrainer {
   }
 
   // The training mask: until motion has been searched for, moving pixels are excluded.
-  std::shared_ptr<const PlaneBuffer> TrainingTarget(const PosedCamera& view, int level) {
+  std::shared_ptr<const PlaneBuffer> TrainingMask(const PosedCamera& view, int level) {
     const std::shared_ptr<const PlaneBuffer> mask = MaskOf(view, level);
     if (!problem_.still || !MayMove() || fraction_ >= kSurveyAt) return mask;
     const std::shared_ptr<const PlaneBuffer> still = still_.Get(view, level);
@@ -376,7 +372,7 @@ class GeometryTrainer {
     const double each = 1.0 / static_cast<double>(views.size());
     for (const PosedCamera& view : views) {
       const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, 0);
-      pipeline_.Forward(At(view), Colors(), CameraAt(view, 0), kBackground, false, run_.pool);
+      pipeline_.Forward({At(view), Colors(), CameraAt(view, 0)}, kBackground, false, run_.pool);
       PlaneBuffer drawn = pipeline_.color();
       const PictureQuality quality =
           CompareClamped(*target, MaskOf(view, 0).get(), loss_, run_.pool, drawn);
@@ -418,7 +414,7 @@ class GeometryTrainer {
   TrainingTargets still_;
   GeometryState state_;
   int64_t initial_count_ = 0;     // Gaussians
-  double fraction_ = 0.0;         // of the schedule that is done
+  double fraction_ = 0.0;         // completed fraction of the schedule
   double earlier_seconds_ = 0.0;  // of training, in the attempts before this one
   PhaseClock clock_;              // of this attempt
   Moment last_round_;             // of densification

@@ -33,7 +33,7 @@ class Recorder : public ProgressObserver {
   std::vector<std::string> warnings;
 };
 
-// Saves once, after `save_after` questions whether to, and then cancels the work.
+// Saves once, at call `save_after` of WantsSave(), and then cancels the work.
 class SaveThenStop : public CheckpointStore {
  public:
   SaveThenStop(int save_after, CancellationToken* cancel) : left_(save_after), cancel_(cancel) {}
@@ -94,8 +94,8 @@ TEST(TrainGeometryTest, RaisesPsnrOfHeldOutView) {
   EXPECT_NEAR(view.depth.At(0, 36, 48), 3.1f, 0.5f);
 }
 
-// Something of its own stands before the room in every photo, elsewhere in each, which a view
-// without it tells.
+// Every photo shows an object of its own in front of the room, at another position each. The
+// held-out view is without one.
 TEST(TrainGeometryTest, IgnoresMaskedPixels) {
   const ProceduralScene s = MakeRoomCorner(7, 96, 72, 800);
   std::vector<std::shared_ptr<const Image>> masks;
@@ -132,7 +132,7 @@ TEST(TrainGeometryTest, IgnoresMaskedPixels) {
   EXPECT_GT(masked, clean - 0.5);
 }
 
-// One camera tells nothing of depth: what is not told stays, whatever would draw as well.
+// One camera does not determine depth: parameters along it are unchanged.
 TEST(TrainGeometryTest, TrainsRelief) {
   ProceduralScene s = MakeRoomCorner(2, 96, 72, 800);
   const Pose looks_from = s.scene.views[0].cam_from_world;
@@ -233,7 +233,7 @@ struct Refusal {
   std::string message;
 };
 
-// How training on `problem` fails; a test failure when it does not.
+// Returns the error of training on `problem`; a test failure without one.
 Refusal RefusalOf(const GeometryProblem& problem, Recorder& recorder) {
   ThreadPool pool(2);
   NoCheckpoints none;
@@ -260,7 +260,7 @@ TEST(TrainGeometryTest, NamesPositionOfNaNInPicture) {
   EXPECT_THAT(refusal.message, testing::HasSubstr("view 1: the pixel at 7, 5"));
 }
 
-// An extent that makes every step overflow, however often the rate is halved.
+// An extent with which every step overflows, even at the lowest rate.
 TEST(TrainGeometryTest, RestoresLastGoodStateThenGivesUp) {
   const ProceduralScene s = MakeRoomCorner(3, 64, 64, 200);
   GeometryProblem problem = ProblemOf(s, -1);

@@ -16,14 +16,14 @@ constexpr int kRadiusPx = 2;
 constexpr double kDeviations = 5.0;
 constexpr double kLeastResidual = 0.03;
 constexpr size_t kMedianFrames = 31;  // at most, evenly over time
-constexpr size_t kFewestFrames = 5;   // to tell what is static
-constexpr int kSpeckPixels = 6;       // of the 3x3 px around one that moves, at least
-constexpr double kConfirmed = 0.1;    // of what was seen to move, by residuals, at least
+constexpr size_t kFewestFrames = 5;   // for a median over time
+constexpr int kSpeckPixels = 6;       // minimum of moving pixels among 3x3
+constexpr double kConfirmed = 0.1;    // minimum share of known moving pixels with high residuals
 // Maximum shares of such pixels in static scenes: with a median over time or known moving regions,
 // and with neither, where badly drawn regions look like motion.
 constexpr double kStillShare = 0.002;
 constexpr double kStillShareAlone = 0.005;
-constexpr size_t kNoiseStep = 7;  // every so many pixels tell the scene's deviation
+constexpr size_t kNoiseStep = 7;  // every 7th pixel is sampled for the standard deviation
 
 using PoseKey = std::tuple<double, double, double, double, double, double, double, int, int>;
 
@@ -79,7 +79,7 @@ Image MaskOf(const Image& residual, double threshold) {
 }
 
 // Pixels where motion was detected before training.
-void AddSeenMoving(SurveyedView& view) {
+void AddKnownMotion(SurveyedView& view) {
   for (size_t i = 0; i < view.still.data.size(); ++i) {
     if (view.still.data[i] == 0.0f) view.moving.data[i] = 1.0f;
   }
@@ -119,7 +119,7 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
   std::map<PoseKey, std::vector<size_t>> cameras;
   for (size_t i = 0; i < views.size(); ++i) cameras[MakePoseKey(views[i].posed)].push_back(i);
   bool has_median = false;
-  for (const auto& [key, frames] : cameras) {
+  for (const auto& [camera, frames] : cameras) {
     if (frames.size() < kFewestFrames) continue;
     has_median = true;
     SubtractTemporalMedian(frames, pool, residuals);
@@ -134,7 +134,7 @@ MotionSurvey SurveyMotion(ThreadPool& pool, std::vector<SurveyedView>& views) {
   const bool seen = !one_time && IsMotionConfirmed(views);
   survey.least_share = has_median || seen ? kStillShare : kStillShareAlone;
   for (SurveyedView& view : views) {
-    if (seen) AddSeenMoving(view);
+    if (seen) AddKnownMotion(view);
     moving += Sum(view.moving);
     pixels += static_cast<double>(view.moving.data.size());
   }

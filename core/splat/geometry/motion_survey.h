@@ -1,5 +1,5 @@
 // Detection of motion as residuals that static Gaussians cannot explain (DYNAMIC.md "Motion").
-// Internal to the splat module. Deterministic whatever the thread count.
+// Internal to the splat module. Deterministic for every thread count.
 #pragma once
 
 #include <functional>

@@ -15,11 +15,12 @@ namespace color3d {
 namespace {
 
 constexpr int kDepths = 64;        // tried along a ray, evenly in 1 / depth
-constexpr double kNearest = 0.15;  // of the standing surface's depth
-constexpr double kBehind = 1.03;   // of a surface's depth: hidden by it
-constexpr int kPatchRadius = 2;    // of the comparison of luminance, px
+constexpr double kNearest = 0.15;  // relative to the depth of the static surface
+constexpr double kBehind = 1.03;   // relative to a surface's depth: occluded beyond it
+constexpr int kPatchRadius = 2;    // of the compared luminance windows, px
 constexpr double kSeedOpacity = 0.3;
-constexpr double kFootprint = 0.6;  // of the distance between seeds: their deviation
+constexpr double kFootprint =
+    0.6;  // a seed's standard deviation, relative to the distance between seeds
 
 struct Pixel {
   int x = 0;

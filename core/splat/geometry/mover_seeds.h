@@ -1,5 +1,5 @@
 // Initial Gaussians of moving objects, for which structure from motion has no points. Internal to
-// the splat module. Deterministic whatever the thread count.
+// the splat module. Deterministic for every thread count.
 #pragma once
 
 #include <cstdint>

@@ -10,7 +10,7 @@
 namespace color3d {
 namespace {
 
-constexpr double kFarthest = 0.2;  // of its depth that a seed may come in one time step
+constexpr double kFarthest = 0.2;  // maximum movement per time step, relative to the depth
 
 // The views of each camera, ordered by time.
 std::vector<std::vector<size_t>> ByCamera(const std::vector<SurveyedView>& views) {
@@ -46,21 +46,21 @@ Image InLab(const Image& luminance) {
 }
 
 // Position in `to` of a seed of `from`; none if nothing moves there.
-std::optional<Eigen::Vector3d> PlaceIn(const MoverSeed& seed,
-                                       const Image& flow,
-                                       const SurveyedView& to,
-                                       const std::vector<MoverSeed>& seeds,
-                                       int step) {
+std::optional<Eigen::Vector3d> PositionIn(const MoverSeed& seed,
+                                          const Image& flow,
+                                          const SurveyedView& to,
+                                          const std::vector<MoverSeed>& seeds,
+                                          int step) {
   const double x = seed.x + 0.5 + flow.At(0, seed.y, seed.x);
   const double y = seed.y + 0.5 + flow.At(1, seed.y, seed.x);
   if (!to.posed.camera.Contains({x, y})) return std::nullopt;
   if (to.moving.At(0, static_cast<int>(y), static_cast<int>(x)) == 0.0f) return std::nullopt;
   const double found = DepthNear(seeds, x, y, 1.5 * step);
   const double depth = found > 0.0 ? found : seed.depth;
-  const Eigen::Vector3d place =
+  const Eigen::Vector3d position =
       to.posed.cam_from_world.WorldFromCamera(depth * to.posed.camera.Ray(x, y));
-  if ((place - seed.position).norm() > kFarthest * seed.depth) return std::nullopt;
-  return place;
+  if ((position - seed.position).norm() > kFarthest * seed.depth) return std::nullopt;
+  return position;
 }
 
 }  // namespace
@@ -90,10 +90,10 @@ void FindVelocities(const std::vector<SurveyedView>& views,
       const Image flow = DenseFlow(InLab(view.luminance), InLab(views[other].luminance));
       for (size_t s = 0; s < seeds[index].size(); ++s) {
         MoverSeed& seed = seeds[index][s];
-        const std::optional<Eigen::Vector3d> place =
-            PlaceIn(seed, flow, views[other], seeds[other], step);
-        if (!place) continue;
-        seed.velocity += (*place - seed.position) / static_cast<double>(time);
+        const std::optional<Eigen::Vector3d> position =
+            PositionIn(seed, flow, views[other], seeds[other], step);
+        if (!position) continue;
+        seed.velocity += (*position - seed.position) / static_cast<double>(time);
         ++found[s];
       }
     }

@@ -1,5 +1,5 @@
 // Initial velocity of moving objects from optical flow to a camera's previous and next frames.
-// Internal to the splat module. Deterministic whatever the thread count.
+// Internal to the splat module. Deterministic for every thread count.
 #pragma once
 
 #include <vector>

@@ -34,7 +34,7 @@ PosedCamera CameraAt(double x, int shot, double time_s) {
 
 Eigen::Vector3d BallAt(double time_s) { return {0.4 * time_s - 0.8, 0.0, 4.0}; }
 
-// A wall at z = kWall and a ball before it.
+// A wall at z = kWall and a ball in front of it.
 SurveyedView ViewAt(double x, int shot, double time_s, bool with_ball) {
   SurveyedView view;
   view.posed = CameraAt(x, shot, time_s);
@@ -94,7 +94,7 @@ TEST(MotionSurveyTest, FindsNothingInWellDrawnOrSingleTime) {
   EXPECT_EQ(SurveyMotion(pool, moment).moving_share, 0.0);
 }
 
-// What a camera that stands still always shows stands still, however badly it is drawn.
+// For a static camera a constant residual is a badly drawn static region.
 TEST(MotionSurveyTest, ConstantResidualIsNotMotion) {
   ThreadPool pool(2);
   std::vector<SurveyedView> views = Rig(7, false);
@@ -104,7 +104,7 @@ TEST(MotionSurveyTest, ConstantResidualIsNotMotion) {
   EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
-// Rows first to end - 1 were seen to move.
+// Rows first to end - 1 have known motion.
 std::vector<SurveyedView> WithSeen(std::vector<SurveyedView> views, int first, int end) {
   for (SurveyedView& view : views) {
     view.still = Image(kSide, kSide, 1, 1.0f);
@@ -129,7 +129,7 @@ TEST(MotionSurveyTest, KnownMotionDrawnWellIsStatic) {
   EXPECT_EQ(SurveyMotion(pool, views).moving_share, 0.0);
 }
 
-// One camera that moves has no median over time: what it draws badly looks like what moves.
+// A moving camera has no median over time: badly drawn regions look like motion.
 TEST(MotionSurveyTest, MovingCameraNeedsMoreEvidence) {
   ThreadPool pool(2);
   std::vector<SurveyedView> moving;
@@ -209,7 +209,7 @@ TEST(BlocksOfTimeTest, BlocksAreBoundedAndKeepTimesWhole) {
                         Case{1, 400, 4, 100},
                         Case{4, 100, 4, 100},
                         Case{1, 12'800, 100, 128},
-                        Case{20, 50, 2, 500},  // 24 times tell what stands still
+                        Case{20, 50, 2, 500},  // at least 24 times a block
                         Case{30, 12, 1, 360}}) {
     const auto blocks = BlocksOfTime(PosedRig(c.cameras, c.times));
     EXPECT_EQ(blocks.size(), c.blocks);
@@ -230,7 +230,7 @@ TEST(BlocksOfTimeTest, BlocksAreBoundedAndKeepTimesWhole) {
   }
 }
 
-// A long film is surveyed block by block: what moves is seeded in all of them.
+// A long film is surveyed in blocks of time; each has seeds.
 TEST(FindMovingPartTest, LongFilmHasMoversAtAllTimes) {
   constexpr int kFrames = 300, kMost = 3000;
   GeometryProblem problem;

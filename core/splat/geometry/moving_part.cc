@@ -14,7 +14,7 @@
 namespace color3d {
 namespace {
 
-constexpr double kMoverShare = 0.4;  // of the most Gaussians that there may be
+constexpr double kMoverShare = 0.4;  // maximum share of the Gaussian cap
 constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
 
 // Mean over the channels.
@@ -57,9 +57,7 @@ std::vector<SurveyedView> SurveyedViews(const GeometryProblem& problem,
     SurveyedView view;
     view.posed = posed;
     view.posed.camera = posed.camera.Scaled(picture->width, picture->height);
-    pipeline.Forward(still,
-                     color,
-                     MakeRasterCamera(view.posed.camera, posed.cam_from_world),
+    pipeline.Forward({still, color, MakeRasterCamera(view.posed.camera, posed.cam_from_world)},
                      kBackground,
                      true,
                      pool);
@@ -160,8 +158,8 @@ MoverSearchResult FindMovingPart(const GeometryProblem& problem,
     parameters = {};
     return found;
   }
-  const ParameterBlock zero(parameters.rows(), parameters.count());
-  found.moving.moments = {zero, zero};
+  const ParameterBlock zeros = parameters.ZerosOfSameShape();
+  found.moving.moments = {zeros, zeros};
   return found;
 }
 
@@ -180,7 +178,7 @@ void ComposeAt(const ParameterBlock& still,
       std::copy_n(moving.parameters.Row(row), moving.parameters.count(), at.Row(row) + first);
     }
   });
-  ApplyMotion(moving.parameters, still.rows(), t, first, pool, at, hidden);
+  ApplyMotion({moving.parameters, still.rows(), t, first}, pool, at, hidden);
 }
 
 void DecomposeGradient(const ParameterBlock& still,
@@ -191,7 +189,7 @@ void DecomposeGradient(const ParameterBlock& still,
                        ParameterBlock& gradient,
                        ParameterBlock& moving_gradient) {
   ApplyMotionBackward(
-      moving.parameters, still.rows(), t, still.count(), at, gradient, pool, moving_gradient);
+      {moving.parameters, still.rows(), t, still.count()}, at, gradient, pool, moving_gradient);
   gradient.Resize(still.count());
 }
 

@@ -1,6 +1,6 @@
 // The moving Gaussians during training of geometry. They are rendered together with the static ones
 // but trained apart, so that the static part is independent of time. Internal to the splat module.
-// Deterministic whatever the thread count.
+// Deterministic for every thread count.
 #pragma once
 
 #include <cstddef>

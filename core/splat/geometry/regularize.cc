@@ -68,14 +68,14 @@ void AddPenaltyGradients(const ParameterBlock& parameters,
   const float count = static_cast<float>(parameters.count());
   const float opacity_each = opacity_penalty / count, scale_each = scale_penalty / (3.0f * count);
   const auto penalty_range = &COLOR3D_KERNEL(PenaltyRange);
-  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(parameters.blocks(), [&](int64_t begin, int64_t end, int) {
     penalty_range(parameters, opacity_each, scale_each, begin * 16, end * 16, gradient);
   });
 }
 
 void LimitNeedles(float max_log_ratio, ThreadPool& pool, ParameterBlock& parameters) {
   const auto needle_range = &COLOR3D_KERNEL(NeedleRange);
-  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(parameters.blocks(), [&](int64_t begin, int64_t end, int) {
     needle_range(max_log_ratio, begin * 16, end * 16, parameters);
   });
 }

@@ -1,6 +1,6 @@
 // Regularization of Gaussian shapes: the penalties on opacity and scale of 3DGS-MCMC (Kheradmand et
-// al. 2024), and a limit on needles. Internal to the splat module; deterministic whatever the
-// thread count.
+// al. 2024), and a limit on needles. Internal to the splat module; deterministic for every thread
+// count.
 #pragma once
 
 #include "core/base/parallel.h"

@@ -17,8 +17,8 @@ namespace {
 constexpr double kCostPerLevel = 2.5;
 constexpr int kMinTrainingSidePx = 64;  // coarser levels are not used below this
 
-constexpr double kAccelerationShare = 0.25;  // of a step of the velocity
-constexpr double kCenterRate = 0.01;         // of the interval between time steps
+constexpr double kAccelerationShare = 0.25;  // relative to a step of the velocity
+constexpr double kCenterRate = 0.01;         // relative to the interval between time steps
 
 // Number of whole steps of `step`, counted from `from`, before `fraction`.
 double StepsDone(double fraction, double from, double step) {

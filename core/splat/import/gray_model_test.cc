@@ -79,7 +79,7 @@ TEST(GrayModelTest, DropsNaNsAndClampsInfinities) {
   EXPECT_EQ(gray.model.opacity_logit[3], 15.0f);
   EXPECT_EQ(gray.model.log_scale[3 * 4], -30.0f);
   EXPECT_EQ(gray.model.rotation[4 * 5], 1.0f);
-  ParseGaussians(SerializeGaussians(gray.model));  // refuses what is not finite
+  ParseGaussians(SerializeGaussians(gray.model));  // throws for values that are not finite
 }
 
 TEST(GrayModelTest, RejectsModelWithoutFiniteGaussians) {

@@ -16,44 +16,55 @@ namespace {
 
 constexpr size_t kMaxHeaderBytes = 1 << 16;
 
+template <class Number>
+float ReadNumber(const char* from) {
+  Number number;
+  std::memcpy(&number, from, sizeof(number));
+  return static_cast<float>(number);
+}
+
+struct Type {
+  size_t bytes;
+  float (*read)(const char* from);
+};
+
+template <class Number>
+constexpr Type kType{sizeof(Number), ReadNumber<Number>};
+
+// Returns nullptr for an unknown type.
+const Type* FindType(const std::string& name) {
+  static const std::map<std::string, Type> types = {{"char", kType<int8_t>},
+                                                    {"int8", kType<int8_t>},
+                                                    {"uchar", kType<uint8_t>},
+                                                    {"uint8", kType<uint8_t>},
+                                                    {"short", kType<int16_t>},
+                                                    {"int16", kType<int16_t>},
+                                                    {"ushort", kType<uint16_t>},
+                                                    {"uint16", kType<uint16_t>},
+                                                    {"int", kType<int32_t>},
+                                                    {"int32", kType<int32_t>},
+                                                    {"uint", kType<uint32_t>},
+                                                    {"uint32", kType<uint32_t>},
+                                                    {"float", kType<float>},
+                                                    {"float32", kType<float>},
+                                                    {"double", kType<double>},
+                                                    {"float64", kType<double>}};
+  const auto found = types.find(name);
+  return found == types.end() ? nullptr : &found->second;
+}
+
 struct Property {
   size_t offset = 0;  // in a row, bytes
-  std::string type;
+  const Type* type = nullptr;
 };
 
 struct Header {
-  size_t body = 0;  // where the rows begin
+  size_t body = 0;  // offset of the rows
   uint64_t count = 0;
   size_t stride = 0;
   std::map<std::string, Property> properties;  // of the vertices
   bool has_faces = false;
 };
-
-// 0 for an unknown type.
-size_t SizeOfType(const std::string& type) {
-  static const std::map<std::string, size_t> sizes = {{"char", 1},
-                                                      {"int8", 1},
-                                                      {"uchar", 1},
-                                                      {"uint8", 1},
-                                                      {"short", 2},
-                                                      {"int16", 2},
-                                                      {"ushort", 2},
-                                                      {"uint16", 2},
-                                                      {"int", 4},
-                                                      {"int32", 4},
-                                                      {"uint", 4},
-                                                      {"uint32", 4},
-                                                      {"float", 4},
-                                                      {"float32", 4},
-                                                      {"double", 8},
-                                                      {"float64", 8}};
-  const auto found = sizes.find(type);
-  return found == sizes.end() ? 0 : found->second;
-}
-
-bool IsFloat(const std::string& type) { return type == "float" || type == "float32"; }
-bool IsDouble(const std::string& type) { return type == "double" || type == "float64"; }
-bool IsByte(const std::string& type) { return type == "uchar" || type == "uint8"; }
 
 class HeaderReader {
  public:
@@ -62,8 +73,8 @@ class HeaderReader {
     const size_t end = begin.find("\nend_header");
     const size_t newline = end == begin.npos ? end : begin.find('\n', end + 1);
     if (newline == begin.npos) {
-      throw InvalidArgument("{} has no end of a PLY header; it was cut short: copy it again",
-                            source.name);
+      throw InvalidArgument(
+          "the PLY header of {} has no end: the file was cut short; copy it again", source.name);
     }
     header_.body = newline + 1;
     std::istringstream lines{std::string(begin.substr(0, end + 1))};
@@ -75,7 +86,8 @@ class HeaderReader {
 
   Header Take() {
     if (!saw_vertices_) {
-      throw InvalidArgument("{} is a PLY without vertices, so without Gaussians", source_.name);
+      throw InvalidArgument("{} is a PLY without vertices, that is without Gaussians",
+                            source_.name);
     }
     return std::move(header_);
   }
@@ -107,7 +119,7 @@ class HeaderReader {
     const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), count);
     if (error != std::errc() || end != number.data() + number.size()) {
       throw InvalidArgument(
-          "{} says that it has '{}' of {}; its PLY header is damaged", source_.name, number, name);
+          "{} claims to have '{}' of {}: its PLY header is damaged", source_.name, number, name);
     }
     in_vertices_ = name == "vertex" && !saw_vertices_;
     header_.has_faces = header_.has_faces || name == "face";
@@ -128,13 +140,13 @@ class HeaderReader {
 
   void AddProperty(const std::string& type, const std::string& name) {
     if (!in_vertices_) return;
-    const size_t size = SizeOfType(type);
-    if (size == 0) {
+    const Type* found = FindType(type);
+    if (found == nullptr) {
       throw InvalidArgument(
-          "{} is no 3DGS PLY: its vertices have the property '{} {}'", source_.name, type, name);
+          "{} is not a 3DGS PLY: its vertices have the property '{} {}'", source_.name, type, name);
     }
-    header_.properties[name] = {header_.stride, type};
-    header_.stride += size;
+    header_.properties[name] = {header_.stride, found};
+    header_.stride += found->bytes;
   }
 
   const SplatSource& source_;
@@ -151,7 +163,7 @@ class PlyReader {
     rows_.remove_prefix(std::min(header_.body, rows_.size()));
     const uint64_t whole = rows_.size() / header_.stride;
     if (whole < header_.count) {
-      throw InvalidArgument("{} ends after {} of its {} Gaussians; it was cut short: copy it again",
+      throw InvalidArgument("{} ends after {} of its {} Gaussians: it was cut short; copy it again",
                             source.name,
                             whole,
                             header_.count);
@@ -188,8 +200,8 @@ class PlyReader {
   bool Has(const std::string& name) const { return header_.properties.contains(name); }
   bool HasByteColors() const {
     const auto red = header_.properties.find("red");
-    return red != header_.properties.end() && IsByte(red->second.type) && Has("green") &&
-           Has("blue");
+    return red != header_.properties.end() && red->second.type->read == ReadNumber<uint8_t> &&
+           Has("green") && Has("blue");
   }
 
   // Coefficients above degree 0 of each channel.
@@ -233,10 +245,10 @@ class PlyReader {
     }
     if (missing.empty()) return;
     throw InvalidArgument(
-        "{} is {}: its vertices have no {}. Give the PLY that 3D Gaussian splatting has trained",
+        "{} is {}: its vertices have no {}. Give a PLY trained by 3D Gaussian splatting",
         source_.name,
         header_.has_faces ? "the PLY of a mesh, not of a splat"
-        : Has("scale_0")  ? "no whole 3DGS PLY"
+        : Has("scale_0")  ? "an incomplete 3DGS PLY"
                           : "the PLY of a point cloud, not of a splat",
         missing);
   }
@@ -245,25 +257,8 @@ class PlyReader {
     const Property& property = header_.properties.at(name);
     const char* from = rows_.data() + property.offset;
     for (uint64_t i = 0; i < header_.count; ++i, from += header_.stride) {
-      (*to)[i * width + k] = Value(from, property.type);
+      (*to)[i * width + k] = property.type->read(from);
     }
-  }
-
-  static float Value(const char* from, const std::string& type) {
-    if (IsFloat(type)) return As<float>(from);
-    if (IsDouble(type)) return static_cast<float>(As<double>(from));
-    if (IsByte(type)) return As<uint8_t>(from);
-    if (type == "char" || type == "int8") return As<int8_t>(from);
-    if (type == "short" || type == "int16") return As<int16_t>(from);
-    if (type == "ushort" || type == "uint16") return As<uint16_t>(from);
-    if (type == "int" || type == "int32") return static_cast<float>(As<int32_t>(from));
-    return static_cast<float>(As<uint32_t>(from));
-  }
-  template <class Number>
-  static Number As(const char* from) {
-    Number number;
-    std::memcpy(&number, from, sizeof(number));
-    return number;
   }
 
   const SplatSource& source_;

@@ -21,7 +21,7 @@ inline uint32_t LittleEndianAt(std::string_view bytes, size_t at, int width) {
 inline void CheckCount(uint64_t count, const SplatSource& source) {
   if (count <= static_cast<uint64_t>(source.max_gaussians)) return;
   throw Error(ErrorCode::kResourceExhausted,
-              "{} holds {} Gaussians; at most {} can be worked on here; {}",
+              "{} holds {} Gaussians; at most {} can be processed here; {}",
               source.name,
               count,
               source.max_gaussians,

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
+#include "core/base/evenly.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/raster/raster_constants.h"
@@ -12,8 +14,8 @@
 namespace color3d {
 namespace {
 
-constexpr int kSmallSidePx = 96;       // of the pictures that tell what hides what
-constexpr size_t kMaxSample = 50'000;  // Gaussians that are looked for
+constexpr int kSmallSidePx = 96;       // of the depth pictures for occlusion
+constexpr size_t kMaxSample = 50'000;  // Gaussians tested for visibility
 constexpr float kLeastLogit = -1.5f;   // fainter ones do not count
 constexpr double kDepthTolerance = 0.04;
 constexpr double kNearShare = 0.15;  // of the focus
@@ -55,10 +57,7 @@ std::vector<size_t> SpreadSample(const GaussianModel& model, size_t count) {
   for (size_t i = 0; i < model.size(); ++i) {
     if (model.opacity_logit[i] > kLeastLogit) drawn.push_back(i);
   }
-  if (drawn.size() <= count) return drawn;
-  std::vector<size_t> sample(count);
-  for (size_t i = 0; i < count; ++i) sample[i] = drawn[i * drawn.size() / count];
-  return sample;
+  return PickEvenly(std::move(drawn), count);
 }
 
 SeenGaussians::SeenGaussians(const GaussianModel& model, const Camera& picture, ThreadPool& pool)
@@ -71,9 +70,7 @@ SeenGaussians::SeenGaussians(const GaussianModel& model, const Camera& picture, 
 
 void SeenGaussians::Render(const Pose& cam_from_world) {
   constexpr float kBlack[3] = {0.0f, 0.0f, 0.0f};
-  pipeline_.Forward(parameters_,
-                    ColorSpecOf(1, 0, 0),
-                    MakeRasterCamera(small_, cam_from_world),
+  pipeline_.Forward({parameters_, ColorSpecOf(1, 0, 0), MakeRasterCamera(small_, cam_from_world)},
                     kBlack,
                     /*depth_channel=*/true,
                     pool_);

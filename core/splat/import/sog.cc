@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/splat/import/read_support.h"
-#include "core/splat/import/unzip.h"
+#include "core/zip/zip.h"
 
 namespace color3d {
 namespace {
@@ -31,25 +31,26 @@ struct Pixels {
 class SogReader {
  public:
   SogReader(std::string_view bytes, const SplatSource& source)
-      : source_(source), zip_(bytes, source.name) {
-    if (!zip_.Has("meta.json")) {
-      throw InvalidArgument("{} is a zip without meta.json, so no SOG; give a .sog or a 3DGS .ply",
+      : source_(source), archive_(bytes, source.name), zip_(archive_) {
+    if (!zip_.Find("meta.json")) {
+      throw InvalidArgument("{} is a zip without meta.json, not a SOG; give a .sog or a 3DGS .ply",
                             source.name);
     }
     meta_ = json::parse(zip_.Read("meta.json", kMaxMetaBytes), nullptr, /*allow_exceptions=*/false);
-    if (!meta_.is_object()) throw InvalidArgument("meta.json of {} is no JSON", source.name);
+    if (!meta_.is_object())
+      throw InvalidArgument("meta.json of {} is not valid JSON; copy the file again", source.name);
   }
 
   ViewerGaussians Read() {
     try {
       CheckVersion();
       const auto count = meta_.at("count").get<int64_t>();
-      if (count < 0) throw InvalidArgument("{} says that it has {} Gaussians", source_.name, count);
+      if (count < 0) throw InvalidArgument("{} claims to have {} Gaussians", source_.name, count);
       CheckCount(static_cast<uint64_t>(count), source_);
       return ReadAll(static_cast<size_t>(count));
     } catch (const json::exception& e) {
       // Shortened to one line.
-      throw InvalidArgument("meta.json of {} is not as SOG 2 says ({})",
+      throw InvalidArgument("meta.json of {} does not follow SOG version 2 ({})",
                             source_.name,
                             std::string(e.what()).substr(0, 120));
     }
@@ -60,7 +61,7 @@ class SogReader {
     const json version = meta_.value("version", json(1));
     if (version == 2) return;
     throw InvalidArgument(
-        "{} is SOG of version {}; only version 2 can be read: convert it with a newer tool "
+        "{} is SOG of version {}, but only version 2 can be read; convert it with a newer tool "
         "(splat-transform in.sog out.ply)",
         source_.name,
         version.is_number() ? version.dump() : "unknown");
@@ -72,7 +73,7 @@ class SogReader {
     const auto* data = reinterpret_cast<const uint8_t*>(bytes.data());
     int width = 0, height = 0;
     if (WebPGetInfo(data, bytes.size(), &width, &height) == 0 || width < 1 || height < 1) {
-      throw InvalidArgument("{} of {} is no WebP picture", file, source_.name);
+      throw InvalidArgument("{} of {} is not a WebP picture", file, source_.name);
     }
     const uint64_t pixels = static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
     if (pixels < least_pixels || pixels > most_pixels) {
@@ -88,7 +89,8 @@ class SogReader {
     result.rgba.resize(4 * pixels);
     if (WebPDecodeRGBAInto(data, bytes.size(), result.rgba.data(), result.rgba.size(), 4 * width) ==
         nullptr) {
-      throw InvalidArgument("{} of {} is cut short or damaged; copy it again", file, source_.name);
+      throw InvalidArgument(
+          "{} of {} is truncated or damaged; copy the file again", file, source_.name);
     }
     return result;
   }
@@ -125,13 +127,13 @@ class SogReader {
     }
     ViewerGaussians g = EmptyGaussians(count, degree);
     if (count == 0) return g;
-    ReadPlaces(&g);
+    ReadPositions(&g);
     ReadShapes(&g);
     if (degree > 0) ReadHarmonics(&g);
     return g;
   }
 
-  void ReadPlaces(ViewerGaussians* g) const {
+  void ReadPositions(ViewerGaussians* g) const {
     const std::vector<double> low = Bounds("mins"), high = Bounds("maxs");
     const Pixels lower = Picture("means", 0, g->size()), upper = Picture("means", 1, g->size());
     for (size_t i = 0; i < g->size(); ++i) {
@@ -157,7 +159,7 @@ class SogReader {
       g->opacity_logit[i] = LogitOf(static_cast<float>(colors.At(i)[3]) / 255.0f);
       const int largest = rotations.At(i)[3] - kFirstLargest;
       if (largest < 0) {
-        throw InvalidArgument("the rotations of {} are damaged; copy it again", source_.name);
+        throw InvalidArgument("the rotations of {} are damaged; copy the file again", source_.name);
       }
       float left = 1.0f;
       for (int k = 0, next = 0; k < 4; ++k) {
@@ -194,7 +196,8 @@ class SogReader {
     for (size_t i = 0; i < g->size(); ++i) {
       const size_t label = labels.At(i)[0] + size_t{256} * labels.At(i)[1];
       if (label >= palette) {
-        throw InvalidArgument("{} names harmonics beyond its palette; copy it again", source_.name);
+        throw InvalidArgument("{} refers to harmonics outside its palette; copy the file again",
+                              source_.name);
       }
       const size_t first = label / kPaletteRow * centroids.width + label % kPaletteRow * rest;
       for (size_t j = 0; j < rest; ++j) {
@@ -206,6 +209,7 @@ class SogReader {
   }
 
   const SplatSource& source_;
+  MemorySource archive_;
   ZipReader zip_;
   json meta_;
 };

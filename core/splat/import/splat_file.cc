@@ -16,7 +16,7 @@ ViewerGaussians ReadSplat(std::string_view bytes, const SplatSource& source) {
                            : bytes.front() == '{'          ? " (it is JSON)"
                                                            : "";
   throw InvalidArgument(
-      "{} is not a splat that can be read{}: give a .ply of 3D Gaussian splatting, a .sog or a "
+      "{} is not a readable splat{}; give a .ply of 3D Gaussian splatting, a .sog or a "
       ".spz",
       source.name,
       looks_like);

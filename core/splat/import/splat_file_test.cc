@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <cmath>
 #include <filesystem>
@@ -11,9 +10,9 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/splat/export/sog/sog.h"
-#include "core/splat/export/sog/zip.h"
 #include "core/splat/export/spz/spz.h"
-#include "core/splat/import/unzip.h"
+#include "core/zip/gzip.h"
+#include "core/zip/zip.h"
 #include "tests/support/scenes/splat_files.h"
 
 namespace color3d {
@@ -42,20 +41,6 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
 
 std::string Header(const std::string& elements) {
   return "ply\nformat binary_little_endian 1.0\n" + elements + "end_header\n";
-}
-
-std::string Gzip(const std::string& plain) {
-  z_stream stream = {};
-  deflateInit2(&stream, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
-  std::string packed(plain.size() + 1024, '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(plain.data()));
-  stream.avail_in = static_cast<uInt>(plain.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  return packed;
 }
 
 TEST(SplatFileTest, ReadsPlyExactly) {
@@ -139,7 +124,7 @@ TEST(SplatFileTest, ChecksSizesBeforeAllocating) {
   for (const SpzVersion version : {SpzVersion::k2, SpzVersion::k4}) {
     EXPECT_THAT(Refusal(EncodeSpz(BallOnGround(5), version, pool), few), HasSubstr("at most 4"));
   }
-  // A header of SPZ 2 that promises 4 billion Gaussians in a hundred bytes.
+  // A header of SPZ 2 that claims 4 billion Gaussians in a hundred bytes.
   std::string header("NGSP\x02\0\0\0\xff\xff\xff\xff\0\x0c\0\0", 16);
   EXPECT_THAT(Refusal(Gzip(header + std::string(1000, '\0'))), HasSubstr("cut short"));
 }
@@ -165,17 +150,17 @@ TEST(SplatFileTest, NamesUnsupportedVersion) {
   EXPECT_THAT(Refusal(StoredZip({{"meta.json", R"({"version":3,"count":1})"}})),
               HasSubstr("SOG of version 3"));
   EXPECT_THAT(Refusal(StoredZip({{"meta.json", R"({"version":2})"}})), HasSubstr("count"));
-  EXPECT_THAT(Refusal(StoredZip({{"meta.json", "{"}})), HasSubstr("no JSON"));
+  EXPECT_THAT(Refusal(StoredZip({{"meta.json", "{"}})), HasSubstr("not valid JSON"));
   EXPECT_THAT(Refusal(StoredZip({{"photo.jpg", "x"}})), HasSubstr("without meta.json"));
   std::string spz = EncodeSpz(BallOnGround(5), SpzVersion::k4, pool);
   spz[4] = 5;
   EXPECT_THAT(Refusal(spz), HasSubstr("SPZ of version 5"));
   EXPECT_THAT(Refusal(Gzip(std::string("NGSP\x01\0\0\0\x01\0\0\0\0\0\0\0", 16))),
               HasSubstr("SPZ of version 1"));
-  EXPECT_THAT(Refusal(Gzip("a text, packed, of more than 16 bytes")), HasSubstr("no SPZ"));
+  EXPECT_THAT(Refusal(Gzip("a text, packed, of more than 16 bytes")), HasSubstr("not an SPZ"));
 }
 
-// A file is read from its archive or not at all.
+// Files outside the archive are not read.
 TEST(SplatFileTest, DoesNotReadFilesOutsideArchive) {
   const ScratchFolder folder;
   const std::filesystem::path outside = folder.path() / "means.webp";
@@ -187,7 +172,7 @@ TEST(SplatFileTest, DoesNotReadFilesOutsideArchive) {
                              files + R"(},"scales":{"codebook":[0],"files":)" + files +
                              R"(},"quats":{"files":)" + files +
                              R"(},"sh0":{"codebook":[0],"files":)" + files + "}}";
-    EXPECT_THAT(Refusal(StoredZip({{"meta.json", meta}})), HasSubstr("not a plain relative path"));
+    EXPECT_THAT(Refusal(StoredZip({{"meta.json", meta}})), HasSubstr("there is no record"));
   }
 }
 
@@ -196,7 +181,7 @@ TEST(SplatFileTest, SpzVersion3UsesRotationsOfVersion4) {
   const ViewerGaussians g = BallOnGround(20);
   const std::string four = EncodeSpz(g, SpzVersion::k4, pool);
   const ViewerGaussians expected = ReadSpz(four);
-  // The same streams behind the older header: positions, opacities, colours, scales, rotations.
+  // The same streams after the older header: positions, opacities, colours, scales, rotations.
   std::string three("NGSP\x03\0\0\0\x14\0\0\0", 12);
   three += four.substr(12, 2) + std::string(2, '\0');
   const auto byte = [&](double value) { three += static_cast<char>(std::lround(value)); };
@@ -209,7 +194,7 @@ TEST(SplatFileTest, SpzVersion3UsesRotationsOfVersion4) {
   for (const float logit : expected.opacity_logit) byte(255.0 / (1.0 + std::exp(-logit)));
   for (const float sh : expected.sh) byte(255.0 * (0.15 * sh + 0.5));
   for (const float scale : expected.log_scale) byte(16.0 * (scale + 10.0));
-  for (int i = 0; i < 20; ++i) three += std::string("\0\0\0\xc0", 4);  // w is left out: identity
+  for (int i = 0; i < 20; ++i) three += std::string("\0\0\0\xc0", 4);  // w is omitted: identity
   const ViewerGaussians g3 = ReadSpz(Gzip(three));
   EXPECT_EQ(g3.position, expected.position);
   EXPECT_EQ(g3.log_scale, expected.log_scale);
@@ -221,44 +206,7 @@ TEST(SplatFileTest, NamesFileThatIsNoSplat) {
   EXPECT_THAT(Refusal(""), HasSubstr("empty"));
   EXPECT_THAT(Refusal("\x89PNG...."), HasSubstr("PNG picture"));
   EXPECT_THAT(Refusal("glTF...."), HasSubstr("glTF"));
-  EXPECT_THAT(Refusal("some text"), HasSubstr("not a splat"));
-}
-
-TEST(SplatFileTest, RejectsUnsafeZipNamesAndBombs) {
-  const auto refusal = [](const std::string& zip) -> std::string {
-    try {
-      const ZipReader reader(zip, "z");
-      return "";
-    } catch (const Error& e) {
-      EXPECT_EQ(e.code(), ErrorCode::kInvalidArgument);
-      return e.what();
-    }
-  };
-  for (const char* name : {"../a", "/etc/a", "a\nb", "a\x1b[2J", "a//b", "a\\b"}) {
-    const std::string text = refusal(StoredZip({{name, "content"}}));
-    EXPECT_THAT(text, HasSubstr("not a plain relative path")) << name;
-    EXPECT_EQ(text.find(name), std::string::npos) << "hostile bytes in a message";
-  }
-  EXPECT_THAT(refusal(StoredZip({{"a", "content"}, {"a", "other"}})), HasSubstr("twice"));
-  EXPECT_EQ(refusal(StoredZip({{"folder/a", "content"}, {"b", ""}})), "");
-  // The size of the content, in the directory's entry.
-  std::string bomb = StoredZip({{"a", "content"}});
-  const size_t entry = bomb.find("PK\x01\x02");
-  bomb.replace(entry + 24, 4, std::string("\xff\xff\xff\x7f", 4));
-  EXPECT_THAT(refusal(bomb), HasSubstr("which is impossible"));
-  // The directory says "a" where the entry itself says "b".
-  std::string moved = StoredZip({{"a", "content"}});
-  moved[30] = 'b';
-  EXPECT_THROW(ZipReader(moved, "z").Read("a", 7), Error);
-  EXPECT_THROW(ZipReader(StoredZip({{"a", "x"}}), "z").Read("../a", 7), Error);
-}
-
-TEST(SplatFileTest, ChecksZipEntries) {
-  const std::string zip = StoredZip({{"a", "content"}});
-  EXPECT_EQ(ZipReader(zip, "z").Read("a", 7), "content");
-  EXPECT_THROW(ZipReader(zip, "z").Read("a", 6), Error);
-  EXPECT_THROW(ZipReader(zip, "z").Read("b", 7), Error);
-  EXPECT_THROW(ZipReader(Replaced(zip, "content", "contest"), "z").Read("a", 7), Error);
+  EXPECT_THAT(Refusal("some text"), HasSubstr("not a readable splat"));
 }
 
 }  // namespace

@@ -20,20 +20,20 @@ constexpr size_t kPoints = 10'000;
 constexpr int64_t kMiB = int64_t{1} << 20;
 
 // Transforms to a frame suitable for float32 and the near plane; the export inverts it.
-void Normalise(SplatPlace* place, SplatScene* result) {
-  const bool in_band = place->radius >= kMinRadius && place->radius <= kMaxRadius;
-  const double scale = in_band ? 1.0 : place->radius / kStandardRadius;
-  const bool far = place->center.cwiseAbs().maxCoeff() > kFarFromOrigin * scale;
+void NormalizeFrame(SplatExtent* extent, SplatScene* result) {
+  const bool in_band = extent->radius >= kMinRadius && extent->radius <= kMaxRadius;
+  const double scale = in_band ? 1.0 : extent->radius / kStandardRadius;
+  const bool far = extent->center.cwiseAbs().maxCoeff() > kFarFromOrigin * scale;
   if (in_band && !far) return;
-  const Eigen::Vector3d offset = far ? place->center : Eigen::Vector3d(Eigen::Vector3d::Zero());
+  const Eigen::Vector3d offset = far ? extent->center : Eigen::Vector3d(Eigen::Vector3d::Zero());
   GaussianModel& model = result->geometry;
   const auto shift = static_cast<float>(std::log(scale));
   for (size_t i = 0; i < model.position.size(); ++i) {
     model.position[i] = static_cast<float>((model.position[i] - offset[i % 3]) / scale);
     model.log_scale[i] -= shift;
   }
-  place->center = (place->center - offset) / scale;
-  place->radius /= scale;
+  extent->center = (extent->center - offset) / scale;
+  extent->radius /= scale;
   result->scene.world_from_scene_scale = scale;
   result->scene.world_offset = offset;
 }
@@ -124,16 +124,17 @@ SplatScene ImportSplat(std::string_view bytes,
   if (result.had_color) {
     result.warnings.push_back(fmt::format("{} is in colour; its colours were removed", name));
   }
-  SplatPlace place = FindSplatPlace(result.geometry);
-  Normalise(&place, &result);
-  const std::vector<SplatCamera> cameras = ChooseSplatCameras(result.geometry, place, options, run);
+  SplatExtent extent = FindSplatExtent(result.geometry);
+  NormalizeFrame(&extent, &result);
+  const std::vector<SplatCamera> cameras =
+      ChooseSplatCameras(result.geometry, extent, options, run);
   if (cameras.size() < 2) {
-    throw InvalidArgument("{} can be seen well from one place only; at least 2 views are needed",
+    throw InvalidArgument("only one position shows enough of {}; at least 2 views are needed",
                           name);
   }
   if (static_cast<int>(cameras.size()) < options.views) {
     result.warnings.push_back(fmt::format(
-        "{} views of the splat are used: no others of the {} that are wanted see enough of it",
+        "{} views of the splat are used: no others of the {} requested ones show enough of it",
         cameras.size(),
         options.views));
   }

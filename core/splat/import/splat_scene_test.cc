@@ -47,7 +47,7 @@ TEST(SplatSceneTest, ViewsAreAboveGroundAndFaceBall) {
     for (const float opacity : shown.opacity.data) filled += opacity;
     EXPECT_GT(filled / static_cast<double>(shown.opacity.data.size()), 0.25) << view.name;
   }
-  // No two alike.
+  // All are different.
   for (size_t i = 0; i < scene.views.size(); ++i) {
     for (size_t j = 0; j < i; ++j) {
       EXPECT_GT(
@@ -66,7 +66,7 @@ TEST(SplatSceneTest, UsesUpAxisGivenByUser) {
     float* q = g.rotation.data() + 4 * i;
     std::swap(p[1], p[2]);
     p[2] = -p[2];
-    // The quarter turn about x that does so: (s, -s, 0, 0) * q without the factor.
+    // The quarter turn about x: (s, -s, 0, 0) * q without the factor.
     const float turned[4] = {q[0] + q[1], q[1] - q[0], q[2] + q[3], q[3] - q[2]};
     std::copy_n(turned, 4, q);
   }
@@ -84,7 +84,7 @@ TEST(SplatSceneTest, IsDeterministic) {
 }
 
 TEST(SplatSceneTest, ViewsWallFromMoreVisibleSide) {
-  // A wall of small things in front of a curtain that hides them from behind.
+  // A wall of small Gaussians in front of a curtain that hides them from behind.
   ViewerGaussians g = BallOnGround(2000);
   for (size_t i = 0; i < g.size(); ++i) {
     const bool curtain = i % 20 == 0;

@@ -88,10 +88,10 @@ struct Candidate {
 class CameraChooser {
  public:
   CameraChooser(const GaussianModel& model,
-                const SplatPlace& place,
+                const SplatExtent& extent,
                 const SplatViewOptions& options,
                 const RunControl& run)
-      : place_(place),
+      : extent_(extent),
         options_(options),
         run_(run),
         picture_(PictureOf(options.side_px)),
@@ -106,17 +106,16 @@ class CameraChooser {
         });
     if (!(best.seen > 0.0)) {
       throw InvalidArgument(
-          "the splat cannot be seen from anywhere: its Gaussians are fainter or smaller than can "
-          "be drawn");
+          "the splat cannot be seen from anywhere: its Gaussians are too faint or too small");
     }
-    KeepDistance(best.distance);
+    PreferOneDistance(best.distance);
     return Spread(best);
   }
 
  private:
   double Score(const Candidate& candidate) {
     run_.cancel.ThrowIfCancelled();
-    const Pose pose = LookingAt(place_.center, candidate.direction, candidate.distance, up_);
+    const Pose pose = LookingAt(extent_.center, candidate.direction, candidate.distance, up_);
     const SeenGaussians::Measure m = seen_.At(pose, candidate.distance);
     const double below = candidate.direction.dot(up_) < kBelow ? kBelowShare : 1.0;
     return below * m.seen * (0.25 + 0.75 * m.covered) * std::max(0.0, 1.0 - 3.0 * m.near);
@@ -126,9 +125,9 @@ class CameraChooser {
   void ScoreCoarseCandidates() {
     const std::vector<Eigen::Vector3d> directions = Directions(kCoarseDirections);
     for (const Eigen::Vector3d& direction : directions) {
-      Candidate best{direction, place_.radius, 0.0};
+      Candidate best{direction, extent_.radius, 0.0};
       for (const double distance : kDistances) {
-        Candidate candidate{direction, distance * place_.radius, 0.0};
+        Candidate candidate{direction, distance * extent_.radius, 0.0};
         candidate.seen = Score(candidate);
         if (candidate.seen > best.seen) best = candidate;
       }
@@ -139,7 +138,7 @@ class CameraChooser {
     }
   }
 
-  void KeepDistance(double distance) {
+  void PreferOneDistance(double distance) {
     for (Candidate& coarse : coarse_) {
       const Candidate same{coarse.direction, distance, 0.0};
       const double seen = coarse.distance == distance ? coarse.seen : Score(same);
@@ -165,7 +164,7 @@ class CameraChooser {
     std::vector<double> far(fine.size(), 2.0);
     const auto take = [&](const Candidate& c) {
       chosen.push_back({picture_,
-                        LookingAt(place_.center, c.direction, c.distance, up_),
+                        LookingAt(extent_.center, c.direction, c.distance, up_),
                         std::min(1.0, c.seen / best.seen)});
       for (size_t i = 0; i < fine.size(); ++i) {
         far[i] = std::min(far[i], 1.0 - fine[i].direction.dot(c.direction));
@@ -201,7 +200,7 @@ class CameraChooser {
     return cameras;
   }
 
-  const SplatPlace place_;
+  const SplatExtent extent_;
   const SplatViewOptions& options_;
   const RunControl& run_;
   const Camera picture_;
@@ -218,7 +217,7 @@ void SplatViewOptions::Validate() const {
   check("side_px", side_px, 64, 4096);
 }
 
-SplatPlace FindSplatPlace(const GaussianModel& model) {
+SplatExtent FindSplatExtent(const GaussianModel& model) {
   std::vector<size_t> sample = SpreadSample(model, kPlaceSample);
   if (sample.empty()) {
     sample.resize(model.size());
@@ -226,31 +225,31 @@ SplatPlace FindSplatPlace(const GaussianModel& model) {
   }
   std::vector<Ellipsoid> ellipsoids;
   for (const size_t i : sample) ellipsoids.push_back(EllipsoidOf(model, i));
-  SplatPlace place;
+  SplatExtent extent;
   std::vector<std::pair<double, double>> values(ellipsoids.size());
   for (int k = 0; k < 3; ++k) {
     for (size_t i = 0; i < values.size(); ++i) {
       values[i] = {ellipsoids[i].center[k], ellipsoids[i].opacity};
     }
-    place.center[k] = MedianOf(&values);
+    extent.center[k] = MedianOf(&values);
   }
   double largest = 0.0;
   for (size_t i = 0; i < values.size(); ++i) {
-    values[i] = {(ellipsoids[i].center - place.center).norm(), ellipsoids[i].opacity};
+    values[i] = {(ellipsoids[i].center - extent.center).norm(), ellipsoids[i].opacity};
     largest = std::max(largest, ellipsoids[i].radius[2]);
   }
-  place.radius = MedianOf(&values);
+  extent.radius = MedianOf(&values);
   // One Gaussian, or several at one position: uses their own size.
-  if (!(place.radius > 1e-6 * largest)) place.radius = std::max(largest, 1e-9);
-  return place;
+  if (!(extent.radius > 1e-6 * largest)) extent.radius = std::max(largest, 1e-9);
+  return extent;
 }
 
 std::vector<SplatCamera> ChooseSplatCameras(const GaussianModel& model,
-                                            const SplatPlace& place,
+                                            const SplatExtent& extent,
                                             const SplatViewOptions& options,
                                             const RunControl& run) {
   options.Validate();
-  return CameraChooser(model, place, options, run).Choose();
+  return CameraChooser(model, extent, options, run).Choose();
 }
 
 Eigen::Vector3d EstimateUp(const GaussianModel& model, SplatUp about) {
@@ -272,7 +271,7 @@ Eigen::Vector3d EstimateUp(const GaussianModel& model, SplatUp about) {
       votes[k] += weight * std::pow(e.axes.col(0).dot(axes[k]), 32.0);
     }
   }
-  const double mean = all / 33.0;  // what evenly spread normals would give each axis
+  const double mean = all / 33.0;  // share of each axis for evenly spread normals
   std::optional<size_t> top;
   for (size_t k = 0; k < axes.size(); ++k) {
     if (axes[k].dot(custom) < 0.5) continue;

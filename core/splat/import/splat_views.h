@@ -24,11 +24,11 @@ struct SplatViewOptions {
 };
 
 // Centre and size of the Gaussians, by medians, so that floaters and far background do not count.
-struct SplatPlace {
+struct SplatExtent {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius = 1.0;  // contains half of the opacity; > 0
 };
-SplatPlace FindSplatPlace(const GaussianModel& model);
+SplatExtent FindSplatExtent(const GaussianModel& model);
 
 struct SplatCamera {
   Camera camera;
@@ -36,10 +36,10 @@ struct SplatCamera {
   double seen = 0.0;  // share of the splat that it sees, relative to the best camera: 0..1
 };
 
-// Best first. `place.radius` is about 1 to 300 units, because the rasterizer draws nothing nearer
+// Best first. `extent.radius` is about 1 to 300 units, because the rasterizer draws nothing nearer
 // than 0.2. Throws Error{kInvalidArgument} if the splat is visible from nowhere.
 std::vector<SplatCamera> ChooseSplatCameras(const GaussianModel& model,
-                                            const SplatPlace& place,
+                                            const SplatExtent& extent,
                                             const SplatViewOptions& options,
                                             const RunControl& run);
 

@@ -15,7 +15,7 @@ constexpr uint32_t kMagic = 0x5053474e;  // "NGSP"
 constexpr size_t kHeaderBytes = 16;
 constexpr uint32_t kTableEntryBytes = 16;
 constexpr uint32_t kMaxStreams = 64;
-constexpr uint64_t kMostInflated = 1032;  // deflate makes at most so many bytes of one
+constexpr uint64_t kMaxInflation = 1032;  // maximum ratio of deflate
 
 struct Header {
   uint32_t version = 0;
@@ -23,7 +23,7 @@ struct Header {
   int degree = 0;
   int fraction_bits = 0;
   size_t turn_bytes() const { return version == 2 ? 3 : 4; }
-  // Of all streams after the header.
+  // Total size of the streams after the header.
   uint64_t bytes() const {
     return count * (9 + 1 + 3 + 3 + turn_bytes() + 3 * (ShCoefficients(degree) - 1));
   }
@@ -37,7 +37,7 @@ struct Header {
 Header ReadHeader(std::string_view plain, bool packed_by_gzip, const SplatSource& source) {
   if (plain.size() < kHeaderBytes) ThrowShort(source);
   if (LittleEndianAt(plain, 0, 4) != kMagic) {
-    throw InvalidArgument("{} is no SPZ; give a .spz, a .sog or a 3DGS .ply", source.name);
+    throw InvalidArgument("{} is not an SPZ; give a .spz, a .sog or a 3DGS .ply", source.name);
   }
   Header header;
   header.version = LittleEndianAt(plain, 4, 4);
@@ -112,7 +112,7 @@ std::string StreamsOfGzip(std::string_view bytes, const SplatSource& source, Hea
   std::string plain;
   if (!gunzip.Append(kHeaderBytes, &plain)) ThrowShort(source);
   *header = ReadHeader(plain, /*packed_by_gzip=*/true, source);
-  if (header->bytes() > kMostInflated * bytes.size()) ThrowShort(source);
+  if (header->bytes() > kMaxInflation * bytes.size()) ThrowShort(source);
   CheckCount(header->count, source);
   plain.clear();
   if (!gunzip.Append(header->bytes(), &plain) || !gunzip.HasValidEnd()) ThrowShort(source);
@@ -135,7 +135,7 @@ std::string StreamsOfZstd(std::string_view bytes, const SplatSource& source, Hea
     all += LittleEndianAt(bytes, table + kTableEntryBytes * i + 8, 4);
   }
   if (all != header->bytes()) {
-    throw InvalidArgument("{} says that it has {} Gaussians, but its parts are of another size",
+    throw InvalidArgument("{} claims to have {} Gaussians, but its parts have other sizes",
                           source.name,
                           header->count);
   }

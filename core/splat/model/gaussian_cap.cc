@@ -7,8 +7,8 @@ namespace color3d {
 namespace {
 
 constexpr double kMaxGaussiansPerPixel = 0.02;
-// Higher resolution of the same few places reveals no more surfaces: with at most this number of
-// views pixels count at this size, with more views gradually at their own.
+// With few views, a higher resolution shows no more surfaces: for at most kSparseViews views pixels
+// are counted at this size, for more views gradually at their own.
 constexpr int kSparseSidePx = 500;
 constexpr double kSparseViews = 12.0;
 constexpr int kMinCap = 5000;

@@ -5,8 +5,8 @@
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/splat/model/gaussian_model.h"
+#include "core/splat/model/model_buffers.h"
 #include "core/splat/model/model_parameters.h"
-#include "core/splat/model/spherical_harmonics.h"
 
 namespace color3d {
 namespace {
@@ -17,7 +17,7 @@ constexpr char kMagic[8] = {'C', '3', 'D', 'G', 'A', 'U', 'S', 'S'};
 constexpr uint32_t kPlainVersion = 1;
 constexpr uint32_t kConfidenceVersion = 2;  // confidence is the last buffer
 constexpr uint32_t kMotionVersion = 3;      // a MotionHeader follows the header, motion is the last
-constexpr size_t kDigestBytes = 64;         // hexadecimal SHA-256 of all that stands before it
+constexpr size_t kDigestBytes = 64;         // hexadecimal SHA-256 of all bytes before it
 
 struct Header {
   char magic[8];
@@ -36,25 +36,6 @@ struct MotionHeader {
   uint64_t with_confidence;  // 0 or 1
 };
 static_assert(sizeof(MotionHeader) == 32);
-
-// visit(name, buffer, width, count) in the order of the file.
-template <class Model, class Visit>
-void ForEachBuffer(Model& m, size_t count, size_t moving, bool with_confidence, Visit&& visit) {
-  const int chroma = m.channels == 3 ? ShCoefficients(m.chroma_sh_degree) : 0;
-  visit("position", m.position, 3, count);
-  visit("log_scale", m.log_scale, 3, count);
-  visit("rotation", m.rotation, 4, count);
-  visit("opacity_logit", m.opacity_logit, 1, count);
-  visit("sh_l", m.sh_l, ShCoefficients(m.sh_degree), count);
-  visit("sh_a", m.sh_a, chroma, count);
-  visit("sh_b", m.sh_b, chroma, count);
-  if (with_confidence) visit("confidence", m.confidence, 1, count);
-  visit("velocity", m.motion.velocity, 3, moving);
-  visit("acceleration", m.motion.acceleration, 3, moving);
-  visit("spin", m.motion.spin, 4, moving);
-  visit("center", m.motion.center, 1, moving);
-  visit("log_width", m.motion.log_width, 1, moving);
-}
 
 template <class... Parts>
 Error Refuse(fmt::format_string<Parts...> why, Parts&&... parts) {
@@ -103,7 +84,7 @@ MotionHeader ReadMotionHeader(std::string_view bytes, const Header& h) {
   if (m.moving == 0 || m.moving > h.count || m.with_confidence > 1 || !std::isfinite(m.begin_s) ||
       !std::isfinite(m.end_s) || m.begin_s > m.end_s) {
     throw Refuse(
-        "its motion of {} Gaussians from {} s to {} s cannot be", m.moving, m.begin_s, m.end_s);
+        "its motion of {} Gaussians from {} s to {} s is invalid", m.moving, m.begin_s, m.end_s);
   }
   return m;
 }
@@ -128,7 +109,7 @@ std::string SerializeGaussians(const GaussianModel& model) {
     const std::string place = FirstNotFinite(name, buffer, width);
     if (!place.empty()) {
       throw Error(
-          ErrorCode::kInternal, "a Gaussian model was to be saved whose {} is not finite", place);
+          ErrorCode::kInternal, "the {} of a Gaussian model to be saved is not finite", place);
     }
     bytes.append(reinterpret_cast<const char*>(buffer.data()), buffer.size() * sizeof(float));
   };

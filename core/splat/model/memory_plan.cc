@@ -20,9 +20,9 @@ constexpr int64_t kPhotoBytesPerPixel = 36;  // decoded (3 x 16 bit), as float, 
 // Maximum caches of training pictures and of decoded ones.
 constexpr int64_t kTargetCacheBytes = 512 * kMiB;
 constexpr int64_t kImageCacheBytes = 1024 * kMiB;
-constexpr int64_t kFrameTargetCacheBytes = 128 * kMiB;  // of a scene that moves
+constexpr int64_t kFrameTargetCacheBytes = 128 * kMiB;  // of dynamic scenes
 constexpr int64_t kFrameCacheBytes = 32 * kMiB;
-constexpr int64_t kSurveyBytes = 80 * kMiB;  // of what moves
+constexpr int64_t kSurveyBytes = 80 * kMiB;  // of the motion survey
 constexpr int kSmallestSidePx = 64;
 constexpr double kSideStep = 0.85;
 constexpr int64_t kFewestGaussians = 1000;

@@ -2,19 +2,9 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
-#include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/model/model_buffers.h"
 
 namespace color3d {
-namespace {
-
-void CheckSize(const std::vector<float>& buffer, size_t rows, int width, const char* name) {
-  if (buffer.size() == rows * static_cast<size_t>(width)) return;
-  throw InvalidArgument("Gaussian model: {} has {} numbers, {} are needed",
-                        name,
-                        buffer.size(),
-                        rows * static_cast<size_t>(width));
-}
-
 void ToPlanar(const std::vector<float>& from, int width, int row, ParameterBlock& to) {
   for (int k = 0; k < width; ++k) {
     float* out = to.Row(row + k);
@@ -31,8 +21,6 @@ std::vector<float> FromPlanar(const ParameterBlock& from, int row, int width) {
   return to;
 }
 
-}  // namespace
-
 void CheckModel(const GaussianModel& model) {
   if (model.channels != 1 && model.channels != 3) {
     throw InvalidArgument("Gaussian model: {} channels; 1 or 3 are possible", model.channels);
@@ -44,29 +32,22 @@ void CheckModel(const GaussianModel& model) {
         model.sh_degree,
         model.chroma_sh_degree);
   }
-  const size_t n = model.size();
-  CheckSize(model.position, n, 3, "position");
-  CheckSize(model.log_scale, n, 3, "log_scale");
-  CheckSize(model.rotation, n, 4, "rotation");
-  CheckSize(model.sh_l, n, ShCoefficients(model.sh_degree), "sh_l");
-  const int chroma = model.channels == 3 ? ShCoefficients(model.chroma_sh_degree) : 0;
-  CheckSize(model.sh_a, n, chroma, "sh_a");
-  CheckSize(model.sh_b, n, chroma, "sh_b");
-  if (!model.confidence.empty()) CheckSize(model.confidence, n, 1, "confidence");
   const GaussianMotion& motion = model.motion;
-  const size_t moving = motion.size();
-  if (moving > n || !(motion.begin_s <= motion.end_s)) {
+  if (motion.size() > model.size() || !(motion.begin_s <= motion.end_s)) {
     throw InvalidArgument(
-        "Gaussian model: motion of {} Gaussians out of {}, from {} s to {} s, cannot be",
-        moving,
-        n,
+        "Gaussian model: motion of {} Gaussians out of {}, from {} s to {} s, is invalid",
+        motion.size(),
+        model.size(),
         motion.begin_s,
         motion.end_s);
   }
-  CheckSize(motion.velocity, moving, 3, "velocity");
-  CheckSize(motion.acceleration, moving, 3, "acceleration");
-  CheckSize(motion.spin, moving, 4, "spin");
-  CheckSize(motion.log_width, moving, 1, "log_width");
+  const auto check = [](const char* name, const auto& buffer, int width, size_t count) {
+    const size_t needed = count * static_cast<size_t>(width);
+    if (buffer.size() == needed) return;
+    throw InvalidArgument(
+        "Gaussian model: {} has {} numbers, {} are needed", name, buffer.size(), needed);
+  };
+  ForEachBuffer(model, model.size(), motion.size(), !model.confidence.empty(), check);
   for (size_t i = 0; i < model.confidence.size(); ++i) {
     if (model.confidence[i] >= 0.0f && model.confidence[i] <= 1.0f) continue;
     throw InvalidArgument("Gaussian model: confidence of Gaussian {} is {}; it must be 0 to 1",

@@ -2,6 +2,8 @@
 // the splat module. Stateless.
 #pragma once
 
+#include <vector>
+
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/model/parameter_block.h"
 
@@ -18,6 +20,10 @@ GaussianModel ModelFromParameters(const ParameterBlock& parameters,
                                   int channels,
                                   int sh_degree,
                                   int chroma_sh_degree);
+
+// Copies a buffer of `width` numbers per Gaussian to or from the rows that begin at `row`.
+void ToPlanar(const std::vector<float>& from, int width, int row, ParameterBlock& to);
+std::vector<float> FromPlanar(const ParameterBlock& from, int row, int width);
 
 // L' alone (channels 1) or L', a', b' of ParametersFromModel's layout.
 ColorSpec ColorSpecOf(int channels, int sh_degree, int chroma_sh_degree);

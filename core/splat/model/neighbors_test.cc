@@ -33,7 +33,7 @@ TEST(NeighborTreeTest, AgreesWithExhaustiveSearch) {
   }
 }
 
-// The order of equal distances is the points' own, whatever the tree looks like.
+// Equal distances are ordered by index, independent of the tree.
 TEST(NeighborTreeTest, BreaksTiesByIndex) {
   std::vector<NeighborTree::Point> points;
   for (int i = 0; i < 1000; ++i) {  // a grid of ten to each side, in a scrambled order

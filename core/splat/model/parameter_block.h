@@ -22,6 +22,11 @@ class ParameterBlock {
 
   int rows() const { return rows_; }
   int64_t count() const { return count_; }
+  int64_t blocks() const { return (count_ + 15) / 16; }  // of 16 Gaussians
+  bool HasShapeOf(const ParameterBlock& other) const {
+    return rows_ == other.rows_ && count_ == other.count_;
+  }
+  ParameterBlock ZerosOfSameShape() const { return ParameterBlock(rows_, count_); }
   // A multiple of 16, at least count(). Lanes from count() on are zero.
   int64_t stride() const { return stride_; }
   float* Row(int row) { return values_.data() + row * stride_; }

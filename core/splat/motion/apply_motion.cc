@@ -11,23 +11,6 @@
 
 #include "core/simd/simd-inl.h"
 
-#ifndef COLOR3D_SPLAT_APPLY_MOTION_ONCE
-#define COLOR3D_SPLAT_APPLY_MOTION_ONCE
-namespace color3d {
-namespace {
-
-// Moving Gaussians i of `moving` are Gaussians first + i of the blocks at the moment `t`.
-struct MotionAt {
-  const ParameterBlock& moving;
-  int row;  // of `moving`, where motion begins
-  float t;
-  int64_t first;
-};
-
-}  // namespace
-}  // namespace color3d
-#endif  // COLOR3D_SPLAT_APPLY_MOTION_ONCE
-
 HWY_BEFORE_NAMESPACE();
 namespace color3d {
 namespace HWY_NAMESPACE {
@@ -41,7 +24,7 @@ constexpr float kLn2 = 0.69314718f;
 constexpr float kMaxOpacity = 1.0f - 1e-6f;
 // Minimum width of a time window, so that no product overflows.
 constexpr float kLeastLogWidth = -40.0f;
-constexpr float kFarthest = 1e4f;  // of tau / width: nothing is seen long before
+constexpr float kFarthest = 1e4f;  // limit of tau / width, far beyond visibility
 
 HWY_INLINE F32 Exp(F32 x) {
   return simd::Exp2(simd::Clamp(x * kLog2E, Broadcast(-125.0f), Broadcast(125.0f)));
@@ -150,41 +133,27 @@ namespace color3d {
 namespace {
 HWY_EXPORT(MoveRange);
 HWY_EXPORT(BackwardRange);
-
-int64_t Blocks(const ParameterBlock& moving) { return (moving.count() + 15) / 16; }
 }  // namespace
 
-void ApplyMotion(const ParameterBlock& moving,
-                 int row,
-                 float t,
-                 int64_t first,
-                 ThreadPool& pool,
-                 ParameterBlock& at,
-                 float hidden) {
+void ApplyMotion(const MotionAt& motion, ThreadPool& pool, ParameterBlock& at, float hidden) {
   const auto move_range = &COLOR3D_KERNEL(MoveRange);
-  const MotionAt motion{moving, row, t, first};
-  pool.ForRanges(Blocks(moving), [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(motion.moving.blocks(), [&](int64_t begin, int64_t end, int) {
     move_range(motion, hidden, begin, end, at);
   });
 }
 
-void ApplyMotionBackward(const ParameterBlock& moving,
-                         int row,
-                         float t,
-                         int64_t first,
+void ApplyMotionBackward(const MotionAt& motion,
                          const ParameterBlock& at,
                          const ParameterBlock& d_at,
                          ThreadPool& pool,
                          ParameterBlock& d_moving) {
-  if (d_moving.rows() != moving.rows() || d_moving.count() != moving.count()) {
-    d_moving = ParameterBlock(moving.rows(), moving.count());
-  }
-  for (int r = 0; r < row; ++r) {
-    std::copy_n(d_at.Row(r) + first, moving.count(), d_moving.Row(r));
+  const ParameterBlock& moving = motion.moving;
+  if (!d_moving.HasShapeOf(moving)) d_moving = moving.ZerosOfSameShape();
+  for (int r = 0; r < motion.row; ++r) {
+    std::copy_n(d_at.Row(r) + motion.first, moving.count(), d_moving.Row(r));
   }
   const auto backward_range = &COLOR3D_KERNEL(BackwardRange);
-  const MotionAt motion{moving, row, t, first};
-  pool.ForRanges(Blocks(moving), [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(moving.blocks(), [&](int64_t begin, int64_t end, int) {
     backward_range(motion, at, d_at, begin, end, d_moving);
   });
 }

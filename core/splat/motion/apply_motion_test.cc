@@ -1,4 +1,4 @@
-// Motion and its adjoint against a twin in float64, once per instruction set.
+// Motion and its adjoint against a float64 reference, once per instruction set.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -48,19 +48,19 @@ class ApplyMotionTest : public InstructionSetTest<int> {  // of thread counts
  protected:
   ApplyMotionTest() {
     for (int64_t i = 0; i < kMoving; ++i) {
-      // Seen at all of the moments that are asked for.
+      // Visible at all tested times.
       moving_.Row(kRows + kLogWidthRow)[i] = 0.2f * moving_.Row(kRows + kLogWidthRow)[i];
       moving_.Row(kRows + kCenterRow)[i] = 0.5f * moving_.Row(kRows + kCenterRow)[i];
     }
   }
 
-  // Still ones, then moving ones at `t`.
+  // Static Gaussians, then moving ones at `t`.
   ParameterBlock At(float t) {
     ParameterBlock at = RandomRows(kRows, kStill + kMoving, 3);
     for (int r = 0; r < kRows; ++r) {
       for (int64_t i = 0; i < kMoving; ++i) at.Row(r)[kStill + i] = moving_.Row(r)[i];
     }
-    ApplyMotion(moving_, kRows, t, kStill, pool_, at);
+    ApplyMotion({moving_, kRows, t, kStill}, pool_, at);
     return at;
   }
 
@@ -84,7 +84,7 @@ TEST_P(ApplyMotionTest, GradientAgreesWithFloat64Reference) {
   const ParameterBlock d_at = RandomRows(kRows, kStill + kMoving, 7);
   for (const float t : {-0.7f, 0.4f}) {
     ParameterBlock gradient;
-    ApplyMotionBackward(moving_, kRows, t, kStill, At(t), d_at, pool_, gradient);
+    ApplyMotionBackward({moving_, kRows, t, kStill}, At(t), d_at, pool_, gradient);
     for (int64_t i = 0; i < kMoving; ++i) {
       const std::vector<double> d = Column(d_at, kStill + i), parameters = Column(moving_, i);
       const auto value = [&](const std::vector<double>& p) {
@@ -113,7 +113,7 @@ TEST_P(ApplyMotionTest, IsInvisibleFarFromItsTime) {
   }
   const ParameterBlock at = At(1.0f);
   ParameterBlock d_at(kRows, kStill + kMoving), gradient;
-  ApplyMotionBackward(moving_, kRows, 1.0f, kStill, at, d_at, pool_, gradient);
+  ApplyMotionBackward({moving_, kRows, 1.0f, kStill}, at, d_at, pool_, gradient);
   for (int64_t i = 0; i < kMoving; ++i) {
     EXPECT_LT(at.Row(kOpacityRow)[kStill + i], -9.0f);
     for (int r = 0; r < gradient.rows(); ++r) EXPECT_EQ(gradient.Row(r)[i], 0.0f);
@@ -123,7 +123,7 @@ TEST_P(ApplyMotionTest, IsInvisibleFarFromItsTime) {
 TEST_P(ApplyMotionTest, HidesGaussiansOfOneTime) {
   constexpr float kMoment = 0.2f, kHidden = 0.4f;
   ParameterBlock at = RandomRows(kRows, kStill + kMoving, 3);
-  ApplyMotion(moving_, kRows, kMoment, kStill, pool_, at, kHidden);
+  ApplyMotion({moving_, kRows, kMoment, kStill}, pool_, at, kHidden);
   int hidden = 0;
   for (int64_t i = 0; i < kMoving; ++i) {
     const bool near = std::abs(kMoment - moving_.Row(kRows + kCenterRow)[i]) < kHidden;

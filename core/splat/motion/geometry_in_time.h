@@ -20,7 +20,7 @@ class GeometryInTime {
   const ParameterBlock& At(const ParameterBlock& all, double time_s) {
     if (motion_.count() == 0) return all;
     at_ = all;
-    ApplyMotion(motion_, 0, times_.UnitTime(time_s), all.count() - motion_.count(), pool_, at_);
+    ApplyMotion({motion_, 0, times_.UnitTime(time_s), all.count() - motion_.count()}, pool_, at_);
     return at_;
   }
 

@@ -29,21 +29,14 @@ float GaussianMotion::UnitTime(double time_s) const {
 ParameterBlock MotionFromModel(const GaussianModel& model) {
   ParameterBlock block(kMotionRows, static_cast<int64_t>(model.motion.size()));
   ForEachPart(model.motion, [&](const std::vector<float>& from, int row, int width) {
-    for (int k = 0; k < width; ++k) {
-      float* out = block.Row(row + k);
-      for (int64_t i = 0; i < block.count(); ++i) out[i] = from[i * width + k];
-    }
+    ToPlanar(from, width, row, block);
   });
   return block;
 }
 
 void SetMotion(const ParameterBlock& moving, int row, GaussianMotion& motion) {
   ForEachPart(motion, [&](std::vector<float>& to, int part, int width) {
-    to.resize(static_cast<size_t>(moving.count()) * width);
-    for (int k = 0; k < width; ++k) {
-      const float* in = moving.Row(row + part + k);
-      for (int64_t i = 0; i < moving.count(); ++i) to[i * width + k] = in[i];
-    }
+    to = FromPlanar(moving, row + part, width);
   });
 }
 
@@ -56,7 +49,7 @@ ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPoo
   ParameterBlock at = ParametersFromModel(model);
   if (model.motion.size() > 0) {
     const auto still = static_cast<int64_t>(model.size() - model.motion.size());
-    ApplyMotion(MotionFromModel(model), 0, model.motion.UnitTime(time_s), still, pool, at);
+    ApplyMotion({MotionFromModel(model), 0, model.motion.UnitTime(time_s), still}, pool, at);
   }
   return at;
 }

@@ -1,6 +1,6 @@
-// Gaussians in time: where they are at a moment, and the adjoint of that (DYNAMIC.md
-// "Motion"). A model at one moment is a model as any other, so no kernel but these knows of time.
-// Internal to the splat module. Deterministic whatever the thread count.
+// Moving Gaussians: their parameters at a time, and the adjoint (DYNAMIC.md "Motion"). All other
+// kernels work on a model at one time. Internal to the splat module. Deterministic for every thread
+// count.
 #pragma once
 
 #include <cstdint>
@@ -24,41 +24,37 @@ inline constexpr int kMotionRows = 12;
 inline constexpr float kUnseenOpacity = 1e-4f;
 inline constexpr float kUnseenLogit = -9.2102404f;
 
-// The motion alone, kMotionRows rows for model.motion.size() Gaussians.
+// Returns kMotionRows rows for model.motion.size() Gaussians.
 ParameterBlock MotionFromModel(const GaussianModel& model);
 // The inverse, from rows [row, row + kMotionRows) of `moving`; begin and end stay as they are.
 void SetMotion(const ParameterBlock& moving, int row, GaussianMotion& motion);
 
-// Takes Gaussians [first, first + moving.count()) of `at` to the moment `t` (GaussianMotion), as
-// rows [row, row + kMotionRows) of `moving` say. Those that belong to a time nearer than `hidden`
-// are not seen.
-void ApplyMotion(const ParameterBlock& moving,
-                 int row,
-                 float t,
-                 int64_t first,
-                 ThreadPool& pool,
-                 ParameterBlock& at,
-                 float hidden = 0.0f);
+// Moving Gaussians at a time. Gaussian i of `moving` is Gaussian first + i of a block of all.
+struct MotionAt {
+  const ParameterBlock& moving;
+  int row;  // of `moving`, the first of kMotionRows; parameters may precede it
+  float t;  // GaussianMotion::UnitTime
+  int64_t first;
+};
 
-// The adjoint. `moving` holds parameters in rows [0, row) and motion from `row` on; `at` holds all
-// Gaussians at `t`, with those of `moving` from `first` on; `d_at` is dL/d(at). Sets `d_moving`,
-// which gets the shape of `moving`.
-void ApplyMotionBackward(const ParameterBlock& moving,
-                         int row,
-                         float t,
-                         int64_t first,
+// Takes the moving Gaussians of `at` to their time. Those whose own time is nearer than `hidden`
+// are not seen.
+void ApplyMotion(const MotionAt& motion, ThreadPool& pool, ParameterBlock& at, float hidden = 0.0f);
+
+// The adjoint. `at` holds all Gaussians at the time; `d_at` is dL/d(at). Sets `d_moving`, which
+// gets the shape of `moving`.
+void ApplyMotionBackward(const MotionAt& motion,
                          const ParameterBlock& at,
                          const ParameterBlock& d_at,
                          ThreadPool& pool,
                          ParameterBlock& d_moving);
 
-// No window in time becomes narrower than exp(least).
+// Widens windows in time that are narrower than exp(least).
 void LimitWindows(float least, int row, ParameterBlock& moving);
 
-// The model's parameters at a time of the scene, seconds; those that stand still are the same at
-// any.
+// Returns the model's parameters at a time of the scene.
 ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPool& pool);
-// The same as a model without motion: the Gaussians that are seen then.
+// Returns the Gaussians that are seen at that time, as a model without motion.
 GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool);
 
 }  // namespace color3d

@@ -66,7 +66,7 @@ TEST(MotionTest, RoundTripsThroughFile) {
 TEST(MotionTest, RejectsDamagedFileAndModel) {
   GaussianModel model = SmallModel();
   std::string bytes = SerializeGaussians(model);
-  bytes[40] = 9;  // more Gaussians that move than there are
+  bytes[40] = 9;  // more moving Gaussians than Gaussians
   EXPECT_THROW(ParseGaussians(bytes), Error);
   EXPECT_THROW(ParseGaussians(SerializeGaussians(model).substr(0, 60)), Error);
   model.motion.spin.pop_back();

@@ -15,12 +15,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Of GaussianMotion. Steps are counted from it: with an even number of them none lies at 0.
+// Of GaussianMotion's t. Time steps are counted from it; with an even number of them none is at 0.
 constexpr double kFirstTime = -1.0;
 constexpr size_t kFewest = 4;           // neighbours, the Gaussian itself among them
 constexpr double kOfAnotherStep = 0.5;  // weight
-constexpr double kLeastWeight = 1e-6;   // so that what nobody sees moves along
-constexpr double kStiffness = 0.01;     // of turning, against neighbours in one line
+constexpr double kLeastWeight = 1e-6;   // for Gaussians that no view sees
+constexpr double kStiffness = 0.01;     // of the rotation, for neighbours in one line
 
 Vector3d Rows(const ParameterBlock& block, int row, int64_t i) {
   return {block.Row(row)[i], block.Row(row + 1)[i], block.Row(row + 2)[i]};

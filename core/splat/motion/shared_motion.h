@@ -1,5 +1,5 @@
-// Motion that neighbours share: in the small, things move rigidly (DYNAMIC.md "Motion").
-// Internal to the splat module. Deterministic whatever the thread count.
+// Locally rigid motion: neighbours share their motion (DYNAMIC.md "Motion").
+// Internal to the splat module. Deterministic for every thread count.
 #pragma once
 
 #include "core/base/parallel.h"
@@ -8,17 +8,16 @@
 namespace color3d {
 
 struct SharedMotionOptions {
-  int row = 0;            // where motion begins in the block
+  int row = 0;            // first row of motion in the block
   double interval = 1.0;  // from one time step to the next, in units of GaussianMotion's t
-  int neighbors = 24;     // of the Gaussian's time step and the two beside it
+  int neighbors = 24;     // of the Gaussian's time step and the two adjacent ones
   double share = 0.05;    // 0: each keeps its own motion, 1: it has that of its neighbours
 };
 
-// Takes the velocity of each Gaussian that share of the way to u + w x (p - c): the rigid motion
-// that fits its nearest neighbours best, each where it is and as it moves at the Gaussian's time
-// step, weighted with their opacity (half of it from another step) and with how well they agree.
-// Acceleration goes to the neighbours' mean likewise. Gaussians with fewer than four neighbours
-// keep their own.
+// Moves the velocity of each Gaussian by this share towards u + w x (p - c), the rigid motion that
+// best fits its nearest neighbours at its time step. Neighbours are weighted by their opacity (half
+// of it if they are of another step) and by their agreement. Acceleration moves towards the
+// neighbours' mean likewise. Gaussians with fewer than four neighbours keep their motion.
 void ShareMotion(const SharedMotionOptions& options, ThreadPool& pool, ParameterBlock& moving);
 
 }  // namespace color3d

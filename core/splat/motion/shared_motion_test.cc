@@ -23,7 +23,7 @@ struct Rigid {
 
 class SharedMotionTest : public testing::Test {
  protected:
-  // Gaussians about `center` at a time step, all of one rigid motion but for `noise`.
+  // Gaussians around `center` at a time step, with one rigid motion and `noise`.
   void AddThing(int count, const Vector3d& center, int step, const Rigid& motion, double noise) {
     const int64_t first = moving_.count();
     moving_.Resize(first + count);
@@ -86,7 +86,7 @@ TEST_F(SharedMotionTest, SeparatesObjectsThatPassEachOther) {
 TEST_F(SharedMotionTest, UsesNeighborsAtAdjacentTimeSteps) {
   const Rigid motion{{20.0, 0.0, 0.0}, {0, 0, 0}};
   AddThing(3, {0, 0, 0}, 0, {}, 0.0);
-  AddThing(100, Vector3d(-2, 0, 0), -1, motion, 0.0);  // comes to the same place one step later
+  AddThing(100, Vector3d(-2, 0, 0), -1, motion, 0.0);  // is at the same position one step later
   Share(1.0);
   EXPECT_LT(Off(motion, 0, 3), 1.0);
   AddThing(3, {50, 0, 0}, 5, {}, 0.0);  // nothing is near in time
@@ -101,9 +101,9 @@ TEST_F(SharedMotionTest, HandlesEvenNumberOfTimeSteps) {
   for (int step = 0; step < 23; ++step) {
     const Vector3d here(0.0, 1000.0 * step, 0.0), there = here + interval_ * velocity;
     const int64_t first = moving_.count();
-    AddThing(3, here, 0, {}, 0.0);                       // has yet to learn to move
-    AddThing(60, there, 0, {velocity, {0, 0, 0}}, 0.0);  // was here a step ago
-    AddThing(60, here, 0, {-velocity, {0, 0, 0}}, 0.0);  // came here since
+    AddThing(3, here, 0, {}, 0.0);                       // has no motion yet
+    AddThing(60, there, 0, {velocity, {0, 0, 0}}, 0.0);  // was here one step ago
+    AddThing(60, here, 0, {-velocity, {0, 0, 0}}, 0.0);  // arrived since
     for (int64_t i = first; i < moving_.count(); ++i) {
       const double t = -1.0 + (i < first + 3 ? step : step + 1) * interval_;
       const double trained = 0.02 * interval_ * random_.NextNormal();
@@ -119,8 +119,8 @@ TEST_F(SharedMotionTest, HandlesEvenNumberOfTimeSteps) {
 TEST_F(SharedMotionTest, IsFiniteAndIndependentOfThreads) {
   AddThing(100, {0, 0, 0}, 0, {{1, 0, 0}, {0, 0, 1}}, 0.5);
   AddThing(50, {1e6, 0, 0}, 1, {{1, 0, 0}, {0, 0, 1}}, 1e6);
-  for (int64_t i = 0; i < 30; ++i) Set(kPositionRow, i, {0.0, 0.0, 0.0});   // all in one place
-  for (int64_t i = 30; i < 60; ++i) moving_.Row(kOpacityRow)[i] = -200.0f;  // not to be seen
+  for (int64_t i = 0; i < 30; ++i) Set(kPositionRow, i, {0.0, 0.0, 0.0});   // all at one position
+  for (int64_t i = 30; i < 60; ++i) moving_.Row(kOpacityRow)[i] = -200.0f;  // invisible
   const ParameterBlock before = moving_;
   Share(0.5, 1);
   const ParameterBlock one = moving_;

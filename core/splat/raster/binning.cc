@@ -176,7 +176,7 @@ void TileBinner::ListVisible(const SplatBuffer& splats, ThreadPool& pool) {
 
 // Radix sort, least significant digit first, of the bits that differ. Each thread takes a
 // contiguous piece and a digit's pieces keep their order: stable, so ties keep the index order,
-// whatever the thread count.
+// for every thread count.
 void TileBinner::SortByDepth(ThreadPool& pool) {
   constexpr int kMostDigitBits = 14;
   constexpr int64_t kWorthSharing = 250'000;  // fewer would share every cache line they write

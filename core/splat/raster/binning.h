@@ -18,7 +18,7 @@ struct TileLists {
   // Entries of tile t: [tile_begin[t], tile_begin[t + 1]), by depth, ties by Gaussian index.
   std::vector<uint32_t> tile_begin;
   std::vector<uint32_t> gaussian;
-  std::vector<uint32_t> pair;        // where this entry's gradient row goes
+  std::vector<uint32_t> pair;        // index of this entry's gradient row
   std::vector<uint32_t> first_pair;  // count + 1; Gaussian i owns pairs [first_pair[i], [i + 1])
 
   int tile_count() const { return tiles_x * tiles_y; }

@@ -19,11 +19,9 @@ class SplatPipeline {
   // leave it in Phase::kOther.
   void set_clock(PhaseClock* clock) { clock_ = clock; }
 
-  // Draws `parameters`; `background` has one number per channel. With `depth_channel` a last
+  // Draws the Gaussians; `background` has one number per channel. With `depth_channel` a last
   // channel holds sum(alpha T depth). Dropped Gaussians have no effect.
-  void Forward(const ParameterBlock& parameters,
-               const ColorSpec& color,
-               const RasterCamera& camera,
+  void Forward(const SplatInput& input,
                const float* background,
                bool depth_channel,
                ThreadPool& pool,
@@ -35,15 +33,11 @@ class SplatPipeline {
   const PlaneBuffer& median_depth() const { return median_depth_; }
   size_t pair_count() const { return lists_.pair_count(); }
 
-  // Gradient by the parameters of the last Forward (same arguments, no depth channel).
-  void Backward(const ParameterBlock& parameters,
-                const ColorSpec& color,
-                const RasterCamera& camera,
+  // Gradient by the parameters of the last Forward (same input, no depth channel).
+  void Backward(const SplatInput& input,
                 const PlaneBuffer& d_color,
-                GradientScope scope,
                 ThreadPool& pool,
-                ParameterBlock& gradient,
-                DensifyStatistics* statistics = nullptr);
+                const GradientOutput& output);
 
  private:
   void Enter(Phase phase) {

@@ -362,48 +362,42 @@ void DensifyStatistics::Reset(int64_t gaussians) {
   radius.assign(static_cast<size_t>(gaussians), 0.0f);
 }
 
-void ProjectSplats(const ParameterBlock& parameters,
-                   const ColorSpec& color,
+void ProjectSplats(const SplatInput& input,
                    bool depth_channel,
-                   const RasterCamera& camera,
                    ThreadPool& pool,
                    SplatBuffer& splats) {
-  splats.channels = color.channels + (depth_channel ? 1 : 0);
+  const size_t count = static_cast<size_t>(input.parameters.count());
+  splats.channels = input.color.channels + (depth_channel ? 1 : 0);
   splats.row_floats = SplatRowFloats(splats.channels);
-  splats.rows.resize(static_cast<size_t>(parameters.count()) * splats.row_floats);
-  splats.depth_key.resize(static_cast<size_t>(parameters.count()));
-  const ForwardContext ctx{parameters, color, depth_channel, camera, splats};
+  splats.rows.resize(count * splats.row_floats);
+  splats.depth_key.resize(count);
+  const ForwardContext ctx{input.parameters, input.color, depth_channel, input.camera, splats};
   const auto project_range = &COLOR3D_KERNEL(ProjectRange);
-  pool.ForRanges((parameters.count() + 15) / 16,
+  pool.ForRanges(input.parameters.blocks(),
                  [&](int64_t begin, int64_t end, int) { project_range(ctx, begin, end); });
 }
 
-void ProjectSplatsBackward(const ParameterBlock& parameters,
-                           const ColorSpec& color,
-                           const RasterCamera& camera,
+void ProjectSplatsBackward(const SplatInput& input,
                            const SplatBuffer& splats,
                            const AlignedFloats& pair_gradient,
                            const std::vector<uint32_t>& first_pair,
-                           GradientScope scope,
                            ThreadPool& pool,
-                           ParameterBlock& gradient,
-                           DensifyStatistics* statistics) {
-  if (gradient.rows() != parameters.rows() || gradient.count() != parameters.count()) {
-    gradient = ParameterBlock(parameters.rows(), parameters.count());
-  }
-  const BackwardContext ctx{GradientRowFloats(color.channels),
-                            kGradientColor + color.channels,
+                           const GradientOutput& output) {
+  const ParameterBlock& parameters = input.parameters;
+  if (!output.parameters.HasShapeOf(parameters)) output.parameters = parameters.ZerosOfSameShape();
+  const BackwardContext ctx{GradientRowFloats(input.color.channels),
+                            kGradientColor + input.color.channels,
                             parameters,
-                            color,
-                            camera,
+                            input.color,
+                            input.camera,
                             splats,
                             pair_gradient.data(),
                             first_pair.data(),
-                            scope,
-                            gradient,
-                            statistics};
+                            output.scope,
+                            output.parameters,
+                            output.statistics};
   const auto backward_range = &COLOR3D_KERNEL(BackwardRange);
-  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(parameters.blocks(), [&](int64_t begin, int64_t end, int) {
     const ScopedFlushToZero flush;
     backward_range(ctx, begin, end);
   });

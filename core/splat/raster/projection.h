@@ -1,6 +1,6 @@
 // Projection of 3D Gaussians to 2D splats and its adjoint (EWA splatting: Zwicker et al. 2001;
 // Kerbl et al. 2023). Internal to the splat module; no Eigen here, because the kernels are compiled
-// once per instruction set. All functions are deterministic whatever the thread count.
+// once per instruction set. All functions are deterministic for every thread count.
 #pragma once
 
 #include <cstdint>
@@ -42,16 +42,21 @@ constexpr int SplatRowFloats(int channels) { return channels <= 2 ? 8 : 12; }
 constexpr int GradientRowFloats(int channels) { return kGradientColor + channels <= 8 ? 8 : 12; }
 
 struct SplatBuffer {
-  int channels = 0;  // colour channels, and one for depth when asked for
+  int channels = 0;  // colour channels, and one for depth if requested
   int row_floats = 8;
   AlignedFloats rows;               // one row per Gaussian
   std::vector<uint32_t> depth_key;  // bits of the camera depth; 0: not visible
 };
 
-void ProjectSplats(const ParameterBlock& parameters,
-                   const ColorSpec& color,
+// Gaussians and the camera that sees them.
+struct SplatInput {
+  const ParameterBlock& parameters;
+  const ColorSpec& color;
+  const RasterCamera& camera;
+};
+
+void ProjectSplats(const SplatInput& input,
                    bool depth_channel,
-                   const RasterCamera& camera,
                    ThreadPool& pool,
                    SplatBuffer& splats);
 
@@ -75,19 +80,21 @@ struct DensifyStatistics {
 // The parameters whose gradients are computed.
 enum class GradientScope { kAll, kColorOnly };
 
+struct GradientOutput {
+  GradientScope scope;
+  // Gets the shape of the parameters. Rows out of scope and Gaussians that are not visible get
+  // zeros.
+  ParameterBlock& parameters;
+  DensifyStatistics* statistics = nullptr;  // may be null
+};
+
 // `pair_gradient` holds one gradient row of GradientRowFloats(channels) for each (Gaussian, tile)
 // pair; those of Gaussian i are [first_pair[i], first_pair[i + 1]).
-// `gradient` gets the shape of `parameters`; rows out of scope and Gaussians that are not visible
-// get zeros. `statistics` may be null.
-void ProjectSplatsBackward(const ParameterBlock& parameters,
-                           const ColorSpec& color,
-                           const RasterCamera& camera,
+void ProjectSplatsBackward(const SplatInput& input,
                            const SplatBuffer& splats,
                            const AlignedFloats& pair_gradient,
                            const std::vector<uint32_t>& first_pair,
-                           GradientScope scope,
                            ThreadPool& pool,
-                           ParameterBlock& gradient,
-                           DensifyStatistics* statistics);
+                           const GradientOutput& output);
 
 }  // namespace color3d

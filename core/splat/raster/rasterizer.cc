@@ -400,13 +400,16 @@ void RasterizeForward(const SplatBuffer& splats,
                       const TileLists& lists,
                       const float* background,
                       ThreadPool& pool,
-                      PlaneBuffer& color,
-                      PlaneBuffer* transmittance,
-                      PlaneBuffer* median_depth,
+                      const RasterizedPlanes& planes,
                       std::vector<uint16_t>& block_masks) {
   block_masks.resize(lists.pair_count() + 16);
-  const ForwardJob job{
-      splats, lists, background, color, transmittance, median_depth, block_masks.data()};
+  const ForwardJob job{splats,
+                       lists,
+                       background,
+                       planes.color,
+                       planes.transmittance,
+                       planes.median_depth,
+                       block_masks.data()};
   const auto forward_tile = &COLOR3D_KERNEL(ForwardTileAt);
   pool.ForEach(lists.tile_count(), [&](int64_t index, int) { forward_tile(job, index); });
 }

@@ -110,7 +110,7 @@ TEST_P(RasterTest, PictureAgreesWithFloat64Reference) {
   const ParameterBlock p = RandomGaussians(200, 3);
   const ColorSpec color = TestColor(channels);
   SplatPipeline pipeline;
-  pipeline.Forward(p, color, camera, kBackground, true, pool);
+  pipeline.Forward({p, color, camera}, kBackground, true, pool);
   const ReferenceImage image =
       ReferenceRender(ReferenceParameters::From(p), color, camera, kBackground64);
   double worst = 0.0, worst_depth = 0.0, spread = 0.0;
@@ -141,9 +141,9 @@ TEST_P(RasterTest, GradientsAgreeWithFiniteDifferencesOfTheReference) {
   const ColorSpec color = TestColor(channels);
   const PlaneBuffer weights = RandomWeights(width, height, channels, 5);
   SplatPipeline pipeline;
-  pipeline.Forward(p, color, camera, kBackground, false, pool);
+  pipeline.Forward({p, color, camera}, kBackground, false, pool);
   ParameterBlock gradient;
-  pipeline.Backward(p, color, camera, weights, GradientScope::kAll, pool, gradient);
+  pipeline.Backward({p, color, camera}, weights, pool, {GradientScope::kAll, gradient});
   ReferenceParameters r = ReferenceParameters::From(p);
   const auto value = [&] {
     return WeightedSum(ReferenceRender(r, color, camera, kBackground64), weights);
@@ -211,7 +211,7 @@ TEST_P(RasterTest, DroppedGaussiansHaveNoEffect) {
   ASSERT_LT(kept.size(), 38u);
   const PlaneBuffer weights = RandomWeights(width, height, channels, 5);
   SplatPipeline pipeline;
-  pipeline.Forward(p, color, camera, kBackground, false, pool, dropping);
+  pipeline.Forward({p, color, camera}, kBackground, false, pool, dropping);
   const ReferenceImage image = ReferenceRender(r, color, camera, kBackground64);
   std::vector<ReferencePixel> pixels;
   std::vector<std::array<double, 3>> d_color;
@@ -229,7 +229,7 @@ TEST_P(RasterTest, DroppedGaussiansHaveNoEffect) {
     }
   }
   ParameterBlock gradient;
-  pipeline.Backward(p, color, camera, weights, GradientScope::kAll, pool, gradient);
+  pipeline.Backward({p, color, camera}, weights, pool, {GradientScope::kAll, gradient});
   ReferenceParameters expected =
       ReferenceGradient(r, color, camera, kBackground64, pixels, d_color);
   for (int k = 0; k < r.count; ++k) {  // by the logit before the factor
@@ -247,12 +247,12 @@ TEST_P(RasterTest, DroppedGaussiansHaveNoEffect) {
     }
     for (int i = 0; i < p.count(); ++i) sum_all += std::abs(gradient.Row(row)[i]);
     EXPECT_LE(worst, 1e-3 * scale) << "row " << row;
-    EXPECT_DOUBLE_EQ(sum_all, sum_kept) << "row " << row;  // what is dropped learns nothing
+    EXPECT_DOUBLE_EQ(sum_all, sum_kept) << "row " << row;  // dropped Gaussians have no gradient
   }
 }
 
-// Moving the principal point moves all centres alike, so a picture of one Gaussian gives dL/d(u, v)
-// by finite differences of the reference.
+// Moving the principal point moves all centres equally, so a picture of one Gaussian gives dL/d(u,
+// v) by finite differences of the reference.
 TEST_P(RasterTest, ScreenGradientsAgreeWithTheReference) {
   ThreadPool pool(2);
   const int channels = TestCase(), width = 41, height = 35;
@@ -289,11 +289,12 @@ TEST_P(RasterTest, ScreenGradientsAgreeWithTheReference) {
       plain[axis] *= 0.5 * (axis == 0 ? width : height);
     }
     SplatPipeline pipeline;
-    pipeline.Forward(p, color, camera, kBackground, false, pool);
+    pipeline.Forward({p, color, camera}, kBackground, false, pool);
     DensifyStatistics statistics;
     statistics.Reset(1);
     ParameterBlock gradient;
-    pipeline.Backward(p, color, camera, weights, GradientScope::kAll, pool, gradient, &statistics);
+    pipeline.Backward(
+        {p, color, camera}, weights, pool, {GradientScope::kAll, gradient, &statistics});
     const double norm = std::hypot(plain[0], plain[1]);
     EXPECT_GT(norm, 0.1);
     EXPECT_NEAR(statistics.gradient[0], norm, 3e-3 * std::hypot(sums[0], sums[1]));
@@ -314,9 +315,9 @@ TEST(RasterizerTest, IsIndependentOfTilesAndThreads) {
   for (int run = 0; run < 2; ++run) {
     ThreadPool pool(run == 0 ? 1 : 3);
     SplatPipeline pipeline;
-    pipeline.Forward(p, color, camera, kBackground, false, pool);
+    pipeline.Forward({p, color, camera}, kBackground, false, pool);
     pictures[run] = pipeline.color().data;
-    pipeline.Backward(p, color, camera, weights, GradientScope::kAll, pool, gradients[run]);
+    pipeline.Backward({p, color, camera}, weights, pool, {GradientScope::kAll, gradients[run]});
   }
   EXPECT_EQ(pictures[0], pictures[1]);
   EXPECT_EQ(gradients[0].values(), gradients[1].values());
@@ -329,10 +330,10 @@ TEST(RasterizerTest, ColorOnlyGradientEqualsFullGradient) {
   const ColorSpec color = TestColor(2);
   const PlaneBuffer weights = RandomWeights(64, 48, 2, 6);
   SplatPipeline pipeline;
-  pipeline.Forward(p, color, camera, kBackground, false, pool);
+  pipeline.Forward({p, color, camera}, kBackground, false, pool);
   ParameterBlock all, only;
-  pipeline.Backward(p, color, camera, weights, GradientScope::kAll, pool, all);
-  pipeline.Backward(p, color, camera, weights, GradientScope::kColorOnly, pool, only);
+  pipeline.Backward({p, color, camera}, weights, pool, {GradientScope::kAll, all});
+  pipeline.Backward({p, color, camera}, weights, pool, {GradientScope::kColorOnly, only});
   for (int i = 0; i < p.count(); ++i) {
     EXPECT_EQ(only.Row(kPositionRow)[i], 0.0f);
     for (int k = 0; k < 8; ++k) EXPECT_EQ(only.Row(kColorRow + k)[i], all.Row(kColorRow + k)[i]);

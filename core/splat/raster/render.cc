@@ -20,7 +20,7 @@ RenderedView RenderView(const GaussianModel& model,
   const RasterCamera raster_camera = MakeRasterCamera(camera, cam_from_world);
   const float background[3] = {background_l, kNeutralChroma, kNeutralChroma};
   SplatPipeline pipeline;
-  pipeline.Forward(parameters, color, raster_camera, background, true, pool);
+  pipeline.Forward({parameters, color, raster_camera}, background, true, pool);
   RenderedView view;
   view.lab = Image(camera.width, camera.height, model.channels);
   view.depth = Image(camera.width, camera.height, 1);

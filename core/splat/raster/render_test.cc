@@ -41,7 +41,7 @@ TEST(RenderViewTest, ReturnsLabDepthAndOpacity) {
   EXPECT_THROW(RenderView(m, camera, Pose(), pool), Error);
 }
 
-// Two Gaussians one behind the other; what counts is how much the nearer one hides.
+// Two Gaussians, one behind the other, with the nearer one of different opacities.
 TEST(RenderViewTest, MedianDepthIsWhereHalfIsOccluded) {
   ThreadPool pool(1);
   GaussianModel m;
@@ -53,7 +53,7 @@ TEST(RenderViewTest, MedianDepthIsWhereHalfIsOccluded) {
   const Camera camera{41, 31, 40.0, 40.0, 20.5, 15.5};
   const auto drawn = [&] { return RenderView(m, camera, Pose(), pool); };
   EXPECT_NEAR(drawn().median_depth.At(0, 15, 20), 4.0f, 1e-4);
-  EXPECT_NEAR(drawn().depth.At(0, 15, 20), 3.2f, 0.1f);  // in between, where nothing is
+  EXPECT_NEAR(drawn().depth.At(0, 15, 20), 3.2f, 0.1f);  // in the gap between both
   m.opacity_logit[0] = 0.5f;
   EXPECT_NEAR(drawn().median_depth.At(0, 15, 20), 2.0f, 1e-4);
   m.opacity_logit = {-2.0f, -2.0f};

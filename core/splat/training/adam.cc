@@ -81,7 +81,7 @@ bool AdamStep(const ParameterBlock& gradient,
   const float root_correction = static_cast<float>(1.0 / std::sqrt(bias2));
   const auto update_row = &COLOR3D_KERNEL(UpdateRow);
   std::atomic<bool> finite{true};
-  pool.ForRanges((parameters.count() + 15) / 16, [&](int64_t begin, int64_t end, int) {
+  pool.ForRanges(parameters.blocks(), [&](int64_t begin, int64_t end, int) {
     const ScopedFlushToZero flush;
     for (int row = 0; row < parameters.rows(); ++row) {
       if (learning_rates[row] == 0.0f) continue;

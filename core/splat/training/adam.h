@@ -1,5 +1,5 @@
 // Adam (Kingma & Ba 2015) over planar parameters, one learning rate per row. Internal to the splat
-// module; deterministic whatever the thread count.
+// module; deterministic for every thread count.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,6 @@
 #include "core/splat/training/checkpoint.h"
 
+#include <cstring>
 #include <utility>
 
 #include "core/base/digest.h"
@@ -18,10 +19,6 @@ CheckpointWriter::CheckpointWriter(std::string_view fingerprint) {
   Text(fingerprint);
 }
 
-void CheckpointWriter::Floats(const float* values, size_t count) {
-  bytes_.append(reinterpret_cast<const char*>(values), count * sizeof(float));
-}
-
 void CheckpointWriter::Text(std::string_view text) {
   Value<uint64_t>(text.size());
   bytes_.append(text);
@@ -30,12 +27,7 @@ void CheckpointWriter::Text(std::string_view text) {
 void CheckpointWriter::Block(const ParameterBlock& block) {
   Value<int32_t>(block.rows());
   Value<int64_t>(block.count());
-  for (int r = 0; r < block.rows(); ++r) Floats(block.Row(r), block.count());
-}
-
-void CheckpointWriter::Vector(const AlignedFloats& values) {
-  Value<uint64_t>(values.size());
-  Floats(values.data(), values.size());
+  for (int r = 0; r < block.rows(); ++r) Append(block.Row(r), block.count());
 }
 
 std::string CheckpointWriter::Finish() && {
@@ -59,27 +51,23 @@ std::string_view CheckpointReader::Text() {
   return text;
 }
 
-ParameterBlock CheckpointReader::Block() {
-  const int32_t rows = Value<int32_t>();
-  const int64_t count = Value<int64_t>();
+void CheckpointReader::Block(ParameterBlock& block) {
+  int32_t rows = 0;
+  int64_t count = 0;
+  Value(rows);
+  Value(count);
   if (rows < 0 || rows > 256 || count < 0 || count > (int64_t{1} << 32) ||
       !Has(static_cast<uint64_t>(rows) * static_cast<uint64_t>(count) * sizeof(float))) {
     ok_ = false;
-    return {};
+    return;
   }
-  ParameterBlock block(rows, count);
+  block = ParameterBlock(rows, count);
   for (int r = 0; r < rows; ++r) Copy(block.Row(r), count * sizeof(float));
-  return block;
-}
-
-AlignedFloats CheckpointReader::Vector() {
-  AlignedFloats values(Count(sizeof(float)));
-  Copy(values.data(), values.size() * sizeof(float));
-  return values;
 }
 
 uint64_t CheckpointReader::Count(size_t item_bytes) {
-  const uint64_t count = Value<uint64_t>();
+  uint64_t count = 0;
+  Value(count);
   ok_ = ok_ && count <= rest_.size() / item_bytes;
   return ok_ ? count : 0;
 }

@@ -31,8 +31,20 @@ struct TrainingState {
   double elapsed_seconds = 0.0;  // of training, over all attempts; set when saved
 };
 
-void WriteState(const TrainingState& state, CheckpointWriter& writer);
-// Sets reader.ok() to false on a failure.
-void ReadState(CheckpointReader& reader, TrainingState& state);
+// Visits all values in the order of checkpoints. `archive`: CheckpointWriter or CheckpointReader.
+template <class Archive, class State>
+void VisitState(Archive& archive, State& state) {
+  archive.Block(state.parameters);
+  archive.Block(state.moments.first);
+  archive.Block(state.moments.second);
+  archive.Value(state.random);
+  archive.Vector(state.order.views);
+  archive.Value(state.order.next);
+  archive.Value(state.iteration);
+  archive.Value(state.rate_scale);
+  archive.Value(state.restores);
+  archive.Value(state.mean_error);
+  archive.Value(state.elapsed_seconds);
+}
 
 }  // namespace color3d

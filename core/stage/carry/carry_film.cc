@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "core/stage/carry/carry_by_kind.h"
 #include "core/stage/carry/carry_results.h"
 #include "core/stage/film/between_anchors.h"
+#include "core/stage/film/frames_of_views.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_checkpoint.h"
 #include "core/stage/formats/key_views.h"
@@ -42,16 +44,14 @@ CarriedColor CarriedToFrame(const FilmFrames& frames,
       between.shot[i] = -1 - i;
     }
   }
-  CarryAlongFilm(
-      between,
-      {*std::find_if(
-          keys.begin(), keys.end(), [&](const FilmKey& key) { return key.frame == nearest; })},
-      options,
-      context.pool(),
-      context.cancel(),
-      [&](int at, const CarriedColor& carried) {
-        if (at == frame) color = carried;
-      });
+  CarryAlongFilm(between,
+                 {*std::ranges::find(keys, nearest, &FilmKey::frame)},
+                 options,
+                 context.pool(),
+                 context.cancel(),
+                 [&](int at, const CarriedColor& carried) {
+                   if (at == frame) color = carried;
+                 });
   return color;
 }
 
@@ -81,12 +81,9 @@ std::vector<FilmKey> ReadFilmKeys(const CarryInputs& inputs,
 void CarryFilm(const CarryInputs& inputs, StageContext& context) {
   const CarryColorOptions& options = inputs.options;
   const ViewImages images(inputs.scene, context.scene_folder(), options.max_side_px, kCacheBytes);
-  FilmFrames frames;
-  for (const View& view : inputs.scene.views) {
-    frames.shot.push_back(view.moment->shot);
-    frames.time_s.push_back(view.time_s());
-  }
-  frames.luminance = [&](int frame) { return images.Luminance(frame); };
+  std::vector<int> views(inputs.scene.views.size());
+  std::iota(views.begin(), views.end(), 0);
+  const FilmFrames frames = FramesOfViews(inputs.scene, views, images);
   const std::vector<FilmKey> keys = ReadFilmKeys(inputs, frames, images, context);
   CarryCheckpoint done(inputs.scene, context);
   const FilmResume resume{done.Walks(), [&](const FilmWalk& walk) { done.SetWalk(walk); }};

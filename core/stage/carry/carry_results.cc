@@ -16,7 +16,7 @@ constexpr double kSmallCoverage = 0.01;  // below, the user is warned
 double MeanCoverage(const std::vector<double>& coverage, const std::vector<int>& key_views) {
   double sum = 0.0;
   for (size_t i = 0; i < coverage.size(); ++i) {
-    if (std::find(key_views.begin(), key_views.end(), static_cast<int>(i)) == key_views.end()) {
+    if (std::ranges::find(key_views, static_cast<int>(i)) == key_views.end()) {
       sum += coverage[i];
     }
   }
@@ -39,10 +39,10 @@ void WriteCoverage(const CarryInputs& inputs,
   for (size_t i = 0; i < coverage.size(); ++i) facts.view_coverage[views[i].name] = coverage[i];
   context.progress().OnError(0, "coverage", mean);
   if (mean < kSmallCoverage) {
-    context.progress().OnWarning(
-        fmt::format("the key view shows only {:.1f} % of what the other views show; their colours "
-                    "are inferred from similarity. Colour a second key view, or choose another one",
-                    100.0 * mean));
+    context.Warn(
+        "the key view shows only {:.1f} % of what the other views show; their colours "
+        "are inferred from similarity. Colour a second key view, or choose another one",
+        100.0 * mean);
   }
   WriteCarryFacts(facts, context);
 }

@@ -5,11 +5,11 @@
 
 #include "core/image/codec.h"
 #include "core/scene/photo_masks.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/carry/carry_results.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_checkpoint.h"
 #include "core/stage/formats/key_views.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {
@@ -18,7 +18,7 @@ SurfaceRenderer RendererOf(const Scene& scene, const GaussianModel& geometry) {
   return [&scene, &geometry](int index, const Camera& camera) {
     ThreadPool one(1);
     const View& view = scene.views[index];
-    RenderedView seen = RenderView(geometry, camera, view.cam_from_world, one, 0.0f, view.time_s());
+    RenderedView seen = RenderView(geometry, view, camera, one);
     return RenderedSurface{std::move(seen.median_depth), std::move(seen.opacity)};
   };
 }
@@ -43,7 +43,7 @@ std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
   const ViewImages& images = surfaces.images();
   std::vector<ColoredKeyView> keys;
   for (const int view : inputs.key_views) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     ColoredKeyView key{view, surfaces.Of(view), {}};
     if (keys.empty()) {
       const Camera& camera = key.surfaces.rendered.camera;
@@ -64,12 +64,11 @@ void CarryIntoViews(const CarryInputs& inputs,
                     StageContext& context) {
   CarryCheckpoint done(inputs.scene, context);
   const std::vector<int> order = inputs.scene.ViewsInOrderOfTime();
-  context.pool().ForEach(static_cast<int64_t>(order.size()), [&](int64_t index, int) {
-    context.cancel().ThrowIfCancelled();
+  context.pool().ForEach(std::ssize(order), [&](int64_t index, int) {
+    context.ThrowIfCancelled();
     const int view = order[index];
     if (done.WasDone(view)) return;
-    const auto key = std::find_if(
-        keys.begin(), keys.end(), [&](const ColoredKeyView& k) { return k.view == view; });
+    const auto key = std::ranges::find(keys, view, &ColoredKeyView::view);
     const bool is_key = key != keys.end();
     const CarriedColor color = is_key ? key->color : carry(view);
     done.Add(view, is_key ? 1.0 : CoveredShare(color), EncodeAbPng(color.ab, color.confidence));

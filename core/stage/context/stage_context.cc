@@ -20,8 +20,7 @@ ThreadPool& StageContext::pool() {
 }
 
 int64_t StageContext::MemoryBytes() const {
-  // Other processes of this machine must be able to grow, too; of what is this process's alone, a
-  // little is left to what grows meanwhile.
+  // The rest is a reserve: for other processes, and for growth of this one meanwhile.
   constexpr double kShareOfMachine = 0.6, kShareOfOwn = 0.9;
   if (setup_.memory_bytes > 0) return setup_.memory_bytes;
   return static_cast<int64_t>(
@@ -61,11 +60,11 @@ std::shared_ptr<const Encoder> StageContext::LoadEncoder(const std::string& mode
 std::filesystem::path StageContext::Input(const std::string& name) const {
   const auto found = setup_.inputs.find(name);
   if (found == setup_.inputs.end()) {
-    const Stage* maker = FindProducer(name);
+    const Stage* writer = FindProducer(name);
     throw Error(ErrorCode::kFailedPrecondition,
-                "this stage needs {}, which a {} job makes: name one among the inputs",
+                "this stage needs {}, which {} writes: name such a job among the inputs",
                 name,
-                maker != nullptr ? maker->kind : "another");
+                writer != nullptr ? writer->kind : "another stage");
   }
   return found->second;
 }
@@ -80,7 +79,7 @@ std::vector<std::string> StageContext::InputsBelow(std::string_view prefix) cons
 
 std::string StageContext::ReadInput(const std::string& name) const { return ReadFile(Input(name)); }
 
-std::filesystem::path StageContext::PlaceFor(const std::string& name) const {
+std::filesystem::path StageContext::OutputPath(const std::string& name) const {
   if (!IsSafeRelativePath(name)) {
     throw InvalidArgument("\"{}\" cannot name an artifact; rename the photo", name);
   }
@@ -91,7 +90,7 @@ std::filesystem::path StageContext::PlaceFor(const std::string& name) const {
 }
 
 void StageContext::WriteOutput(const std::string& name, std::string_view bytes) {
-  WriteFileAtomic(PlaceFor(name), bytes);
+  WriteFileAtomic(OutputPath(name), bytes);
   outputs_.push_back(name);
 }
 
@@ -100,11 +99,11 @@ std::string StageContext::ReadOutput(const std::string& name) const {
 }
 
 void StageContext::RewriteOutput(const std::string& name, std::string_view bytes) {
-  WriteFileAtomic(PlaceFor(name), bytes);
+  WriteFileAtomic(OutputPath(name), bytes);
 }
 
-void StageContext::TakeOutput(const std::string& name, const std::filesystem::path& file) {
-  PublishFile(file, PlaceFor(name));
+void StageContext::MoveOutput(const std::string& name, const std::filesystem::path& file) {
+  PublishFile(file, OutputPath(name));
   outputs_.push_back(name);
 }
 

@@ -1,7 +1,8 @@
-// What every stage is given and leaves: files in, named files out. One source per stage beside this
-// one, named as its kind: typed options in, artifacts out; threads, checkpoints, progress and
-// cancellation come from the context.
+// Inputs, outputs and services of a running stage: named files in and out, threads, checkpoints,
+// progress and cancellation.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <cstdint>
 #include <filesystem>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/base/run_control.h"
@@ -25,20 +27,19 @@ class StageContext {
   struct Setup {
     std::filesystem::path scene_folder;                   // the scene's files, read-only
     std::map<std::string, std::filesystem::path> inputs;  // artifacts of earlier stages by name
-    std::filesystem::path output_folder;   // artifacts are left here under their names
-    std::filesystem::path scratch_folder;  // free to use, deleted by the caller
+    std::filesystem::path output_folder;   // receives the artifacts under their names
+    std::filesystem::path scratch_folder;  // for temporary files; the caller deletes it
     int threads = 1;
     uint64_t seed = 1;
-    // That the stage may take. 0: 60 % of what the machine has left, and not more than 90 % of what
-    // this process's own limit leaves.
+    // Memory budget. 0: 60 % of the machine's available memory, at most 90 % of the memory that the
+    // limit of this process leaves.
     int64_t memory_bytes = 0;
     std::map<std::string, std::filesystem::path> models;  // the user's weights, by name
     RemoteColorizerFactory remote_colorizers;             // the user's model servers; may be empty
     std::string attempt;                                  // unique to this run, e.g. "jobs/3f/2"
-    // Kept between jobs (FileCache); empty: none.
-    std::filesystem::path cache_folder = {};
-    SceneBatch* batch = nullptr;  // that personalization takes part in; null: alone
-    std::string project = {};     // of the job's owner; scenes in the batch take turns by project
+    std::filesystem::path cache_folder = {};  // kept between jobs (FileCache); empty: none
+    SceneBatch* batch = nullptr;              // batch of personalizations; null: none
+    std::string project = {};  // project of the job; scenes in a batch take turns by project
   };
 
   // The references must outlive the context.
@@ -49,18 +50,18 @@ class StageContext {
 
   const std::filesystem::path& scene_folder() const { return setup_.scene_folder; }
   const std::filesystem::path& scratch_folder() const { return setup_.scratch_folder; }
-  // The threads of this run, started when they are first asked for. For the calling thread.
+  // Threads of this run, started at the first call. Not thread-safe.
   ThreadPool& pool();
-  // What long computations are given.
+  // The services of this context for long computations.
   RunControl control() { return {pool(), checkpoints_, progress_, cancel_}; }
   uint64_t seed() const { return setup_.seed; }
   int64_t MemoryBytes() const;
   const std::string& attempt() const { return setup_.attempt; }
-  // File of the user's weights. Throws Error{kFailedPrecondition} naming those that there are.
+  // File of the user's weights. Throws Error{kFailedPrecondition} with the known names.
   std::filesystem::path Model(const std::string& name) const;
-  // A model server of the user's. Throws as Model.
+  // Connection to a model server of the user. Throws as Model.
   std::unique_ptr<RemoteColorizer> Remote(const std::string& name) const;
-  // The encoder of these weights, loaded anew; the embedded one when `model` is empty.
+  // Loads the encoder of these weights; returns the embedded one if `model` is empty.
   std::shared_ptr<const Encoder> LoadEncoder(const std::string& model) const;
   const std::filesystem::path& cache_folder() const { return setup_.cache_folder; }
   SceneBatch* batch() const { return setup_.batch; }
@@ -68,10 +69,21 @@ class StageContext {
   CheckpointStore& checkpoints() { return checkpoints_; }
   ProgressObserver& progress() { return progress_; }
   const CancellationToken& cancel() const { return cancel_; }
+  void ThrowIfCancelled() const { cancel_.ThrowIfCancelled(); }
+  void ReportProgress(int64_t step, int64_t total, const std::string& message) {
+    progress_.OnProgress(step, total, message);
+  }
+  // Shows the user a warning, which the report repeats.
+  void Warn(const std::string& message) { progress_.OnWarning(message); }
+  // Formats the warning with fmt.
+  template <typename First, typename... Rest>
+  void Warn(fmt::format_string<First, Rest...> message, First&& first, Rest&&... rest) {
+    Warn(fmt::format(message, std::forward<First>(first), std::forward<Rest>(rest)...));
+  }
 
   bool HasInput(const std::string& name) const { return setup_.inputs.contains(name); }
-  // File of an input artifact. Throws Error{kFailedPrecondition} naming the artifact and the stage
-  // that makes it.
+  // File of an input artifact. Throws Error{kFailedPrecondition} with the artifact and the stage
+  // that writes it.
   std::filesystem::path Input(const std::string& name) const;
   // Names of the inputs that begin with `prefix`, sorted.
   std::vector<std::string> InputsBelow(std::string_view prefix) const;
@@ -79,20 +91,21 @@ class StageContext {
 
   // Writes an artifact, atomically.
   void WriteOutput(const std::string& name, std::string_view bytes);
-  // What was written under that name, and other bytes in its place.
+  // Reads an artifact that this stage has written.
   std::string ReadOutput(const std::string& name) const;
+  // Replaces such an artifact, atomically.
   void RewriteOutput(const std::string& name, std::string_view bytes);
-  // As WriteOutput for a finished file in the scratch folder, which is moved.
-  void TakeOutput(const std::string& name, const std::filesystem::path& file);
-  // An input that this stage publishes again under its name.
+  // Publishes a finished file of the scratch folder, which is moved.
+  void MoveOutput(const std::string& name, const std::filesystem::path& file);
+  // Publishes an input again under its name.
   void ForwardInput(const std::string& name);
 
   const std::vector<std::string>& outputs() const { return outputs_; }
   const std::vector<std::string>& passed_on() const { return passed_on_; }
 
  private:
-  // Where an artifact of this name goes; its folder is there.
-  std::filesystem::path PlaceFor(const std::string& name) const;
+  // Path of an output. Creates its folder.
+  std::filesystem::path OutputPath(const std::string& name) const;
 
   Setup setup_;
   CheckpointStore& checkpoints_;

@@ -9,7 +9,7 @@
 namespace color3d {
 namespace {
 
-TEST_F(StageTest, AMissingInputNamesTheStageThatMakesIt) {
+TEST_F(StageTest, NamesTheStageThatWritesAMissingInput) {
   const StageContext context = MakeContext();
   try {
     context.Input(artifact::kColorizer);
@@ -20,7 +20,7 @@ TEST_F(StageTest, AMissingInputNamesTheStageThatMakesIt) {
   }
 }
 
-TEST_F(StageTest, OutputsStayInsideTheirFolder) {
+TEST_F(StageTest, RefusesOutputsOutsideTheFolder) {
   StageContext context = MakeContext();
   EXPECT_THROW(context.WriteOutput("../escape", "x"), Error);
   context.WriteOutput("views/a.png", "x");
@@ -28,7 +28,7 @@ TEST_F(StageTest, OutputsStayInsideTheirFolder) {
   EXPECT_EQ(ReadFile(scratch_.path() / "out/views/a.png"), "x");
 }
 
-TEST_F(StageTest, NamesThatAreNotThereAreListedWithTheRemedy) {
+TEST_F(StageTest, ListsModelsForAnUnknownName) {
   models_ = {{"clip", scratch_.path() / "clip"}};
   const StageContext context = MakeContext();
   EXPECT_EQ(context.Model("clip"), scratch_.path() / "clip");

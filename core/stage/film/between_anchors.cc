@@ -53,7 +53,7 @@ InferredColor InferBetweenAnchors(const CarriedColor& of_anchors,
 FilmKey AnchorAsKey(int frame, const FusedColor& color) {
   const int width = color.ab.width, height = color.ab.height;
   Image channels(width, height, kColorChannels);
-  std::copy(color.ab.data.begin(), color.ab.data.end(), channels.data.begin());
+  std::ranges::copy(color.ab.data, channels.data.begin());
   for (size_t i = 0; i < channels.PlaneSize(); ++i) {
     const float guessed = color.provenance.Plane(kGuessedPlane)[i],
                 inferred = color.provenance.Plane(kInferredPlane)[i];
@@ -122,7 +122,7 @@ FusedColor ColorBetweenAnchors(const Image& luminance,
     return InferBetweenAnchors(of_anchors, carried_surely, l, sources);
   };
   ThreadPool one(1);
-  FusedColor fused = ColorOfView(luminance, carried, with_anchors, one, cancel);
+  FusedColor fused = FuseViewColor(luminance, carried, with_anchors, one, cancel);
   // Guessed colours of an anchor count as guessed here, too.
   for (size_t i = 0; i < fused.provenance.PlaneSize(); ++i) {
     if (of_anchors.confidence.data[i] <= kDecisiveConfidence) continue;

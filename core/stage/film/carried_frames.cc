@@ -9,6 +9,7 @@
 #include "core/base/files.h"
 #include "core/image/codec.h"
 #include "core/stage/film/between_anchors.h"
+#include "core/stage/film/frames_of_views.h"
 
 namespace color3d {
 CarriedFrames::CarriedFrames(const Scene& scene,
@@ -21,35 +22,27 @@ CarriedFrames::CarriedFrames(const Scene& scene,
       has_(scene.views.size(), 0) {
   std::filesystem::create_directories(folder_);
   const std::vector<int> order = scene.ViewsInOrderOfTime();
-  FilmFrames frames;
-  for (const int view : order) {
-    frames.shot.push_back(scene.views[view].moment->shot);
-    frames.time_s.push_back(scene.views[view].time_s());
-  }
-  frames.luminance = [&](int frame) { return images.Luminance(order[frame]); };
   std::vector<FilmKey> film_keys;
   for (const ColoredKeyView& key : keys) {
-    const auto frame = std::find(order.begin(), order.end(), key.view) - order.begin();
+    const auto frame = std::ranges::find(order, key.view) - order.begin();
     film_keys.push_back({static_cast<int>(frame), key.color});
   }
-  CarryAlongFilm(
-      frames,
-      film_keys,
-      options,
-      context.pool(),
-      context.cancel(),
-      [&](int frame, const CarriedColor& color) {
-        const int view = order[frame];
-        WriteFileAtomic(FileOf(view), EncodeAbPng(color.ab, color.confidence));
-        has_[view] = 1;
-      },
-      {},
-      [&](int frame, const CarriedColor& second) {
-        const int view = order[frame];
-        CarriedColor color = Of(view);
-        if (FillUncertain(second, &color) == 0) return;
-        WriteFileAtomic(FileOf(view), EncodeAbPng(color.ab, color.confidence));
-      });
+  const auto keep = [&](int frame, const CarriedColor& color) {
+    const int view = order[frame];
+    WriteFileAtomic(FileOf(view), EncodeAbPng(color.ab, color.confidence));
+    has_[view] = 1;
+  };
+  CarryAlongFilm(FramesOfViews(scene, order, images),
+                 film_keys,
+                 options,
+                 context.pool(),
+                 context.cancel(),
+                 keep,
+                 {},
+                 [&](int frame, const CarriedColor& second) {
+                   CarriedColor color = Of(order[frame]);
+                   if (FillUncertain(second, &color) > 0) keep(frame, color);
+                 });
 }
 
 std::vector<int> CarriedFrames::NearestTo(int view) const {

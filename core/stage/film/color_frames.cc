@@ -13,9 +13,9 @@
 #include "core/carry/confidence.h"
 #include "core/film/anchor_frames.h"
 #include "core/film/film_carry.h"
-#include "core/film/steady_colors.h"
-#include "core/image/optical_flow.h"
 #include "core/stage/film/between_anchors.h"
+#include "core/stage/film/frames_of_views.h"
+#include "core/stage/film/steady_frames.h"
 #include "core/stage/formats/artifact_io.h"
 
 namespace color3d {
@@ -29,25 +29,16 @@ struct ShotToColor {
   std::vector<int> frames;
   std::vector<int> anchors;
 
-  bool IsAnchor(int frame) const {
-    return std::binary_search(anchors.begin(), anchors.end(), frame);
-  }
+  bool IsAnchor(int frame) const { return std::ranges::binary_search(anchors, frame); }
   // The last anchor up to a frame and the first one after it; -1 where there is none.
   int AnchorUpTo(int frame) const {
-    const auto next = std::upper_bound(anchors.begin(), anchors.end(), frame);
+    const auto next = std::ranges::upper_bound(anchors, frame);
     return next == anchors.begin() ? -1 : *(next - 1);
   }
   int AnchorBehind(int frame) const {
-    const auto next = std::upper_bound(anchors.begin(), anchors.end(), frame);
+    const auto next = std::ranges::upper_bound(anchors, frame);
     return next == anchors.end() ? -1 : *next;
   }
-};
-
-// A coloured frame before averaging along flow.
-struct Colored {
-  int frame = 0;
-  FusedColor color;
-  std::shared_ptr<const FlowPair> flow_from_last;
 };
 
 constexpr double kWorthGuessing = 0.02;  // least guessed share of an anchor
@@ -72,20 +63,20 @@ class ShotColorer {
  public:
   ShotColorer(const ShotToColor& shot,
               const FilmFrames& frames,
-              const std::vector<NearKeyFrames>& near,
               const std::vector<int>& view_of_frame,
               const FrameColoring& coloring,
               const Scene& scene,
               const ViewImages& images,
+              std::vector<NearKeyFrames> near,
               StageContext& context)
       : shot_(shot),
         frames_(frames),
-        near_(near),
         view_of_frame_(view_of_frame),
         coloring_(coloring),
         scene_(scene),
         images_(images),
-        context_(context) {}
+        context_(context),
+        steady_(std::move(near), [this](int frame) { return WasDone(frame); }) {}
 
   void Run() {
     size_t begin = FirstUncoloredFrame();
@@ -94,20 +85,24 @@ class ShotColorer {
       Color({shot_.frames.begin() + static_cast<std::ptrdiff_t>(begin),
              shot_.frames.begin() + static_cast<std::ptrdiff_t>(end)});
       begin = end;
-      Deliver(end == shot_.frames.size());
+      steady_.Deliver(
+          end == shot_.frames.size(), context_, [&](int frame, const FusedColor& color) {
+            coloring_.deliver(view_of_frame_[frame], color);
+          });
     }
   }
 
  private:
+  bool WasDone(int frame) const { return coloring_.was_done(view_of_frame_[frame]); }
+
   // An interrupted run resumes at the last anchor before all frames that are left.
   size_t FirstUncoloredFrame() const {
     const auto begin = shot_.frames.begin();
-    const auto open = std::find_if(begin, shot_.frames.end(), [&](int frame) {
-      return !coloring_.was_done(view_of_frame_[frame]);
-    });
+    const auto open =
+        std::ranges::find_if(shot_.frames, [&](int frame) { return !WasDone(frame); });
     if (open == shot_.frames.end()) return shot_.frames.size();
-    if (open - begin < steady_.reach) return 0;
-    const int anchor = shot_.AnchorUpTo(*(open - steady_.reach));
+    if (open - begin < steady_.reach()) return 0;
+    const int anchor = shot_.AnchorUpTo(*(open - steady_.reach()));
     return anchor < 0 ? 0 : std::lower_bound(begin, open, anchor) - begin;
   }
 
@@ -127,14 +122,18 @@ class ShotColorer {
 
   void Color(const std::vector<int>& stretch) {
     const auto index_of = [&](int frame) {
-      return std::lower_bound(stretch.begin(), stretch.end(), frame) - stretch.begin();
+      return std::ranges::lower_bound(stretch, frame) - stretch.begin();
     };
-    const auto count = static_cast<int64_t>(stretch.size());
+    const auto count = std::ssize(stretch);
     ThreadPool& pool = context_.pool();
-    std::vector<Colored> colored(stretch.size());
+    std::vector<SteadyFrames::Frame> colored(stretch.size());
     pool.ForEach(count, [&](int64_t i, int) {
+      context_.ThrowIfCancelled();
       colored[i].frame = stretch[i];
-      colored[i].flow_from_last = FlowTo(stretch[i], i > 0 ? stretch[i - 1] : last_);
+      const int last = i > 0 ? stretch[i - 1] : last_;
+      if (last < 0) return;
+      colored[i].flow_from_last =
+          FlowBetween(*frames_.luminance(last), *frames_.luminance(stretch[i]));
     });
     std::vector<FilmKey> keys;
     if (last_anchor_) keys.push_back(std::move(*last_anchor_));
@@ -148,14 +147,14 @@ class ShotColorer {
       color = ColorOf(key.frame, nullptr);
       key = AnchorAsKey(key.frame, color);
     });
-    for (const Colored& one : colored) {
+    for (const SteadyFrames::Frame& one : colored) {
       if (!one.color.ab.Empty() && ShareGuessed(one.color) > kWorthGuessing) {
         guessed_.insert(one.frame);
       }
     }
     std::vector<CarriedColor> before(stretch.size()), behind(stretch.size());
     const Flow flow = [&](int, int later) { return colored[index_of(later)].flow_from_last; };
-    pool.ForEach(2 * static_cast<int64_t>(keys.size()), [&](int64_t i, int) {
+    pool.ForEach(2 * std::ssize(keys), [&](int64_t i, int) {
       const FilmKey& key = keys[i / 2];
       const bool forward = i % 2 == 0;
       std::vector<int> way;
@@ -177,10 +176,9 @@ class ShotColorer {
     });
     std::vector<Gap> gaps = GapsOf(stretch);
     // The longest gaps first, so that threads end together.
-    std::stable_sort(gaps.begin(), gaps.end(), [](const Gap& x, const Gap& y) {
-      return x.end - x.begin > y.end - y.begin;
-    });
-    pool.ForEach(static_cast<int64_t>(gaps.size()), [&](int64_t i, int) {
+    std::ranges::stable_sort(
+        gaps, std::ranges::greater(), [](const Gap& gap) { return gap.end - gap.begin; });
+    pool.ForEach(std::ssize(gaps), [&](int64_t i, int) {
       InferUncertainFrames(gaps[i], stretch, flow, &of_anchors, &colored);
     });
     pool.ForEach(count, [&](int64_t i, int) {
@@ -188,15 +186,7 @@ class ShotColorer {
     });
     if (!keys.empty()) last_anchor_ = std::move(keys.back());
     last_ = stretch.back();
-    std::move(colored.begin(), colored.end(), std::back_inserter(colored_));
-  }
-
-  std::shared_ptr<const FlowPair> FlowTo(int frame, int last) const {
-    context_.cancel().ThrowIfCancelled();
-    if (last < 0) return nullptr;
-    const auto earlier = frames_.luminance(last), later = frames_.luminance(frame);
-    return std::make_shared<const FlowPair>(
-        FlowPair{DenseFlow(*earlier, *later), DenseFlow(*later, *earlier)});
+    steady_.Add(std::move(colored));
   }
 
   // Propagates the colours of a frame into those of `way`, which adjoin it, step by step.
@@ -240,7 +230,7 @@ class ShotColorer {
                             const std::vector<int>& stretch,
                             const Flow& flow,
                             std::vector<CarriedColor>* of_anchors,
-                            std::vector<Colored>* colored) const {
+                            std::vector<SteadyFrames::Frame>* colored) const {
     const std::vector<int> frames(stretch.begin() + static_cast<std::ptrdiff_t>(gap.begin),
                                   stretch.begin() + static_cast<std::ptrdiff_t>(gap.end));
     std::vector<Image> carried;  // confidences
@@ -253,16 +243,16 @@ class ShotColorer {
       measure(i);
     }
     for (size_t left = frames.size(); left > 0; --left) {
-      const auto most = std::max_element(open.begin(), open.end()) - open.begin();
+      const auto most = std::ranges::max_element(open) - open.begin();
       if (open[most] <= kWorthInferring) return;
       open[most] = 0.0;
-      Colored& asked = (*colored)[gap.begin + most];
+      SteadyFrames::Frame& asked = (*colored)[gap.begin + most];
       asked.color = ColorOf(asked.frame, &(*of_anchors)[gap.begin + most]);
       Propagate(AnchorAsKey(asked.frame, asked.color),
                 frames,
                 flow,
                 [&](int frame, const CarriedColor& color) {
-                  const auto i = std::find(frames.begin(), frames.end(), frame) - frames.begin();
+                  const auto i = std::ranges::find(frames, frame) - frames.begin();
                   if (open[i] == 0.0) return;
                   FillFromNeighbor(color, &(*of_anchors)[gap.begin + i]);
                   measure(i);
@@ -278,7 +268,7 @@ class ShotColorer {
 
   // `of_anchors`: null for anchors. Nothing is guessed between two anchors without guessed colours.
   FusedColor ColorOf(int frame, const CarriedColor* of_anchors) const {
-    context_.cancel().ThrowIfCancelled();
+    context_.ThrowIfCancelled();
     const int view = view_of_frame_[frame];
     const auto luminance = frames_.luminance(frame);
     const CarriedColor carried = PropagatedColor(frame);
@@ -291,53 +281,20 @@ class ShotColorer {
       return ColorBetweenAnchors(*luminance, carried, *of_anchors, sources, context_.cancel());
     }
     ThreadPool one(1);
-    return ColorOfView(*luminance, carried, sources, one, context_.cancel());
-  }
-
-  // Delivers the frames whose neighbours are coloured, and keeps those that later ones need.
-  void Deliver(bool is_end) {
-    const auto reach = static_cast<size_t>(steady_.reach);
-    const size_t end =
-        is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
-    // Colours of different key frames are not averaged.
-    std::vector<MovingFrame> neighbors;
-    int last_nearest = -1;
-    for (const Colored& one : colored_) {
-      const int nearest = near_[one.frame].nearest;
-      neighbors.push_back({&one.color.ab, nearest == last_nearest ? one.flow_from_last : nullptr});
-      last_nearest = nearest;
-    }
-    context_.pool().ForEach(static_cast<int64_t>(end - delivered_), [&](int64_t i, int) {
-      context_.cancel().ThrowIfCancelled();
-      const size_t index = delivered_ + static_cast<size_t>(i);
-      const int frame = colored_[index].frame;
-      const int view = view_of_frame_[frame];
-      if (coloring_.was_done(view)) return;
-      FusedColor color = colored_[index].color;
-      if (near_[frame].nearest != frame) {
-        color.ab = SteadyColors(neighbors, static_cast<int>(index), steady_);
-      }
-      coloring_.deliver(view, color);
-    });
-    const size_t done_with = end - std::min(end, reach);
-    colored_.erase(colored_.begin(), colored_.begin() + static_cast<std::ptrdiff_t>(done_with));
-    delivered_ = end - done_with;
+    return FuseViewColor(*luminance, carried, sources, one, context_.cancel());
   }
 
   const ShotToColor& shot_;
   const FilmFrames& frames_;
-  const std::vector<NearKeyFrames>& near_;  // of each frame
   const std::vector<int>& view_of_frame_;
   const FrameColoring& coloring_;
   const Scene& scene_;
   const ViewImages& images_;
   StageContext& context_;
-  const SteadyColorsOptions steady_;
   std::set<int> guessed_;               // anchors with guessed colours
   int last_ = -1;                       // frame of the last stretch
   std::optional<FilmKey> last_anchor_;  // of the last stretch
-  std::vector<Colored> colored_;        // successive frames
-  size_t delivered_ = 0;                // number of these
+  SteadyFrames steady_;
 };
 
 }  // namespace
@@ -347,12 +304,7 @@ void ColorFrames(const Scene& scene,
                  const FrameColoring& coloring,
                  StageContext& context) {
   const std::vector<int> order = scene.ViewsInOrderOfTime();
-  FilmFrames frames;
-  for (const int view : order) {
-    frames.shot.push_back(scene.views[view].moment->shot);
-    frames.time_s.push_back(scene.views[view].time_s());
-  }
-  frames.luminance = [&](int frame) { return images.Luminance(order[frame]); };
+  const FilmFrames frames = FramesOfViews(scene, order, images);
   std::map<int, ShotToColor> shots;
   for (size_t i = 0; i < order.size(); ++i) {
     shots[frames.shot[i]].frames.push_back(static_cast<int>(i));
@@ -362,12 +314,11 @@ void ColorFrames(const Scene& scene,
   }
   std::vector<int> key_frames;
   for (const int view : coloring.key_views) {
-    key_frames.push_back(
-        static_cast<int>(std::find(order.begin(), order.end(), view) - order.begin()));
+    key_frames.push_back(static_cast<int>(std::ranges::find(order, view) - order.begin()));
   }
   const std::vector<NearKeyFrames> near = NearestKeyFrames(frames, key_frames);
   for (const auto& [number, shot] : shots) {
-    ShotColorer(shot, frames, near, order, coloring, scene, images, context).Run();
+    ShotColorer(shot, frames, order, coloring, scene, images, near, context).Run();
   }
 }
 

@@ -72,7 +72,7 @@ class ColorFramesTest : public StageTest {
           [this, &mutex, view](const Image& l, const Image&) {
             const std::lock_guard lock(mutex);
             asked_.push_back(view);
-            return InferredColor{Told(view), Image(l.width, l.height, 1, distance_)};
+            return InferredColor{Inferred(view), Image(l.width, l.height, 1, distance_)};
           },
           [this, &mutex](const Image& l) {
             const std::lock_guard lock(mutex);
@@ -96,8 +96,8 @@ class ColorFramesTest : public StageTest {
     return delivered;
   }
 
-  // Colours that the sources give a frame.
-  Image Told(int view) const {
+  // Colours that the sources infer for a frame.
+  Image Inferred(int view) const {
     Image ab = TrueAb(view);
     if (flicker_) {
       for (float& value : ab.data) value += view % 2 == 0 ? 8.0f : -8.0f;
@@ -143,22 +143,23 @@ TEST_F(ColorFramesTest, InfersStillFramesOnce) {
   AddFrames([](int, int x, int y) {
     return static_cast<float>(0.5 + 0.2 * std::sin(0.3 * x) * std::sin(0.4 * y));
   });
-  distance_ = 4.0f;  // half as strange as can be: half of 0.9 is guessed
+  distance_ = 4.0f;  // half the largest distance: half of 0.9 is guessed
   const std::map<int, FusedColor> colors = Run(2);
   EXPECT_LE(asked_.size(), 3u) << "of " << kFrames;
   for (const auto& [view, color] : colors) {
-    EXPECT_NEAR(color.provenance.At(0, 30, 50), 0.45, 0.01) << "what is guessed stays so: " << view;
+    EXPECT_NEAR(color.provenance.At(0, 30, 50), 0.45, 0.01)
+        << "guessed colour stays guessed: " << view;
     EXPECT_NEAR(color.provenance.At(2, 30, 50), 0.55, 0.01) << view;
   }
 }
 
 TEST_F(ColorFramesTest, GuessesOnlyBetweenGuessedAnchors) {
   AddFrames(Panned);
-  distance_ = 7.0f;  // so strange that guesses count
+  distance_ = 7.0f;  // so large that guesses count
   Run(2);
   EXPECT_EQ(guesses_, asked_.size());
   const size_t asked = asked_.size();
-  distance_ = 2.0f;  // strange, but a pale guess does not count
+  distance_ = 2.0f;  // large, but a pale guess does not count
   Run(2);
   EXPECT_EQ(asked_.size(), asked);
   EXPECT_GT(guesses_, 0u) << "anchors";
@@ -186,7 +187,7 @@ TEST_F(ColorFramesTest, DoesNotAverageKeyFrames) {
   AddFrames(Panned);
   key_views_ = {kFirst, kSecond};
   for (int i = 0; i < kFrames; ++i) {
-    AddInput(ViewArtifact(artifact::kCarried, scene_.views[i], ".png"),
+    AddInput(ViewArtifact(artifact::kCarried, scene_.views[i]),
              EncodeAbPng(Image(kWidth, kHeight, 2, i < kSwitch ? -30.0f : 30.0f)));
   }
   for (const auto& [view, color] : Run(2)) {
@@ -207,7 +208,7 @@ TEST_F(ColorFramesTest, ResumesWithTheSameResult) {
     dies_after_ = 1000;
     const size_t asked_before = asked_.size();
     colors.merge(Run(1));
-    EXPECT_LE(asked_.size(), asked_before) << "not all of it is done again";
+    EXPECT_LE(asked_.size(), asked_before) << "finished frames are not computed again";
     ASSERT_EQ(colors.size(), whole.size());
     for (const auto& [view, color] : whole) {
       EXPECT_EQ(colors.at(view).ab.data, color.ab.data) << view << ", died after " << dies_after;

@@ -32,9 +32,8 @@ std::vector<Shot> ShotsOf(const Scene& scene) {
     (shot.views.size() > 1 ? shots : single).push_back(std::move(shot));
   }
   if (shots.empty()) shots = std::move(single);
-  std::stable_sort(shots.begin(), shots.end(), [](const Shot& x, const Shot& y) {
-    return x.views.size() > y.views.size();
-  });
+  std::ranges::stable_sort(
+      shots, std::ranges::greater(), [](const Shot& shot) { return shot.views.size(); });
   return shots;
 }
 
@@ -107,7 +106,7 @@ std::vector<int> CandidatesOfFilm(const Scene& scene, const std::string& named) 
     from.insert(from.end(), training.begin(), training.end());
   }
   if (from.empty()) from = scene.TrainingViews();
-  std::sort(from.begin(), from.end());
+  std::ranges::sort(from);
   const size_t wanted = std::min(kMaxCandidates, from.size());
   std::set<int> candidates;
   std::set<int> shots_with;

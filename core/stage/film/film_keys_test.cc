@@ -38,7 +38,7 @@ Scene FilmOf(const std::vector<int>& lengths) {
   return scene;
 }
 
-TEST(FilmKeys, EveryShotHasACandidateAndFaultsNone) {
+TEST(FilmKeysTest, FindsCandidatesInEveryShotWithoutFaults) {
   const Scene scene = FilmOf({200, 1, 3, 90, 2});
   const std::vector<int> candidates = CandidatesOfFilm(scene, "");
   EXPECT_LE(candidates.size(), 64u);
@@ -53,7 +53,7 @@ TEST(FilmKeys, EveryShotHasACandidateAndFaultsNone) {
   EXPECT_EQ(CandidatesOfFilm(FilmOf({1, 1, 1}), "").size(), 3u);
 }
 
-TEST(FilmKeys, LongestShotWithoutKeyFrameIsNext) {
+TEST(FilmKeysTest, LongestShotWithoutKeyFrameIsNext) {
   const Scene scene = FilmOf({20, 40, 1, 30});
   std::vector<double> coverage(scene.views.size(), 0.0);
   const auto next = AdviseNextFilmKey(scene, {45}, coverage);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
-#include <map>
 #include <numeric>
 #include <optional>
 #include <set>
@@ -13,6 +12,7 @@
 #include "core/catalogue/film_rate.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/stage/film/frames_of_views.h"
 #include "core/stage/film_import/film_frames.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/movie/film_clock.h"
@@ -61,25 +61,16 @@ std::string FileNameOf(const std::string& camera, std::set<std::string>* taken) 
   return unlike;
 }
 
-// The views of each shot, in order of time.
-std::map<int, std::vector<int>> FramesByShot(const Scene& scene) {
-  std::map<int, std::vector<int>> frames;
-  for (const int view : scene.ViewsInOrderOfTime()) {
-    frames[scene.views[view].moment->shot].push_back(view);
-  }
-  return frames;
-}
-
 // Publishes the file of the scratch folder under each of the names.
-void PublishUnderNames(const std::vector<std::string>& artifacts,
-                       const fs::path& file,
-                       StageContext& context) {
+void PublishAs(const std::vector<std::string>& artifacts,
+               const fs::path& file,
+               StageContext& context) {
   for (size_t i = 1; i < artifacts.size(); ++i) {
     const fs::path copy = file.string() + ".copy";
     fs::copy_file(file, copy);
-    context.TakeOutput(artifacts[i], copy);
+    context.MoveOutput(artifacts[i], copy);
   }
-  context.TakeOutput(artifacts[0], file);
+  context.MoveOutput(artifacts[0], file);
 }
 
 }  // namespace
@@ -114,13 +105,13 @@ void WriteColoredFilm(const Scene& scene,
                    .sound = SoundFrom(
                        scene, frames.front(), scene.views[frames.front()].time_s(), clock, context),
                    .cancel = &context.cancel()});
-  if (!movie.sound_warning().empty()) context.progress().OnWarning(movie.sound_warning());
+  if (!movie.sound_warning().empty()) context.Warn(movie.sound_warning());
   const auto count = static_cast<int>(frames.size());
   const int batch = context.pool().thread_count();
   std::vector<Image> pictures(batch);
   std::vector<std::string> files(batch);
   for (int begin = 0; begin < count; begin += batch) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     const int size = std::min(batch, count - begin);
     context.pool().ForEach(size, [&](int64_t i, int) {
       const int view = frames[begin + i];
@@ -134,14 +125,14 @@ void WriteColoredFilm(const Scene& scene,
       movie.AddAt(
           clock.time_s[frame], clock.seconds[frame], MovieFrame(pictures[i]), context.pool());
       if (film.pictures) {
-        context.WriteOutput(ViewArtifact(artifact::kFilmFrames, view, ".png"), files[i]);
+        context.WriteOutput(ViewArtifact(artifact::kFilmFrames, view), files[i]);
       }
       if (written) written(frames[frame], pictures[i]);
     }
-    context.progress().OnProgress(begin + size, count, "writing frames of " + film.artifacts[0]);
+    context.ReportProgress(begin + size, count, "writing frames of " + film.artifacts[0]);
   }
   movie.Finish();
-  PublishUnderNames(film.artifacts, file, context);
+  PublishAs(film.artifacts, file, context);
 }
 
 void WriteFilmsOfCameras(const Scene& scene, bool pictures, StageContext& context) {
@@ -168,8 +159,8 @@ void RenderFilm(const RenderOptions& options,
   film.frames.resize(scene.views.size());
   std::iota(film.frames.begin(), film.frames.end(), 0);
   WriteColoredFilm(scene, film, context, [&](int view, const Image& srgb) {
-    if (std::find(views.begin(), views.end(), view) == views.end()) return;
-    context.WriteOutput(ViewArtifact(artifact::kRenders, scene.views[view], ".png"),
+    if (std::ranges::find(views, view) == views.end()) return;
+    context.WriteOutput(ViewArtifact(artifact::kRenders, scene.views[view]),
                         EncodePng8(FitWithin(srgb, options.max_side_px)));
   });
 }

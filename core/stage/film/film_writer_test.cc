@@ -71,7 +71,7 @@ class FilmWriterTest : public StageTest {
     scene_ = SceneFromJson(ReadFile(scratch_.path() / "out/scene.json"));
     AddInput(artifact::kScene, SceneToJson(scene_));
     for (const View& view : scene_.views) {
-      AddInput(ViewArtifact(artifact::kViewsAb, view, ".png"),
+      AddInput(ViewArtifact(artifact::kViewsAb, view),
                EncodeAbPng(Image(kWidth, kHeight, 2, 20.0f)));
     }
     StageContext context = MakeContext();
@@ -90,7 +90,7 @@ class FilmWriterTest : public StageTest {
         view.moment = Moment{0.5 * i, camera[0] == 'l' ? 0 : 1};
         fs::create_directories((scratch_.path() / view.image_file).parent_path());
         WriteFileAtomic(scratch_.path() / view.image_file, EncodePng8(FrameOf(i)));
-        AddInput(ViewArtifact(artifact::kViewsAb, view, ".png"),
+        AddInput(ViewArtifact(artifact::kViewsAb, view),
                  EncodeAbPng(Image(kWidth, kHeight, 2, 20.0f)));
         scene_.views.push_back(view);
       }
@@ -184,8 +184,7 @@ TEST_F(FilmWriterTest, KeepsSizeOfWideScansInPictures) {
   scene_ = SceneFromJson(ReadFile(scratch_.path() / "out/scene.json"));
   AddInput(artifact::kScene, SceneToJson(scene_));
   for (const View& view : scene_.views) {
-    AddInput(ViewArtifact(artifact::kViewsAb, view, ".png"),
-             EncodeAbPng(Image(kWide, kTall, 2, 20.0f)));
+    AddInput(ViewArtifact(artifact::kViewsAb, view), EncodeAbPng(Image(kWide, kTall, 2, 20.0f)));
   }
   StageContext context = MakeContext();
   RunRender({.max_views = 2, .pictures = true}, context);
@@ -217,7 +216,7 @@ TEST_F(FilmWriterTest, WritesFilmOfEachCamera) {
   EXPECT_NE(ReadFile(out / "film.mp4"), ReadFile(out / "films/in_the_left.mp4"));
   EXPECT_EQ(HearFilm(out / "films/in_the_left.mp4").codec, "");
   EXPECT_EQ(HearFilm(out / "film.mp4").codec, "aac");
-  EXPECT_EQ(HearFilm(out / "scene.mp4").codec, "aac") << "as that camera saw it";
+  EXPECT_EQ(HearFilm(out / "scene.mp4").codec, "aac") << "sound of the camera of the key view";
   for (const View& view : scene_.views) {
     EXPECT_EQ(ReadImage(out / ("film_frames/" + view.name)).width, kWidth) << view.name;
   }

@@ -1,17 +1,18 @@
 #include "core/stage/film/temporal_scores.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/metrics/scene_consistency.h"
 #include "core/metrics/temporal_consistency.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/film/film_writer.h"
+#include "core/stage/film/frames_of_views.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {
@@ -19,16 +20,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int64_t kScoredFramesCacheBytes = int64_t{16} << 20;  // each frame is read twice in a row
-
-std::vector<std::vector<int>> ShotsInOrderOfTime(const Scene& scene) {
-  std::map<int, std::vector<int>> shots;
-  for (const int view : scene.ViewsInOrderOfTime()) {
-    shots[scene.views[view].moment->shot].push_back(view);
-  }
-  std::vector<std::vector<int>> ordered;
-  for (auto& [shot, frames] : shots) ordered.push_back(std::move(frames));
-  return ordered;
-}
 
 ordered_json JsonOf(const TemporalConsistency& consistency) {
   ordered_json json{{"pairs", consistency.pairs}};
@@ -49,7 +40,7 @@ ordered_json TemporalScores(const Scene& scene,
       scene, context.scene_folder(), kConsistencySidePx, kScoredFramesCacheBytes);
   const int key = context.HasInput(artifact::kKeyView) ? ReadKeyView(context, scene) : -1;
   TemporalSource source;
-  source.shots = ShotsInOrderOfTime(scene);
+  for (auto& [shot, frames] : FramesByShot(scene)) source.shots.push_back(std::move(frames));
   source.luminance = [&](int view) { return *images.Luminance(view); };
   std::vector<std::string> names = {"colored_views"};
   source.colorings.emplace_back([&](int view) {
@@ -61,7 +52,7 @@ ordered_json TemporalScores(const Scene& scene,
       ThreadPool one(1);
       const View& seen = scene.views[view];
       const Camera camera = images.WorkingCamera(view);
-      return RenderView(of, camera, seen.cam_from_world, one, 0.0f, seen.time_s()).lab;
+      return RenderView(of, seen, camera, one).lab;
     });
   };
   if (model) add_pictures_of(*model, "rendered");

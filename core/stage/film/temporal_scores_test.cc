@@ -39,7 +39,7 @@ class TemporalScoresTest : public StageTest {
       WriteFileAtomic(scratch_.path() / view.image_file, EncodePng8(gray));
       scene_.views.push_back(view);
       const float flicker = i % 2 == 0 ? 10.0f : 14.0f;
-      AddInput(ViewArtifact(artifact::kViewsAb, view, ".png"),
+      AddInput(ViewArtifact(artifact::kViewsAb, view),
                EncodeAbPng(Image(kWidth, kHeight, 2, flicker)));
       truth_.push_back({view.name, scratch_.path() / ("true_" + view.name)});
       WriteFileAtomic(truth_.back().file,

@@ -20,14 +20,14 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// What structure-from-motion sees of one camera.
-struct Sighting {
+// Pictures of one camera for structure-from-motion.
+struct SfmInput {
   ShotMotion motion;
   std::vector<SequenceFrame> pictures;
-  std::vector<std::vector<int>> views;  // of the scene, that have each picture's pose
+  std::vector<std::vector<int>> views;  // views that get the pose of each picture
 };
 
-// L of each pixel, the median over up to 9 frames spread evenly: what passes by is gone.
+// Median L of each pixel over up to 9 evenly spread frames, which removes moving objects.
 Image MedianPicture(const ViewImages& images, const std::vector<int>& views) {
   constexpr size_t kFrames = 9;
   std::vector<std::shared_ptr<const Image>> frames;
@@ -39,15 +39,15 @@ Image MedianPicture(const ViewImages& images, const std::vector<int>& views) {
   std::vector<float> values(count);
   for (size_t p = 0; p < median.data.size(); ++p) {
     for (size_t i = 0; i < count; ++i) values[i] = frames[i]->data[p];
-    std::nth_element(values.begin(), values.begin() + count / 2, values.end());
+    std::ranges::nth_element(values, values.begin() + count / 2);
     median.data[p] = values[count / 2];
   }
   return median;
 }
 
-class CameraSurvey {
+class SfmInputs {
  public:
-  CameraSurvey(const fs::path& frames_root, const Scene& frames, StageContext& context)
+  SfmInputs(const fs::path& frames_root, const Scene& frames, StageContext& context)
       : frames_root_(frames_root),
         frames_(frames),
         context_(context),
@@ -55,8 +55,8 @@ class CameraSurvey {
 
   const MovingRegionFiles& files() const { return files_; }
 
-  Sighting Of(const FramesOfCamera& camera, int number) const {
-    Sighting seen;
+  SfmInput Of(const FramesOfCamera& camera, int number) const {
+    SfmInput seen;
     seen.motion = WriteMovingRegions(frames_root_, frames_, camera.views, files_, context_);
     if (seen.motion.camera_stands_still) {
       seen.pictures.push_back(Standing(camera, number));
@@ -80,7 +80,7 @@ class CameraSurvey {
     fs::create_directories(folder);
     const fs::path file = folder / fmt::format("{:03}.png", number);
     WriteFileAtomic(file, EncodeGrayFrame(MedianPicture(images, camera.views)));
-    // No view has an absolute path for a name.
+    // An absolute path differs from the names of all views.
     return {fs::absolute(file).string(), file, {}, number};
   }
 
@@ -90,12 +90,12 @@ class CameraSurvey {
   MovingRegionFiles files_;
 };
 
-// Of each camera, the share of its pictures that found a place.
-std::vector<double> SharesPlaced(const Scene& placed, const std::vector<Sighting>& seen) {
+// Share of the pictures with a pose, by camera.
+std::vector<double> SharesPlaced(const Scene& placed, const std::vector<SfmInput>& seen) {
   std::set<std::string> names;
   for (const View& view : placed.views) names.insert(view.name);
   std::vector<double> shares;
-  for (const Sighting& camera : seen) {
+  for (const SfmInput& camera : seen) {
     int found = 0;
     for (const SequenceFrame& picture : camera.pictures) found += names.contains(picture.name);
     shares.push_back(found / static_cast<double>(camera.pictures.size()));
@@ -103,44 +103,43 @@ std::vector<double> SharesPlaced(const Scene& placed, const std::vector<Sighting
   return shares;
 }
 
-// Throws unless two cameras stay; warns of those that do not.
-void RequireTwo(const std::vector<FramesOfCamera>& cameras,
-                const std::vector<Sighting>& seen,
-                const std::vector<double>& shares,
-                StageContext& context) {
-  std::string stay, go;
-  size_t staying = 0;
+// Warns of cameras with too few poses. Throws if fewer than two cameras remain.
+void RequireTwoCameras(const std::vector<FramesOfCamera>& cameras,
+                       const std::vector<SfmInput>& seen,
+                       const std::vector<double>& shares,
+                       StageContext& context) {
+  std::string kept, dropped;
+  size_t kept_count = 0;
   for (size_t i = 0; i < cameras.size(); ++i) {
-    std::string& list = shares[i] >= kLeastShareWithPoses ? stay : go;
-    staying += shares[i] >= kLeastShareWithPoses;
+    std::string& list = shares[i] >= kLeastShareWithPoses ? kept : dropped;
+    kept_count += shares[i] >= kLeastShareWithPoses;
     list += (list.empty() ? "" : ", ") + cameras[i].film;
     if (shares[i] >= kLeastShareWithPoses) continue;
     list += seen[i].motion.camera_stands_still ? " (stands still)"
                                                : fmt::format(" ({:.0f} %)", 100.0 * shares[i]);
   }
-  if (staying < 2) {
+  if (kept_count < 2) {
     throw InvalidArgument(
-        "the cameras' places could not be joined: {} (frames that found a place among those of "
-        "{}). Cameras must see much of the same still things, from places that are not too far "
-        "apart. "
-        "Tell where they stood (transforms.json), or colour each film on its own",
-        go,
-        stay.empty() ? "the others" : stay);
+        "the poses of the cameras could not be estimated together: {} (share of frames with a pose "
+        "relative to {}). Cameras must share much of the static background and stand close enough. "
+        "Give the poses (transforms.json), or colour each film on its own",
+        dropped,
+        kept.empty() ? "the others" : kept);
   }
-  if (go.empty()) return;
-  context.progress().OnWarning(fmt::format(
-      "left out, since too few of their frames found a place among those of {}: {}", stay, go));
+  if (dropped.empty()) return;
+  context.Warn(
+      "left out, because too few of their frames have a pose relative to {}: {}", kept, dropped);
 }
 
-// The frames of the cameras that stay, with their poses, and the points that they see.
-Scene SceneOf(const Scene& placed,
-              const Scene& frames,
-              const std::vector<Sighting>& seen,
-              const std::vector<double>& shares) {
+// The frames of the remaining cameras with their poses, and the points that they observe.
+Scene PlacedScene(const Scene& placed,
+                  const Scene& frames,
+                  const std::vector<SfmInput>& seen,
+                  const std::vector<double>& shares) {
   std::map<std::string, int> index;  // of a placed picture
   for (size_t i = 0; i < placed.views.size(); ++i)
     index[placed.views[i].name] = static_cast<int>(i);
-  std::vector<std::pair<View, int>> views;  // and the picture that it has its pose of
+  std::vector<std::pair<View, int>> views;  // with the picture that has its pose
   for (size_t c = 0; c < seen.size(); ++c) {
     if (shares[c] < kLeastShareWithPoses) continue;
     for (size_t p = 0; p < seen[c].pictures.size(); ++p) {
@@ -157,9 +156,8 @@ Scene SceneOf(const Scene& placed,
       }
     }
   }
-  std::sort(views.begin(), views.end(), [](const auto& x, const auto& y) {
-    return x.first.name < y.first.name;
-  });
+  std::ranges::sort(
+      views, {}, [](const auto& view) -> const std::string& { return view.first.name; });
   Scene scene;
   std::map<int, std::vector<int>> views_of;  // by picture
   for (auto& [view, picture] : views) {
@@ -177,14 +175,14 @@ Scene SceneOf(const Scene& placed,
       kept.views.insert(kept.views.end(), found->second.begin(), found->second.end());
     }
     if (pictures < 2) continue;
-    std::sort(kept.views.begin(), kept.views.end());
+    std::ranges::sort(kept.views);
     scene.points.push_back(std::move(kept));
   }
   return scene;
 }
 
 FilmFindings FindingsOf(const std::vector<FramesOfCamera>& cameras,
-                        const std::vector<Sighting>& seen,
+                        const std::vector<SfmInput>& seen,
                         int placed) {
   FilmFindings findings{.poses_found = true, .frames_placed = placed, .camera_stands_still = true};
   double moving = 0.0, frames = 0.0;
@@ -209,19 +207,19 @@ PlacedCameras PlaceCameras(const fs::path& frames_root,
                            const std::vector<FramesOfCamera>& cameras,
                            const ImportOptions& options,
                            StageContext& context) {
-  const CameraSurvey sightings(frames_root, frames, context);
-  std::vector<Sighting> seen;
+  const SfmInputs inputs(frames_root, frames, context);
+  std::vector<SfmInput> seen;
   std::vector<SequenceFrame> pictures;
   for (size_t i = 0; i < cameras.size(); ++i) {
-    seen.push_back(sightings.Of(cameras[i], static_cast<int>(i) + 1));
+    seen.push_back(inputs.Of(cameras[i], static_cast<int>(i) + 1));
     pictures.insert(pictures.end(), seen[i].pictures.begin(), seen[i].pictures.end());
   }
   PlacedCameras placed;
   placed.result =
       PlaceSequence(pictures, context.scratch_folder() / "poses", options, context.control());
   const std::vector<double> shares = SharesPlaced(placed.result.scene, seen);
-  RequireTwo(cameras, seen, shares, context);
-  placed.result.scene = SceneOf(placed.result.scene, frames, seen, shares);
+  RequireTwoCameras(cameras, seen, shares, context);
+  placed.result.scene = PlacedScene(placed.result.scene, frames, seen, shares);
   const Scene& scene = placed.result.scene;
   placed.findings = FindingsOf(cameras, seen, static_cast<int>(scene.views.size()));
   std::vector<int> of_cameras;
@@ -229,8 +227,8 @@ PlacedCameras PlaceCameras(const fs::path& frames_root,
     if (shares[i] < kLeastShareWithPoses) continue;
     of_cameras.insert(of_cameras.end(), cameras[i].views.begin(), cameras[i].views.end());
   }
-  WarnOfFramesWithoutPlace(frames, of_cameras, scene, context);
-  sightings.files().Leave(scene, context);
+  WarnOfUnplacedFrames(frames, of_cameras, scene, context);
+  inputs.files().Publish(scene, context);
   return placed;
 }
 

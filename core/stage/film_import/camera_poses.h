@@ -1,5 +1,5 @@
-// Poses of several cameras that filmed one place, in part of which things move (DYNAMIC.md "Poses
-// of films"). For the import stage only.
+// Poses of several cameras that filmed one place with moving objects (DYNAMIC.md "Poses of films").
+// For the import stage only.
 #pragma once
 
 #include <filesystem>
@@ -12,24 +12,24 @@
 
 namespace color3d {
 
-// One camera's frames, all of one shot.
+// Frames of one camera, all of one shot.
 struct FramesOfCamera {
   std::string film;        // for messages
   std::vector<int> views;  // of the scene, in order of time
 };
 
 struct PlacedCameras {
-  ImportResult result;  // the scene's views have the frames' names, files and moments
+  ImportResult result;  // its views have the names, files and times of the frames
   FilmFindings findings;
 };
 
-// `frames`: the views of all cameras, whose pictures lie at their image_file below `frames_root`.
-// A camera that stands still gives one picture, the median over its time, to structure-from-motion,
-// and all its frames that pose; of one that moves every frame finds its own by what stands still.
-// Cameras of which less than 80 % of the frames find a place are left out, and named in a warning.
-// Leaves kMovingRegions of the placed frames. What FinishPosedScene does is left to the caller.
-// Throws Error: fewer than two cameras find a place, with what to do (kInvalidArgument); what
-// PlaceSequence throws.
+// Estimates the poses of all cameras by structure-from-motion. `frames`: views of all cameras;
+// `image_file` is relative to `frames_root`. A standing camera contributes the median of its
+// frames, which all get the pose of that picture. Each frame of a moving camera gets a pose of its
+// own from the static background. Cameras with poses for less than 80 % of their frames are left
+// out with a warning. Publishes kMovingRegions of the frames with poses. The caller calls
+// FinishPosedScene. Throws Error: kInvalidArgument with the remedy for fewer than two cameras with
+// poses, and the errors of PlaceSequence.
 PlacedCameras PlaceCameras(const std::filesystem::path& frames_root,
                            const Scene& frames,
                            const std::vector<FramesOfCamera>& cameras,

@@ -1,4 +1,4 @@
-// Where the cameras of made-up films stood, by COLMAP for real.
+// Poses of the cameras of synthetic films, estimated by COLMAP.
 #include "core/stage/film_import/camera_poses.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ constexpr int kFrames = 6;
 const Camera kFirst{400, 300, 420.0, 420.0, 200.0, 150.0};
 const Camera kSecond{360, 300, 380.0, 380.0, 180.0, 150.0};
 
-// Two go by, on ways of their own, and one stands.
+// Two cameras move along different paths, and one stands still.
 Pose PoseOf(const std::string& camera, int frame) {
   const double t = frame - 0.5 * kFrames;
   if (camera == "left") return LookAt({0.4 + 0.08 * t, -0.1, -1.3 + 0.03 * t}, {0.1, 0.4, 1.6});
@@ -65,7 +65,7 @@ class CameraPosesTest : public StageTest {
   ImportFacts facts_;
 };
 
-TEST_F(CameraPosesTest, CamerasFindTheirPlacesButForOneThatSawAnother) {
+TEST_F(CameraPosesTest, FindsPosesAndLeavesOutUnrelatedCamera) {
   for (const char* camera : {"left", "right", "stand"}) WriteFilm(camera);
   for (int i = 0; i < kFrames; ++i) {
     const Pose elsewhere = LookAt({9.0 + 0.1 * i, -4.0, -8.0}, {12.0, -3.5, 2.0});
@@ -83,7 +83,7 @@ TEST_F(CameraPosesTest, CamerasFindTheirPlacesButForOneThatSawAnother) {
   EXPECT_EQ(scene.HeldOutViews().size(), static_cast<size_t>(kFrames));
   EXPECT_TRUE(fs::exists(scratch_.path() / "out/sfm.log"));
   EXPECT_THAT(observer_.text,
-              HasSubstr("found a place among those of frames/left, frames/right, frames/stand: "
+              HasSubstr("have a pose relative to frames/left, frames/right, frames/stand: "
                         "frames/elsewhere (0 %)"));
   for (int i = 0; i < kFrames; ++i) {
     EXPECT_TRUE(fs::exists(scratch_.path() / "out/moving/left" / Name(i))) << i;
@@ -107,7 +107,7 @@ TEST_F(CameraPosesTest, CamerasFindTheirPlacesButForOneThatSawAnother) {
     const Eigen::Vector3d aligned = (align * found.col(i).homogeneous()).head<3>();
     EXPECT_LT((aligned - expected.col(i)).norm(), 0.04) << scene.views[i].name;
   }
-  // What the standing camera sees, all its frames see.
+  // All frames of the standing camera observe the same points.
   for (const SparsePoint& point : scene.points) {
     int standing = 0;
     for (const int view : point.views) standing += view >= 2 * kFrames;
@@ -115,7 +115,7 @@ TEST_F(CameraPosesTest, CamerasFindTheirPlacesButForOneThatSawAnother) {
   }
 }
 
-TEST_F(CameraPosesTest, VideoFilesWithAnOffsetBetweenTheirClocks) {
+TEST_F(CameraPosesTest, AppliesTimeOffsetsOfVideos) {
   ThreadPool pool(1);
   for (const std::string camera : {"left", "right"}) {
     const Camera lens = LensOf(camera);
@@ -143,7 +143,7 @@ TEST_F(CameraPosesTest, VideoFilesWithAnOffsetBetweenTheirClocks) {
   EXPECT_EQ(facts_.cameras[1].film, "right.mp4");
 }
 
-TEST_F(CameraPosesTest, CamerasThatShareNothingAreRefusedWithTheRemedy) {
+TEST_F(CameraPosesTest, RefusesUnrelatedCamerasAndCuts) {
   WriteFilm("left");
   for (int i = 0; i < kFrames; ++i) Write("flat", i, GradientPhoto(400, 300, 1));
   EXPECT_THAT(Refusal([&] { Import(); }), HasSubstr("colour each film on its own"));
@@ -154,10 +154,10 @@ TEST_F(CameraPosesTest, CamerasThatShareNothingAreRefusedWithTheRemedy) {
     for (float& v : noise.data) v = static_cast<float>(random.NextUniform());
     Write("flat", i, Resize(noise, 400, 300));
   }
-  EXPECT_THAT(Refusal([&] { Import(); }), HasSubstr("frames/flat is cut before flat/n103.png"));
+  EXPECT_THAT(Refusal([&] { Import(); }), HasSubstr("frames/flat has a cut before flat/n103.png"));
 }
 
-TEST_F(CameraPosesTest, PicturesBesideFoldersAreRefused) {
+TEST_F(CameraPosesTest, RefusesPicturesBesideFolders) {
   for (const char* camera : {"left", "right"}) WriteFilm(camera);
   WriteFileAtomic(scratch_.path() / "frames/lost.png", EncodePng8(Image(40, 30, 1, 0.5f)));
   EXPECT_THAT(Refusal([&] { Import(); }), HasSubstr("frames/lost.png lies beside the folder"));

@@ -23,19 +23,18 @@
 namespace color3d {
 namespace {
 
-constexpr size_t kNamed = 5;  // frames in a warning
+constexpr size_t kNamed = 5;  // frames that a warning names
 
-const char* UnusedReason(NoFilm scene) {
+const char* ReasonForUnusedOptions(ImportedAs scene) {
   switch (scene) {
-    case NoFilm::kPosedFilms:
-      return "films whose poses are given have times and places of their own, and are taken as "
-             "exposed";
-    case NoFilm::kCameraFilms:
-    case NoFilm::kCameraPictures:
+    case ImportedAs::kPosedFilms:
+      return "films with poses have times of their own and are taken as exposed";
+    case ImportedAs::kCameraFilms:
+    case ImportedAs::kCameraPictures:
       return "films of several cameras are taken as exposed, at their own times";
-    case NoFilm::kTimedPictures:
-      return "pictures whose times and poses are given are all taken, as exposed";
-    case NoFilm::kPhotos:
+    case ImportedAs::kTimedPictures:
+      return "pictures with times and poses are all taken as exposed";
+    case ImportedAs::kPhotos:
       break;
   }
   return "the scene is no film";
@@ -43,7 +42,7 @@ const char* UnusedReason(NoFilm scene) {
 
 }  // namespace
 
-Camera UnknownCamera(int width, int height) {
+Camera GuessedCamera(int width, int height) {
   constexpr double kFocalOfLongerSide = 1.2;
   const double focal = kFocalOfLongerSide * std::max(width, height);
   return {width, height, focal, focal, 0.5 * width, 0.5 * height};
@@ -54,7 +53,7 @@ std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
   for (const std::string& file : ListFiles(folder)) {
     if (HasImageExtension(file)) files.push_back(file);
   }
-  std::sort(files.begin(), files.end(), ComesBefore);
+  std::ranges::sort(files, ComesBefore);
   return files;
 }
 
@@ -62,7 +61,7 @@ std::vector<double> TimesOfPictures(const std::vector<std::string>& files,
                                     const FilmOptions& options,
                                     StageContext& context) {
   const FrameNumbers numbers = FramePositions(files);
-  if (!numbers.note.empty()) context.progress().OnWarning(numbers.note);
+  if (!numbers.note.empty()) context.Warn(numbers.note);
   std::vector<double> times;
   for (const int64_t place : numbers.places) {
     times.push_back(static_cast<double>(place) /
@@ -80,21 +79,21 @@ std::vector<int> RequestedFrames(const std::vector<double>& times, const FilmOpt
   }
   if (wanted.empty()) {
     throw InvalidArgument(
-        "the film has no frame between the times that are asked for; it lasts {:.2f} s",
+        "the film has no frame in the requested part (film_begin_s, film_end_s); it lasts {:.2f} s",
         times.back());
   }
   return wanted;
 }
 
-void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext& context) {
+void WarnOfUnusedOptions(const FilmOptions& options, ImportedAs scene, StageContext& context) {
   const FilmOptions usual;
   std::vector<std::string> unused;
   const auto add = [&](bool given, const char* name) {
     if (given) unused.emplace_back(name);
   };
-  const bool pictures = scene == NoFilm::kCameraPictures;
-  const bool cameras = pictures || scene == NoFilm::kCameraFilms;
-  if (!cameras && scene != NoFilm::kPosedFilms) {
+  const bool pictures = scene == ImportedAs::kCameraPictures;
+  const bool cameras = pictures || scene == ImportedAs::kCameraFilms;
+  if (!cameras && scene != ImportedAs::kPosedFilms) {
     add(options.stride != usual.stride, "film_stride");
     add(options.begin_s != usual.begin_s, "film_begin_s");
     add(options.end_s != usual.end_s, "film_end_s");
@@ -103,18 +102,18 @@ void WarnOfUnusedOptions(const FilmOptions& options, NoFilm scene, StageContext&
   add(options.deflicker != usual.deflicker, "film_deflicker");
   add(!cameras && options.poses != usual.poses, "film_poses");
   if (unused.empty()) return;
-  context.progress().OnWarning(fmt::format("{} {} left aside: {}",
-                                           fmt::join(unused, ", "),
-                                           unused.size() == 1 ? "is" : "are",
-                                           UnusedReason(scene)));
+  context.Warn("{} {} ignored: {}",
+               fmt::join(unused, ", "),
+               unused.size() == 1 ? "is" : "are",
+               ReasonForUnusedOptions(scene));
 }
 
 void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {
   if (frames <= kMaxFilmFrames) return;
   throw InvalidArgument(
-      "{} frames ({:.0f} s) are more than a job takes ({}); take every {}th (film_stride), or a "
-      "part "
-      "of {:.0f} s at most (film_begin_s, film_end_s)",
+      "{} frames ({:.0f} s) exceed the limit of {}; set film_stride to {}, or take a part of at "
+      "most "
+      "{:.0f} s (film_begin_s, film_end_s)",
       frames,
       seconds,
       kMaxFilmFrames,
@@ -157,17 +156,17 @@ std::string NamesOfFrames(const std::vector<std::string>& names) {
 
 void WarnOfFrames(const std::vector<std::string>& names, const char* what, StageContext& context) {
   if (names.empty()) return;
-  context.progress().OnWarning(fmt::format("{} {} {}: {}",
-                                           names.size(),
-                                           names.size() == 1 ? "frame" : "frames",
-                                           what,
-                                           NamesOfFrames(names)));
+  context.Warn("{} {} {}: {}",
+               names.size(),
+               names.size() == 1 ? "frame" : "frames",
+               what,
+               NamesOfFrames(names));
 }
 
-void WarnOfFramesWithoutPlace(const Scene& film,
-                              const std::vector<int>& views,
-                              const Scene& placed,
-                              StageContext& context) {
+void WarnOfUnplacedFrames(const Scene& film,
+                          const std::vector<int>& views,
+                          const Scene& placed,
+                          StageContext& context) {
   std::set<std::string> has_place;
   for (const View& view : placed.views) has_place.insert(view.name);
   std::vector<std::string> without;
@@ -175,7 +174,7 @@ void WarnOfFramesWithoutPlace(const Scene& film,
     if (!has_place.contains(film.views[view].name)) without.push_back(film.views[view].name);
   }
   WarnOfFrames(
-      without, fmt::format("of {} found no place, left out", views.size()).c_str(), context);
+      without, fmt::format("of {} without a pose, left out", views.size()).c_str(), context);
 }
 
 }  // namespace color3d

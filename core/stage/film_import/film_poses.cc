@@ -26,17 +26,14 @@ bool AreEnough(size_t some, size_t all) {
   return static_cast<double>(some) >= kLeastShareWithPoses * static_cast<double>(all);
 }
 
-// The frames of the shot that has most of them.
+// Frames of the longest shot.
 std::vector<int> LongestShot(const Scene& scene) {
   std::map<int, std::vector<int>> shots;
   for (size_t i = 0; i < scene.views.size(); ++i) {
     shots[scene.views[i].moment->shot].push_back(static_cast<int>(i));
   }
-  const auto longest =
-      std::max_element(shots.begin(), shots.end(), [](const auto& a, const auto& b) {
-        return a.second.size() < b.second.size();
-      });
-  return longest->second;
+  return std::ranges::max_element(shots, {}, [](const auto& shot) { return shot.second.size(); })
+      ->second;
 }
 
 // Throws what PlaceSequence and FinishPosedScene throw.
@@ -46,7 +43,7 @@ ImportResult Place(const fs::path& frames_root,
                    const MovingRegionFiles& files,
                    ImportOptions options,
                    StageContext& context) {
-  options.hold_out_every_eighth = false;  // whoever imports the film does that
+  options.hold_out_every_eighth = false;  // the caller does that
   options.hold_out_block = 0.0;
   std::vector<SequenceFrame> frames;
   for (const int view : shot) {
@@ -60,7 +57,7 @@ ImportResult Place(const fs::path& frames_root,
   return result;
 }
 
-// The placed frames as views of the film: their own files and moments.
+// The placed frames with the files and times of the film.
 Scene DynamicScene(Scene placed, const Scene& film) {
   for (View& view : placed.views) {
     const View& frame = film.views[film.FindView(view.name)];
@@ -71,7 +68,7 @@ Scene DynamicScene(Scene placed, const Scene& film) {
   return placed;
 }
 
-// The frames of the shot as one camera that stands still took them.
+// The frames of the shot, taken by one standing camera.
 Scene ReliefScene(const Scene& film, const std::vector<int>& shot, const MovingRegionFiles& files) {
   constexpr int kPoints = 20'000;
   Scene scene;
@@ -79,7 +76,7 @@ Scene ReliefScene(const Scene& film, const std::vector<int>& shot, const MovingR
   for (const int frame : shot) {
     scene.views.push_back(film.views[frame]);
     const std::string file = files.MovingFile(frame).string();
-    const double foot = FootRow(DecodeImage(ReadFile(file), file));
+    const double foot = LowestMovingRow(DecodeImage(ReadFile(file), file));
     if (foot >= 0.0) feet.push_back(foot);
   }
   scene.relief = FitRelief(std::move(feet));
@@ -91,8 +88,8 @@ Scene ReliefScene(const Scene& film, const std::vector<int>& shot, const MovingR
   return scene;
 }
 
-// How much the camera's steps differ from one frame to the next, in steps: near 0 for a camera that
-// is carried or driven.
+// Median change of the camera's step from frame to frame, relative to the median step. Near 0 for a
+// carried or driven camera.
 double Unevenness(const Scene& scene) {
   std::vector<double> steps, changes;
   Eigen::Vector3d last = Eigen::Vector3d::Zero();
@@ -108,17 +105,18 @@ double Unevenness(const Scene& scene) {
   return step > 0.0 ? Median(std::move(changes)) / step : 0.0;
 }
 
-// What fills most of the picture counts as the place, even where it is a person.
+// Moving objects that fill most of the picture are mistaken for the background.
 void WarnOfUnevenPath(double unevenness, StageContext& context) {
   constexpr double kUneven = 0.4;
   if (unevenness < kUneven) return;
-  context.progress().OnWarning(fmt::format(
-      "the camera's path is uneven (its steps change by {:.0f} % from frame to frame): what was "
-      "taken for the place may move itself; look at the poses, or leave them out (film_poses: off)",
-      100.0 * unevenness));
+  context.Warn(
+      "the camera path is uneven (its steps change by {:.0f} % from frame to frame): moving "
+      "objects "
+      "may have been mistaken for the background; check the poses, or set film_poses to off",
+      100.0 * unevenness);
 }
 
-// Whether a film may go on without poses after it.
+// Returns true for errors after which the film is kept without poses.
 bool IsAboutPoses(const Error& error) {
   return error.code() == ErrorCode::kInvalidArgument ||
          error.code() == ErrorCode::kDeadlineExceeded ||
@@ -132,15 +130,15 @@ void FindFilmPoses(const fs::path& frames_root,
                    StageContext& context,
                    Scene* scene,
                    ImportFacts* facts) {
-  const auto stays = [&](const std::string& why) {
-    context.progress().OnWarning("the film stays without poses: " + why);
+  const auto keep_film = [&](const std::string& why) {
+    context.Warn("the film stays without poses: " + why);
   };
   facts->film.emplace();
   std::vector<int> all(scene->views.size());
   std::iota(all.begin(), all.end(), 0);
   const std::vector<int> shot = LongestShot(*scene);
   if (!AreEnough(shot.size(), scene->views.size())) {
-    return stays(fmt::format(
+    return keep_film(fmt::format(
         "its longest shot has {} of {} frames; take one shot (film_begin_s, film_end_s)",
         shot.size(),
         scene->views.size()));
@@ -151,17 +149,19 @@ void FindFilmPoses(const fs::path& frames_root,
   facts->film->background_px = motion.background_px;
   facts->film->camera_stands_still = motion.camera_stands_still;
   if (motion.camera_stands_still) {
-    context.progress().OnWarning(fmt::format(
-        "the camera stands still (what does not move of its own shifts by {:.2f} px at {} px), "
-        "which tells no depth: the scene is a relief (2.5D), its depth is assumed. Ground in front "
-        "of an upright backdrop, and what moves stands on it; good for a look from nearby only",
+    context.Warn(
+        "the camera stands still (the background shifts by {:.2f} px at {} px), so depth is "
+        "unknown: "
+        "the scene is a relief (2.5D) with assumed depth. Ground lies in front of an upright "
+        "backdrop, "
+        "and moving objects stand on it; view it from close to the camera only",
         motion.background_px,
-        kMotionSidePx));
+        kMotionSidePx);
     Scene relief = ReliefScene(*scene, shot, files);
     facts->film->poses_found = true;
     facts->photos_registered = static_cast<int>(relief.views.size());
-    WarnOfFramesWithoutPlace(*scene, all, relief, context);
-    files.Leave(relief, context);
+    WarnOfUnplacedFrames(*scene, all, relief, context);
+    files.Publish(relief, context);
     *scene = std::move(relief);
     return;
   }
@@ -175,30 +175,31 @@ void FindFilmPoses(const fs::path& frames_root,
   } catch (const Error& e) {
     if (!IsAboutPoses(e)) throw;
     keep_log();
-    return stays(e.what());
+    return keep_film(e.what());
   }
   keep_log();
   facts->ran_structure_from_motion = true;
   facts->sfm_plan = result.sfm.plan;
   facts->film->frames_placed = result.photos_registered;
   if (!AreEnough(result.scene.views.size(), scene->views.size())) {
-    return stays(
-        fmt::format("only {} of {} frames found a place, {:.0f} % of the picture moves on its own; "
-                    "the others share too little that stands still with them",
+    return keep_film(
+        fmt::format("only {} of {} frames have a pose; {:.0f} % of the picture is moving objects, "
+                    "and the other "
+                    "frames share too little static background with these",
                     result.scene.views.size(),
                     scene->views.size(),
                     100.0 * motion.moving_share));
   }
-  for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
+  for (const std::string& warning : result.warnings) context.Warn(warning);
   facts->film->poses_found = true;
   facts->undistorted = result.undistorted;
   facts->random_points = result.random_points;
   facts->photos_registered = result.photos_registered;
   const Scene placed = DynamicScene(std::move(result.scene), *scene);
-  WarnOfFramesWithoutPlace(*scene, all, placed, context);
+  WarnOfUnplacedFrames(*scene, all, placed, context);
   facts->film->path_unevenness = Unevenness(placed);
   WarnOfUnevenPath(facts->film->path_unevenness, context);
-  files.Leave(placed, context);
+  files.Publish(placed, context);
   *scene = placed;
 }
 

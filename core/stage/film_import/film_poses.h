@@ -1,5 +1,5 @@
-// Poses of a film's frames where one camera moves through a place, in part of which things move
-// (DYNAMIC.md "Poses of films"). For the import stage only.
+// Poses of the frames of one moving camera that filmed moving objects (DYNAMIC.md "Poses of
+// films"). For the import stage only.
 #pragma once
 
 #include <filesystem>
@@ -10,16 +10,15 @@
 
 namespace color3d {
 
-// The least share of a camera's frames that has poses when it goes on with them.
+// Least share of the frames of a camera that must have poses.
 inline constexpr double kLeastShareWithPoses = 0.8;
 
-// `scene`: a film without poses, whose pictures lie at their image_file below `frames_root`. When
-// at least 80 % of its frames belong to one shot and find a place, makes it a dynamic scene of
-// those frames, with points, and leaves kMovingRegions; where the camera stands still, a relief
-// (scene/relief.h), with a warning. Otherwise the film stays as it is. What is
-// left out, and why there are no poses, is a warning; what was found goes into `facts` either way.
-// The log of structure-from-motion is left as kSfmLog when it ran. Throws Error: cancelled, frames
-// that cannot be read.
+// Estimates the poses of a film. `scene`: a film without poses; `image_file` is relative to
+// `frames_root`. If at least 80 % of its frames belong to one shot and get a pose, `scene` becomes
+// a dynamic scene of these frames with points; for a standing camera a relief (scene/relief.h),
+// with a warning. Otherwise the film stays as it is, and a warning gives the reason. Publishes
+// kMovingRegions of the frames with poses, and kSfmLog if structure-from-motion ran. `facts`
+// receives the findings in any case. Throws Error: kCancelled, and for unreadable frames.
 void FindFilmPoses(const std::filesystem::path& frames_root,
                    const ImportOptions& options,
                    StageContext& context,

@@ -1,4 +1,4 @@
-// Poses of made-up films, by COLMAP for real.
+// Poses of synthetic films, estimated by COLMAP.
 #include "core/stage/film_import/film_poses.h"
 
 #include <gmock/gmock.h>
@@ -62,14 +62,14 @@ class FilmPosesTest : public StageTest {
   ImportFacts facts_;
 };
 
-TEST_F(FilmPosesTest, AMovingCameraBeforeWhichSomethingMoves) {
+TEST_F(FilmPosesTest, FindsPosesDespiteMovingObjects) {
   WriteFilm(0.05, 0.025);
-  Write(5, Image(400, 300, 1, 0.3f));  // a blank frame finds no place
+  Write(5, Image(400, 300, 1, 0.3f));  // a blank frame gets no pose
   options_.hold_out_every_eighth = true;
   const Scene scene = Import();
   ASSERT_TRUE(scene.capture().is_dynamic);
   ASSERT_EQ(scene.views.size(), kFrames - 1u) << observer_.text;
-  EXPECT_THAT(observer_.text, HasSubstr("1 frame of 16 found no place, left out: n105.png"));
+  EXPECT_THAT(observer_.text, HasSubstr("1 frame of 16 without a pose, left out: n105.png"));
   EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{4, 12}));
   EXPECT_GT(scene.points.size(), 200u);
   EXPECT_TRUE(fs::exists(scratch_.path() / "out/sfm.log"));
@@ -110,7 +110,7 @@ TEST_F(FilmPosesTest, AMovingCameraBeforeWhichSomethingMoves) {
   }
 }
 
-TEST_F(FilmPosesTest, ACameraThatStandsStillIsSaidToAndMakesARelief) {
+TEST_F(FilmPosesTest, MakesReliefOfStandingCamera) {
   WriteFilm(0.0, 0.025);
   options_.hold_out_every_eighth = true;
   const Scene scene = Import();
@@ -119,7 +119,7 @@ TEST_F(FilmPosesTest, ACameraThatStandsStillIsSaidToAndMakesARelief) {
   EXPECT_EQ(scene.views.size(), static_cast<size_t>(kFrames));
   EXPECT_EQ(scene.HeldOutViews(), (std::vector<int>{4, 12}));
   EXPECT_THAT(observer_.text, HasSubstr("the camera stands still"));
-  EXPECT_THAT(observer_.text, HasSubstr("a relief (2.5D), its depth is assumed"));
+  EXPECT_THAT(observer_.text, HasSubstr("a relief (2.5D) with assumed depth"));
   EXPECT_TRUE(facts_.film->camera_stands_still);
   EXPECT_TRUE(facts_.film->poses_found);
   EXPECT_GT(facts_.film->motion_energy, 0.03);
@@ -135,12 +135,12 @@ TEST_F(FilmPosesTest, ACameraThatStandsStillIsSaidToAndMakesARelief) {
   }
   for (int i = 0; i < kFrames; ++i) {
     const Image moving = ReadImage(scratch_.path() / "out/moving" / Name(i));
-    const double foot = FootRow(moving);
-    EXPECT_GT(foot, scene.relief->foot) << "the board stands before the backdrop";
+    const double foot = LowestMovingRow(moving);
+    EXPECT_GT(foot, scene.relief->foot) << "the board stands in front of the backdrop";
   }
 }
 
-TEST_F(FilmPosesTest, CutFilmsAndFramesThatShareNothingStayWithoutPoses) {
+TEST_F(FilmPosesTest, KeepsCutOrUntexturedFilmWithoutPoses) {
   for (int i = 0; i < 12; ++i) {
     Random random(static_cast<uint64_t>(i < 6 ? 1 : 2));
     Image noise(40, 30, 1);
@@ -153,7 +153,7 @@ TEST_F(FilmPosesTest, CutFilmsAndFramesThatShareNothingStayWithoutPoses) {
 
   observer_.text.clear();
   fs::remove_all(scratch_.path() / "frames");
-  for (int i = 0; i < 4; ++i) {  // textured nowhere
+  for (int i = 0; i < 4; ++i) {  // without texture
     Write(i, GradientPhoto(400, 300, 1));
   }
   EXPECT_FALSE(Import().capture().is_reconstructed);
@@ -161,7 +161,7 @@ TEST_F(FilmPosesTest, CutFilmsAndFramesThatShareNothingStayWithoutPoses) {
   EXPECT_FALSE(facts_.film->poses_found);
 }
 
-TEST_F(FilmPosesTest, TooLittleTimeLeavesTheFilmAsItIsAndCancellingDoesNot) {
+TEST_F(FilmPosesTest, KeepsFilmOnTimeoutButNotWhenCancelled) {
   WriteFilm(0.05, 0.025);
   options_.sfm_timeout = std::chrono::seconds(1);
   EXPECT_FALSE(Import().capture().is_reconstructed);

@@ -20,21 +20,21 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kNoMoment = -std::numeric_limits<double>::infinity();
+constexpr double kNoTime = -std::numeric_limits<double>::infinity();
 
-constexpr char kToldInTransforms[] = "transforms.json";  // when each film began
+constexpr char kOffsetsFile[] = "transforms.json";  // may give the time offset of each film
 
-// What its file tells of a film.
+// Contents of a film file.
 struct IndexedFilm {
   FilmFacts facts;
   std::vector<double> times;
 };
 using IndexedFilms = std::map<std::string, IndexedFilm>;  // by file
 
-// What a film's first minutes sound like.
-std::vector<float> LevelsOf(const Footage& footage,
-                            const IndexedFilms& films,
-                            const StageContext& context) {
+// Sound levels of the first ten minutes of a film; empty if it is not to be aligned by sound.
+std::vector<float> SoundLevelsOf(const Footage& footage,
+                                 const IndexedFilms& films,
+                                 const StageContext& context) {
   constexpr double kMostS = 600.0;
   if (footage.film.is_pictures || footage.film.has_pose) return {};
   const FilmFacts& facts = films.at(footage.film.file).facts;
@@ -45,13 +45,13 @@ std::vector<float> LevelsOf(const Footage& footage,
                      context.cancel());
 }
 
-// Films of which nobody has said when they began are put on the clock of the first one with sound,
-// by what both hear. One that hears nothing in common keeps its time.
+// Shifts films to the clock of the first one with sound, by the sound that both recorded. Films
+// without sound in common keep their time.
 void AlignBySound(const IndexedFilms& films, std::vector<Footage>* all, StageContext& context) {
   const Footage* first = nullptr;
   std::vector<float> heard;
   for (Footage& footage : *all) {
-    std::vector<float> levels = LevelsOf(footage, films, context);
+    std::vector<float> levels = SoundLevelsOf(footage, films, context);
     if (levels.empty()) continue;
     if (first == nullptr) {
       first = &footage;
@@ -60,29 +60,29 @@ void AlignBySound(const IndexedFilms& films, std::vector<Footage>* all, StageCon
     }
     const std::optional<double> offset_s = SoundOffset(heard, levels);
     if (!offset_s) {
-      context.progress().OnWarning(fmt::format(
-          "{} and {} share no sound that tells when they began: taken to have begun together; else "
-          "give time_offset in transforms.json",
+      context.Warn(
+          "{} and {} have no sound in common to align them by, and are assumed to begin together; "
+          "otherwise give time_offset in transforms.json",
           first->film.file,
-          footage.film.file));
+          footage.film.file);
       continue;
     }
     const double interval_s = footage.times.size() < 2 ? 0.0 : footage.times[1] - footage.times[0];
     if (std::abs(*offset_s) < 0.5 * interval_s) continue;
     for (double& time_s : footage.times) time_s += *offset_s;
-    context.progress().OnWarning(fmt::format("by their sound, {} began {:.2f} s {} {}",
-                                             footage.film.file,
-                                             std::abs(*offset_s),
-                                             *offset_s > 0.0 ? "after" : "before",
-                                             first->film.file));
+    context.Warn("by their sound, {} began {:.2f} s {} {}",
+                 footage.film.file,
+                 std::abs(*offset_s),
+                 *offset_s > 0.0 ? "after" : "before",
+                 first->film.file);
   }
 }
 
-// The films with the times of their frames on the clock that they share.
+// The films with the times of their frames on the common clock.
 std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& context) {
   IndexedFilms films;
   const auto size_of = [&](const std::string& file) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     const FilmReader reader(context.scene_folder() / file, &context.cancel());
     const FilmFacts& facts = reader.facts();
     CheckMovieSize(file, facts.width, facts.height);
@@ -102,7 +102,7 @@ std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& conte
     for (double& time_s : footage.times) time_s += footage.film.time_offset_s;
     all.push_back(std::move(footage));
   }
-  if (!fs::exists(context.scene_folder() / kToldInTransforms)) AlignBySound(films, &all, context);
+  if (!fs::exists(context.scene_folder() / kOffsetsFile)) AlignBySound(films, &all, context);
   double begin_s = std::numeric_limits<double>::infinity();
   for (const Footage& footage : all) begin_s = std::min(begin_s, footage.times.front());
   for (Footage& footage : all) {
@@ -111,15 +111,15 @@ std::vector<Footage> FilmsInTime(const FilmOptions& options, StageContext& conte
   return all;
 }
 
-// Whether a moment lies in the part that is asked for; `margin_s` farther to either side counts.
+// Returns true for times in the requested part, extended by `margin_s` to either side.
 bool IsInside(double time_s, const FilmOptions& options, double margin_s) {
   return time_s >= options.begin_s - margin_s &&
          (!options.end_s || time_s < *options.end_s + margin_s);
 }
 
-// Frames that are too near the one before them in time are no moments of their own.
-void DropRepeated(std::vector<Footage>* all) {
-  // Of the time from first to last; what is nearer is one time to MomentsOf.
+// Sets the times of frames that repeat the time of the one before them to kNoTime.
+void DropRepeatedFrames(std::vector<Footage>* all) {
+  // Relative to the time from first to last; AssignMoments treats smaller distances as one time.
   constexpr double kApart = 2e-6;
   double first_s = std::numeric_limits<double>::infinity(), last_s = 0.0;
   for (const Footage& footage : *all) {
@@ -127,10 +127,10 @@ void DropRepeated(std::vector<Footage>* all) {
     last_s = std::max(last_s, footage.times.back());
   }
   for (Footage& footage : *all) {
-    double before_s = kNoMoment;
+    double before_s = kNoTime;
     for (double& time_s : footage.times) {
       if (time_s - before_s <= kApart * (last_s - first_s)) {
-        time_s = kNoMoment;
+        time_s = kNoTime;
       } else {
         before_s = time_s;
       }
@@ -138,10 +138,10 @@ void DropRepeated(std::vector<Footage>* all) {
   }
 }
 
-// Gives frames of one moment one time, of those that may be asked for. Whether the films follow one
-// clock, so that they have such moments.
-bool ShareMoments(const FilmOptions& options, std::vector<Footage>* all, StageContext& context) {
-  constexpr double kMarginS = 1.0;  // more than a moment is long; hours may lie before and behind
+// Gives frames of different films that were taken together one time, near the requested part.
+// Returns true if the films follow one clock, so that there are such frames.
+bool AlignTimes(const FilmOptions& options, std::vector<Footage>* all, StageContext& context) {
+  constexpr double kMarginS = 1.0;  // longer than a frame; the films may be hours longer
   std::vector<FrameTime> frames;
   std::vector<double*> times;
   for (Footage& footage : *all) {
@@ -151,26 +151,26 @@ bool ShareMoments(const FilmOptions& options, std::vector<Footage>* all, StageCo
       times.push_back(&time_s);
     }
   }
-  const FrameMoments moments = MomentsOf(frames);
-  if (moments.cameras.empty()) return true;  // none, or all of one time
-  if (!moments.note.empty()) context.progress().OnWarning(moments.note);
+  const FrameMoments moments = AssignMoments(frames);
+  if (moments.cameras.empty()) return true;  // no frames, or all at one time
+  if (!moments.note.empty()) context.Warn(moments.note);
   double begin_s = std::numeric_limits<double>::infinity();
   for (const FrameTime& frame : frames) begin_s = std::min(begin_s, *frame.time);
   for (size_t i = 0; i < times.size(); ++i) *times[i] = begin_s + moments.moments[i]->time_s;
   return moments.one_clock;
 }
 
-// Every so many moments of the part that is asked for, the same of all films. Those that follow no
-// clock together have none: each counts its own frames.
-void ChooseFrames(const FilmOptions& options, std::vector<Footage>* all, StageContext& context) {
-  constexpr double kRoundedS = 1e-6;             // what adding an offset may take from a time
+// Selects every stride-th time of the requested part in all films. Without a common clock, selects
+// every stride-th frame of each film.
+void SelectFrames(const FilmOptions& options, std::vector<Footage>* all, StageContext& context) {
+  constexpr double kRoundedS = 1e-6;             // rounding error of adding an offset
   std::vector<std::pair<double, double>> spans;  // of each film, for errors
   for (const Footage& footage : *all) {
     spans.emplace_back(footage.times.front(), footage.times.back());
   }
-  DropRepeated(all);
-  const bool one_clock = ShareMoments(options, all, context);
-  std::map<double, int> moments;  // of that part, and which each is
+  DropRepeatedFrames(all);
+  const bool one_clock = AlignTimes(options, all, context);
+  std::map<double, int> moments;  // times of that part, with their numbers
   for (const Footage& footage : *all) {
     for (const double time_s : footage.times) {
       if (IsInside(time_s + kRoundedS, options, 0.0)) moments[time_s] = 0;
@@ -189,8 +189,9 @@ void ChooseFrames(const FilmOptions& options, std::vector<Footage>* all, StageCo
     }
     if (!footage.frames.empty()) continue;
     throw InvalidArgument(
-        "{}: the film has no frame of the moments that are asked for (film_begin_s, film_end_s, "
-        "film_stride); it runs from {:.2f} to {:.2f} s of the time that all films share",
+        "{}: the film has no frame in the requested part (film_begin_s, film_end_s, film_stride); "
+        "it "
+        "runs from {:.2f} to {:.2f} s on the common clock",
         footage.film.file,
         spans[film].first,
         spans[film].second);
@@ -202,7 +203,7 @@ void ChooseFrames(const FilmOptions& options, std::vector<Footage>* all, StageCo
 std::vector<Footage> ReadFootage(const FilmOptions& options, StageContext& context) {
   std::vector<Footage> all = FilmsInTime(options, context);
   if (all.empty()) return all;
-  ChooseFrames(options, &all, context);
+  SelectFrames(options, &all, context);
   size_t frames = 0;
   double seconds = 0.0;
   for (const Footage& footage : all) {

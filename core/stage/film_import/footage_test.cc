@@ -16,12 +16,12 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-// Films of 8 s, ten frames a second, that heard one event.
+// Films of 8 s at 10 frames per second that recorded one event.
 class FootageTest : public StageTest {
  protected:
   static constexpr double kSeconds = 8.0;
 
-  // Syllables of a tone, of uneven strength, and some noise.
+  // Sound of the event: syllables of a tone, of uneven strength.
   static double EventAt(double t) {
     const auto syllable = static_cast<uint64_t>(std::floor(t / 0.17));
     Random random(syllable);
@@ -49,7 +49,7 @@ class FootageTest : public StageTest {
   }
 };
 
-TEST_F(FootageTest, FilmsThatBeganApartAreAlignedByTheirSound) {
+TEST_F(FootageTest, AlignsFilmsBySound) {
   WriteFilm("a.mp4", 2.0);
   WriteFilm("b.mp4", 4.5);
   WriteFilm("c.mp4", 0.8);
@@ -65,7 +65,7 @@ TEST_F(FootageTest, FilmsThatBeganApartAreAlignedByTheirSound) {
   EXPECT_THAT(observer_.text, HasSubstr("by their sound, c.mp4 began 1.20 s before a.mp4"));
 }
 
-TEST_F(FootageTest, WhatTransformsSaysCounts) {
+TEST_F(FootageTest, PrefersOffsetsOfTransforms) {
   WriteFilm("a.mp4", 2.0);
   WriteFilm("b.mp4", 4.5);
   WriteFileAtomic(scratch_.path() / "transforms.json",
@@ -74,14 +74,14 @@ TEST_F(FootageTest, WhatTransformsSaysCounts) {
   EXPECT_EQ(observer_.text.find("by their sound"), std::string::npos);
 }
 
-TEST_F(FootageTest, WithoutASoundInCommonFilmsBeganTogether) {
+TEST_F(FootageTest, AssumesCommonStartWithoutCommonSound) {
   WriteFilm("a.mp4", 2.0);
   WriteFilm("b.mp4", 200.0);
   WriteFilm("c.mp4", 0.0, /*with_sound=*/false);
   const std::vector<Footage> all = Read();
   ASSERT_EQ(all.size(), 3u);
   for (const Footage& footage : all) EXPECT_NEAR(footage.times[0], 0.0, 1e-6);
-  EXPECT_THAT(observer_.text, HasSubstr("a.mp4 and b.mp4 share no sound that tells"));
+  EXPECT_THAT(observer_.text, HasSubstr("a.mp4 and b.mp4 have no sound in common"));
   EXPECT_EQ(observer_.text.find("c.mp4"), std::string::npos);
 }
 

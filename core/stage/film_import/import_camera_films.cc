@@ -26,19 +26,19 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Cameras that run at their own rates or begin at odd times share no moment.
-void WarnOfUnequalTimes(const std::vector<View>& views, size_t longest, StageContext& context) {
+// Warns if the cameras share few times, because their rates or start times differ.
+void WarnOfDifferentTimes(const std::vector<View>& views, size_t longest, StageContext& context) {
   std::set<double> times;
   for (const View& view : views) times.insert(view.time_s());
   if (2 * times.size() <= 3 * longest) return;
-  context.progress().OnWarning(fmt::format(
+  context.Warn(
       "the cameras' frames were not taken at the same times ({} times, {} frames of one camera): "
       "are their rates the same?",
       times.size(),
-      longest));
+      longest);
 }
 
-// The frames of all cameras as views, and where they are kept.
+// Makes views of the frames of all cameras.
 class CameraFilmsImport {
  public:
   // `all` outlives the object.
@@ -54,9 +54,7 @@ class CameraFilmsImport {
       throw InvalidArgument("none of the {} frames can be decoded", count_);
     ImportResult result;
     if (all_[0].film.has_pose) {
-      std::sort(frames_.views.begin(), frames_.views.end(), [](const View& x, const View& y) {
-        return x.name < y.name;
-      });
+      std::ranges::sort(frames_.views, {}, &View::name);
       result.scene = std::move(frames_);
       result.layout = CaptureLayout::kPosedFilms;
     } else {
@@ -64,7 +62,7 @@ class CameraFilmsImport {
       result.layout = CaptureLayout::kFilms;
     }
     result.photos_found = count_;
-    ReportTimes(&result);
+    AssignTimes(&result);
     FinishPosedScene(options, &result);
     KeepFrames(result.scene);
     return result;
@@ -72,26 +70,25 @@ class CameraFilmsImport {
   const std::optional<FilmFindings>& findings() const { return findings_; }
 
  private:
-  bool AreDrawn() const { return !all_[0].film.is_pictures; }
-  // Where pictures lie at their image_file.
+  bool AreVideos() const { return !all_[0].film.is_pictures; }
+  // Folder that image_file of the views is relative to.
   fs::path FramesRoot() const {
-    return AreDrawn() ? context_.scratch_folder() : context_.scene_folder();
+    return AreVideos() ? context_.scratch_folder() : context_.scene_folder();
   }
 
   void ReadFilm(const Footage& footage) {
     FootageReader reader(footage, context_);
     if (reader.interlaced()) {
-      context_.progress().OnWarning(footage.film.file +
-                                    " is interlaced: one field of each frame is taken");
+      context_.Warn(footage.film.file + " is interlaced: one field of each frame is taken");
     }
     for (const std::string& note : reader.notes()) {
-      context_.progress().OnWarning(footage.film.file + " " + note);
+      context_.Warn(footage.film.file + " " + note);
     }
     FramesOfCamera camera{footage.film.file, {}};
     std::vector<Image> thumbnails;
     for (const int frame : footage.frames) {
-      context_.cancel().ThrowIfCancelled();
-      context_.progress().OnProgress(done_++, count_, "reading frames");
+      context_.ThrowIfCancelled();
+      context_.ReportProgress(done_++, count_, "reading frames");
       const std::string name = footage.film.camera + "/" + reader.NameOf(frame);
       Image luminance;
       try {
@@ -114,11 +111,12 @@ class CameraFilmsImport {
   void AddView(const Footage& footage, const std::string& name, Image luminance) {
     View view = footage.film.view;
     if (!footage.film.has_pose) {
-      view.camera = view.captured_camera = UnknownCamera(luminance.width, luminance.height);
+      view.camera = view.captured_camera = GuessedCamera(luminance.width, luminance.height);
     }
     view.name = name;
-    view.image_file = AreDrawn() ? artifact::kGivenViews + name : std::string(kFramesFolder) + name;
-    if (AreDrawn()) {
+    view.image_file =
+        AreVideos() ? artifact::kGivenViews + name : std::string(kFramesFolder) + name;
+    if (AreVideos()) {
       const fs::path file = FramesRoot() / view.image_file;
       fs::create_directories(file.parent_path());
       WriteFileAtomic(file, EncodeGrayFrame(std::move(luminance)));
@@ -132,8 +130,9 @@ class CameraFilmsImport {
     const FilmShots shots = FindShots(thumbnails);
     if (shots.cuts.empty()) return;
     throw InvalidArgument(
-        "{} is cut before {}: where the poses of several cameras are looked for, each film must be "
-        "one shot; take a part of one (film_begin_s, film_end_s), or cut the films",
+        "{} has a cut before {}: to estimate the poses of several cameras, each film must be one "
+        "shot; "
+        "take a part without cuts (film_begin_s, film_end_s), or split the films",
         camera.film,
         frames_.views[camera.views[shots.cuts.front()]].name);
   }
@@ -144,26 +143,26 @@ class CameraFilmsImport {
     return std::move(placed.result);
   }
 
-  void ReportTimes(ImportResult* result) {
+  void AssignTimes(ImportResult* result) {
     std::vector<FrameTime> times;
     std::map<std::string, size_t> frames;
     for (const View& view : result->scene.views) {
       times.push_back(times_.at(view.name));
       ++frames[times.back().camera];
     }
-    FrameMoments moments = MomentsOf(times);
+    FrameMoments moments = AssignMoments(times);
     for (size_t i = 0; i < times.size(); ++i) result->scene.views[i].moment = moments.moments[i];
     result->cameras = std::move(moments.cameras);
     if (!moments.note.empty()) result->warnings.push_back(std::move(moments.note));
     size_t longest = 0;
     for (const auto& [camera, count] : frames) longest = std::max(longest, count);
-    if (result->scene.views[0].moment) WarnOfUnequalTimes(result->scene.views, longest, context_);
+    if (result->scene.views[0].moment) WarnOfDifferentTimes(result->scene.views, longest, context_);
   }
 
   void KeepFrames(const Scene& scene) {
-    if (!AreDrawn()) return;
+    if (!AreVideos()) return;
     for (const View& view : scene.views) {
-      context_.TakeOutput(view.image_file, FramesRoot() / view.image_file);
+      context_.MoveOutput(view.image_file, FramesRoot() / view.image_file);
     }
   }
 
@@ -171,15 +170,15 @@ class CameraFilmsImport {
   StageContext& context_;
   int count_ = 0, done_ = 0;
   Scene frames_;                            // views of all cameras
-  std::vector<FramesOfCamera> cameras_;     // of frames_, where poses are looked for
+  std::vector<FramesOfCamera> cameras_;     // in frames_; only if poses are estimated
   std::map<std::string, FrameTime> times_;  // by the view's name
   std::vector<std::string> damaged_;
   std::optional<FilmFindings> findings_;
 };
 
-NoFilm KindOf(const CameraFilm& film) {
-  if (film.has_pose) return NoFilm::kPosedFilms;
-  return film.is_pictures ? NoFilm::kCameraPictures : NoFilm::kCameraFilms;
+ImportedAs KindOf(const CameraFilm& film) {
+  if (film.has_pose) return ImportedAs::kPosedFilms;
+  return film.is_pictures ? ImportedAs::kCameraPictures : ImportedAs::kCameraFilms;
 }
 
 }  // namespace

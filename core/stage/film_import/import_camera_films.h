@@ -1,4 +1,4 @@
-// Films of several cameras as a scene that moves. For the import stage only.
+// Imports films of several cameras as a dynamic scene. For the import stage only.
 #pragma once
 
 #include "core/scene/import/import.h"
@@ -6,14 +6,13 @@
 
 namespace color3d {
 
-// False, and nothing done, when the scene has no such films (scene/formats/camera_films.h). Else
-// every camera's frames become views "CAMERA/f000012.png" (of pictures their own names) with the
-// frame's time and the camera's pose, as told or, where none is told, as it is found
-// (camera_poses.h). FilmOptions asks for a part and a stride (footage.h). Leaves kScene,
-// kImportFacts, the frames of videos in grey as kGivenViews and, where poses were looked for,
-// kMovingRegions and kSfmLog. Decodes one frame at a time. Frames that cannot be decoded are left
-// out and named in a warning. Throws Error{kInvalidArgument}: what ReadFootage, PlaceCameras and
-// FinishPosedScene refuse; films that are cut, where poses are looked for.
+// Returns false and does nothing if the scene has no such films (scene/formats/camera_films.h).
+// Otherwise the frames of all cameras become views "CAMERA/f000012.png" (pictures keep their names)
+// with times, and with poses from a file or estimated ones (camera_poses.h). FilmOptions select a
+// part and a stride (footage.h). Writes kScene, kImportFacts, the frames of videos in grey as
+// kGivenViews and, for estimated poses, kMovingRegions and kSfmLog. Decodes one frame at a time.
+// Frames that cannot be decoded are left out with a warning. Throws Error{kInvalidArgument}: errors
+// of ReadFootage, PlaceCameras and FinishPosedScene; cuts in films whose poses are estimated.
 bool ImportCameraFilms(const ImportOptions& options,
                        const FilmOptions& film,
                        StageContext& context);

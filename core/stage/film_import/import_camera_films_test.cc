@@ -22,7 +22,7 @@ constexpr int kWidth = 96, kHeight = 64;
 
 class ImportCameraFilmsTest : public StageTest {
  protected:
-  // Of one grey that tells camera and frame.
+  // Grey level that identifies camera and frame.
   static double Gray(int camera, int frame) { return 0.2 + 0.2 * camera + 0.02 * frame; }
   void WriteFilm(int camera, int frames, double frames_per_second = 10) {
     ThreadPool pool(1);
@@ -34,7 +34,7 @@ class ImportCameraFilmsTest : public StageTest {
     }
     writer.Finish();
   }
-  // Shown at multiples of 0.1 s, but for one that was dropped.
+  // Frames at multiples of 0.1 s, without one dropped frame.
   void WriteFilmWithout(int camera, int frames, int dropped) {
     ThreadPool pool(1);
     Mp4Writer writer(scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
@@ -60,7 +60,7 @@ class ImportCameraFilmsTest : public StageTest {
     WriteFileAtomic(scratch_.path() / "poses_bounds.npy",
                     NpyOf({static_cast<size_t>(cameras), 17}, rows));
   }
-  // The first two films; `of_second`: fields of its frame.
+  // Poses of the first two films; `of_second`: more fields of the second one.
   void WriteTransforms(const std::string& of_second) {
     const auto frame = [](const std::string& file, const std::string& more, double x) {
       return "{\"file_path\":\"" + file + "\"," + more + "\"transform_matrix\":[[1,0,0," +
@@ -87,7 +87,7 @@ class ImportCameraFilmsTest : public StageTest {
   }
 };
 
-TEST_F(ImportCameraFilmsTest, FramesOfARigAreViewsWithPosesAndTimes) {
+TEST_F(ImportCameraFilmsTest, MakesViewsWithPosesAndTimes) {
   WriteFilm(0, 12);
   WriteFilm(1, 9);  // cameras of different lengths
   WritePoses(2);
@@ -113,7 +113,7 @@ TEST_F(ImportCameraFilmsTest, FramesOfARigAreViewsWithPosesAndTimes) {
   EXPECT_EQ(facts.photos_found, 21);
 }
 
-TEST_F(ImportCameraFilmsTest, StridesPartsAndHeldOutCameras) {
+TEST_F(ImportCameraFilmsTest, AppliesStridePartAndHeldOutCamera) {
   for (int camera = 0; camera < 3; ++camera) WriteFilm(camera, 12);
   WritePoses(3);
   ImportOptions options;
@@ -121,24 +121,24 @@ TEST_F(ImportCameraFilmsTest, StridesPartsAndHeldOutCameras) {
   const Scene scene = Import({.stride = 2, .begin_s = 0.25, .end_s = 0.95}, options);
   ASSERT_EQ(scene.views.size(), 12u);  // frames 3, 5, 7, 9
   EXPECT_EQ(scene.views[1].name, "cam00/f000005.png");
-  EXPECT_NEAR(scene.views[1].moment->time_s, 0.2, 1e-6);  // from the first that is taken
+  EXPECT_NEAR(scene.views[1].moment->time_s, 0.2, 1e-6);  // relative to the first selected one
   for (const View& view : scene.views) {
     EXPECT_EQ(view.held_out, view.name.starts_with("cam02/")) << view.name;
   }
   EXPECT_THAT(Complaint({.begin_s = 9.0}),
-              HasSubstr("cam00.mp4: the film has no frame of the moments that are asked for"));
+              HasSubstr("cam00.mp4: the film has no frame in the requested part"));
   options.hold_out_camera = "cam09";
   EXPECT_THAT(Complaint({}, options), HasSubstr("the scene has cam00, cam01, cam02"));
 }
 
-TEST_F(ImportCameraFilmsTest, TooManyFramesOfAllCamerasAreRefusedWithNumbers) {
+TEST_F(ImportCameraFilmsTest, RefusesTooManyFrames) {
   for (int camera = 0; camera < 2; ++camera) WriteFilm(camera, 1510);
   WritePoses(2);
   EXPECT_THAT(Complaint({}), HasSubstr("3020 frames"));
-  EXPECT_THAT(Complaint({}), HasSubstr("take every 2th (film_stride)"));
+  EXPECT_THAT(Complaint({}), HasSubstr("set film_stride to 2"));
 }
 
-TEST_F(ImportCameraFilmsTest, OneTimeIsAStillScene) {
+TEST_F(ImportCameraFilmsTest, MakesStaticSceneOfOneTime) {
   for (int camera = 0; camera < 3; ++camera) WriteFilm(camera, 4);
   WritePoses(3);
   const Scene scene = Import({.stride = 100});
@@ -147,7 +147,7 @@ TEST_F(ImportCameraFilmsTest, OneTimeIsAStillScene) {
   EXPECT_THAT(observer_.text, HasSubstr("the scene is static"));
 }
 
-TEST_F(ImportCameraFilmsTest, OddRatesAreTold) {
+TEST_F(ImportCameraFilmsTest, WarnsOfDifferentRates) {
   WriteFilm(0, 8, 10);
   WriteFilm(1, 8, 17);
   WritePoses(2);
@@ -155,11 +155,11 @@ TEST_F(ImportCameraFilmsTest, OddRatesAreTold) {
   EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times"));
 }
 
-TEST_F(ImportCameraFilmsTest, ClocksThatAreOffAreSetByTheirOffset) {
+TEST_F(ImportCameraFilmsTest, AppliesTimeOffsets) {
   WriteFilm(0, 8);
   WriteFilm(1, 8);
   WriteTransforms("\"time_offset\":-0.25,");
-  Scene scene = Import();  // cam01 began 2.5 frames before the other
+  Scene scene = Import();  // cam01 starts 2.5 frames before cam00
   EXPECT_NEAR(scene.views[0].time_s(), 0.25, 1e-6);
   EXPECT_EQ(scene.views[8].name, "cam01/f000000.png");
   EXPECT_NEAR(scene.views[8].time_s(), 0.0, 1e-6);
@@ -176,7 +176,7 @@ TEST_F(ImportCameraFilmsTest, ClocksThatAreOffAreSetByTheirOffset) {
   EXPECT_THAT(Complaint(), HasSubstr("frame 1: time_offset must be a finite number"));
 }
 
-// Which frames of each camera are taken, by their time.
+// Selected frames of each camera by their time.
 using FramesAt = std::map<std::string, std::map<double, std::string>>;
 FramesAt FramesOf(const Scene& scene) {
   FramesAt frames;
@@ -187,7 +187,7 @@ FramesAt FramesOf(const Scene& scene) {
   return frames;
 }
 
-TEST_F(ImportCameraFilmsTest, AStrideTakesTheSameMomentsOfCamerasThatBeganApart) {
+TEST_F(ImportCameraFilmsTest, StrideSelectsSameTimesDespiteOffset) {
   WriteFilm(0, 8);
   WriteFilm(1, 8);
   WriteTransforms("\"time_offset\":0.1,");  // one frame
@@ -198,7 +198,7 @@ TEST_F(ImportCameraFilmsTest, AStrideTakesTheSameMomentsOfCamerasThatBeganApart)
           {"cam01", {{0.2, "f000001"}, {0.4, "f000003"}, {0.6, "f000005"}, {0.8, "f000007"}}}}));
 }
 
-TEST_F(ImportCameraFilmsTest, AStrideTakesTheSameMomentsWhereOneCameraDroppedAFrame) {
+TEST_F(ImportCameraFilmsTest, StrideSelectsSameTimesDespiteDroppedFrame) {
   WriteFilm(0, 8);
   WriteFilmWithout(1, 8, 3);
   WriteTransforms("");
@@ -209,7 +209,7 @@ TEST_F(ImportCameraFilmsTest, AStrideTakesTheSameMomentsWhereOneCameraDroppedAFr
           {"cam01", {{0.0, "f000000"}, {0.2, "f000002"}, {0.4, "f000003"}, {0.6, "f000005"}}}}));
 }
 
-TEST_F(ImportCameraFilmsTest, APartIsTheSameOfCamerasThatBeganApart) {
+TEST_F(ImportCameraFilmsTest, PartIsTheSameDespiteOffset) {
   WriteFilm(0, 9);
   WriteFilm(1, 9);
   WriteTransforms("\"time_offset\":0.3,");
@@ -217,39 +217,39 @@ TEST_F(ImportCameraFilmsTest, APartIsTheSameOfCamerasThatBeganApart) {
             (FramesAt{{"cam00", {{0.0, "f000005"}, {0.1, "f000006"}}},
                       {"cam01", {{0.0, "f000002"}, {0.1, "f000003"}}}}));
   EXPECT_THAT(Complaint({.end_s = 0.25}),
-              HasSubstr("cam01.mp4: the film has no frame of the moments that are asked for "
+              HasSubstr("cam01.mp4: the film has no frame in the requested part "
                         "(film_begin_s, film_end_s, film_stride); it runs from 0.30 to 1.10 s"));
 }
 
-TEST_F(ImportCameraFilmsTest, CamerasThatShareNoMomentsCountTheirOwnFrames) {
+TEST_F(ImportCameraFilmsTest, StrideCountsFramesWithoutCommonTimes) {
   WriteFilm(0, 8);
   WriteFilm(1, 8);
-  WriteTransforms("\"time_offset\":0.05,");  // always between two frames of the other
+  WriteTransforms("\"time_offset\":0.05,");  // between two frames of the other camera
   const FramesAt frames = FramesOf(Import({.stride = 2}));
   EXPECT_EQ(frames.at("cam00").size(), 4u);
   EXPECT_EQ(frames.at("cam01").size(), 4u);
 }
 
-TEST_F(ImportCameraFilmsTest, OddTimesAreToldBesideWhatIsSaidOfTheClock) {
+TEST_F(ImportCameraFilmsTest, WarnsOfDifferentTimesAndClocks) {
   WriteFilm(0, 8);
   WriteFilm(1, 8);
   WriteTransforms("\"time_offset\":0.72,");
-  Import();  // one frame of each is of one moment, nearly
+  Import();  // only one frame of each was taken at nearly the same time
   EXPECT_THAT(observer_.text, HasSubstr("clocks differ by up to 0.02 s"));
   EXPECT_THAT(observer_.text, HasSubstr("not taken at the same times (15 times, 8 frames"));
 }
 
-TEST_F(ImportCameraFilmsTest, OptionsOfNoUseAreTold) {
+TEST_F(ImportCameraFilmsTest, WarnsOfUnusedOptions) {
   for (int camera = 0; camera < 2; ++camera) WriteFilm(camera, 4);
   WritePoses(2);
   Import({.stride = 2});
-  EXPECT_THAT(observer_.text, Not(HasSubstr("left aside")));
+  EXPECT_THAT(observer_.text, Not(HasSubstr("ignored")));
   Import({.frames_per_second = 16, .deflicker = true, .poses = FilmPoses::kAuto});
   EXPECT_THAT(observer_.text,
-              HasSubstr("film_frames_per_second, film_deflicker, film_poses are left aside"));
+              HasSubstr("film_frames_per_second, film_deflicker, film_poses are ignored"));
 }
 
-TEST_F(ImportCameraFilmsTest, FilmsThatAreNoneAreRefusedByName) {
+TEST_F(ImportCameraFilmsTest, NamesUnreadableFilm) {
   WriteFilm(0, 4);
   WriteFileAtomic(scratch_.path() / "cam01.mp4", "no film");
   WritePoses(2);

@@ -28,7 +28,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Pictures of all frames that are wanted, one after the other: sRGB or grey.
+// The requested frames, read one by one: sRGB or grey.
 struct FrameStream {
   int count = 0;
   std::function<double(int)> time_s;
@@ -37,19 +37,20 @@ struct FrameStream {
   bool is_video = false;
 };
 
-// Indices of the frames that are asked for.
-std::vector<int> Wanted(const std::vector<double>& times, const FilmOptions& options) {
+// Indices of the requested frames, at least two.
+std::vector<int> RequestedFilmFrames(const std::vector<double>& times, const FilmOptions& options) {
   std::vector<int> wanted = RequestedFrames(times, options);
   CheckFrameCount(wanted.size(), times[wanted.back()] - times[wanted.front()], options);
   if (wanted.size() == 1) {
     throw InvalidArgument(
-        "one frame is no film; give one of two frames at least, or take more of its own "
-        "(film_stride, film_begin_s, film_end_s)");
+        "a film needs at least two frames, and one was requested; give a longer film, or request "
+        "more "
+        "frames (film_stride, film_begin_s, film_end_s)");
   }
   return wanted;
 }
 
-void ReportShots(const FilmShots& shots, Scene* scene, StageContext& context) {
+void AssignShots(const FilmShots& shots, Scene* scene, StageContext& context) {
   std::vector<std::string> blank, alien, cuts;
   for (size_t i = 0; i < scene->views.size(); ++i) {
     View& view = scene->views[i];
@@ -58,40 +59,41 @@ void ReportShots(const FilmShots& shots, Scene* scene, StageContext& context) {
     if (shots.fault[i] == FrameFault::kAlien) alien.push_back(view.name);
   }
   for (const int frame : shots.cuts) cuts.push_back(scene->views[frame].name);
-  WarnOfFrames(blank, "of one grey all over", context);
-  WarnOfFrames(alien, "unlike those around (torn?), coloured on their own", context);
+  WarnOfFrames(blank, "with no detail", context);
+  WarnOfFrames(alien, "unlike their neighbours (torn?), coloured on their own", context);
   if (cuts.empty()) return;
-  context.progress().OnWarning(fmt::format(
-      "the film is cut before {}: {} shots; a key view colours its own shot by motion, others only "
-      "by likeness. Colour a frame of each (additional key views; the selection of several names "
-      "one a shot)",
+  context.Warn(
+      "the film has cuts before {}: {} shots; a key view colours its own shot by optical flow and "
+      "other shots by similarity. Colour a frame of each shot (additional key views; the selection "
+      "of "
+      "several key views proposes one for each shot)",
       NamesOfFrames(cuts),
-      cuts.size() + 1));
+      cuts.size() + 1);
 }
 
-// The frames that can be decoded, and small pictures of them.
+// The frames that can be decoded.
 struct ReadFrames {
   Scene scene;
   std::vector<int> index;         // of each view, in the stream
-  std::vector<Image> thumbnails;  // for the shots
-  std::vector<Image> tones;       // for exposure; empty where it stays
+  std::vector<Image> thumbnails;  // to find shots
+  std::vector<Image> tones;       // to steady exposure; empty without deflicker
 };
 
-View ViewOf(const FrameStream& stream, int i, const Image& luminance, bool is_drawn) {
+View ViewOf(const FrameStream& stream, int i, const Image& luminance, bool is_written) {
   View view;
   view.name = stream.name(i);
   view.image_file = std::string(kFramesFolder) + view.name;
-  if (is_drawn) {
+  if (is_written) {
     view.image_file =
         artifact::kGivenViews + fs::path(view.name).replace_extension(".png").string();
   }
-  view.camera = view.captured_camera = UnknownCamera(luminance.width, luminance.height);
+  view.camera = view.captured_camera = GuessedCamera(luminance.width, luminance.height);
   view.moment = Moment{stream.time_s(i), 0};
   return view;
 }
 
-// Kept aside until it is known which frames stay.
-void WriteScratchFrame(const View& view, Image luminance, const StageContext& context) {
+// Writes the frame to the scratch folder until all frames are known.
+void StoreFrame(const View& view, Image luminance, const StageContext& context) {
   const fs::path file = context.scratch_folder() / view.image_file;
   fs::create_directories(file.parent_path());
   WriteFileAtomic(file, EncodeGrayFrame(std::move(luminance)));
@@ -102,8 +104,8 @@ ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& cont
   std::vector<View>& views = frames.scene.views;
   std::vector<std::string> damaged;
   for (int i = 0; i < stream.count; ++i) {
-    context.cancel().ThrowIfCancelled();
-    context.progress().OnProgress(i, stream.count, "reading frames");
+    context.ThrowIfCancelled();
+    context.ReportProgress(i, stream.count, "reading frames");
     Image luminance;
     try {
       luminance = LuminanceFromSrgb(stream.read(i));
@@ -116,55 +118,54 @@ ReadFrames ReadAll(const FrameStream& stream, bool deflicker, StageContext& cont
     if (views.empty()) CheckMovieSize(view.name, view.camera.width, view.camera.height);
     if (!views.empty() && (view.camera.width != views[0].camera.width ||
                            view.camera.height != views[0].camera.height)) {
-      throw InvalidArgument("{} has {} x {} px, but {} has {} x {} px: frames of a film are alike",
-                            view.name,
-                            view.camera.width,
-                            view.camera.height,
-                            views[0].name,
-                            views[0].camera.width,
-                            views[0].camera.height);
+      throw InvalidArgument(
+          "{} has {} x {} px, but {} has {} x {} px; all frames of a film must have one size",
+          view.name,
+          view.camera.width,
+          view.camera.height,
+          views[0].name,
+          views[0].camera.width,
+          views[0].camera.height);
     }
     frames.thumbnails.push_back(FitWithin(luminance, kShotThumbnailPx));
     if (deflicker) frames.tones.push_back(FitWithin(luminance, kTonePicturePx));
-    if (stream.is_video && !deflicker) WriteScratchFrame(view, std::move(luminance), context);
+    if (stream.is_video && !deflicker) StoreFrame(view, std::move(luminance), context);
     views.push_back(std::move(view));
     frames.index.push_back(i);
   }
   WarnOfFrames(damaged, "cannot be decoded and are left out", context);
   if (views.size() < 2) {
     throw InvalidArgument(
-        "{} of {} frames can be decoded; a film has two at least", views.size(), stream.count);
+        "{} of {} frames can be decoded; a film needs at least two", views.size(), stream.count);
   }
   CheckStemsAreUnique(frames.scene);
   return frames;
 }
 
-// Every frame once more, now that it is known what is steady.
+// Writes every frame with steadied exposure.
 void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageContext& context) {
   std::vector<int> shot;
   for (const View& view : frames.scene.views) shot.push_back(view.moment->shot);
   const SteadyTones tones = FindSteadyTones(frames.tones, shot, context.pool(), context.cancel());
   const auto count = static_cast<int>(frames.index.size());
   for (int i = 0; i < count; ++i) {
-    context.cancel().ThrowIfCancelled();
-    context.progress().OnProgress(i, count, "steadying exposure");
-    WriteScratchFrame(
-        frames.scene.views[i],
-        ApplyToneCurve(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
-        context);
+    context.ThrowIfCancelled();
+    context.ReportProgress(i, count, "steadying exposure");
+    StoreFrame(frames.scene.views[i],
+               Toned(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
+               context);
   }
-  constexpr double kNothingL = 1e-6;
-  if (std::abs(tones.flicker_before - tones.flicker_after) < kNothingL) {
-    return context.progress().OnWarning(
-        fmt::format("exposure is steady: from a frame to the next it changes by {:.2f} L in the "
-                    "mean; it is left as it is",
-                    tones.flicker_before));
+  constexpr double kUnchangedL = 1e-6;
+  if (std::abs(tones.flicker_before - tones.flicker_after) < kUnchangedL) {
+    return context.Warn("exposure is steady (mean change between frames {:.2f} L) and is kept",
+                        tones.flicker_before);
   }
-  context.progress().OnWarning(
-      fmt::format("exposure is steadied: from a frame to the next it changed by {:.2f} L in the "
-                  "mean, now by {:.2f}; the coloured film has the steady luminance",
-                  tones.flicker_before,
-                  tones.flicker_after));
+  context.Warn(
+      "exposure is steadied: mean change between frames {:.2f} L before, {:.2f} L after; the "
+      "coloured "
+      "film has the steadied luminance",
+      tones.flicker_before,
+      tones.flicker_after);
 }
 
 void ImportFrames(const FrameStream& stream,
@@ -173,29 +174,29 @@ void ImportFrames(const FrameStream& stream,
                   StageContext& context) {
   ReadFrames frames = ReadAll(stream, options.deflicker, context);
   Scene& scene = frames.scene;
-  ReportShots(FindShots(frames.thumbnails), &scene, context);
+  AssignShots(FindShots(frames.thumbnails), &scene, context);
   if (options.deflicker) WriteSteady(stream, frames, context);
-  const bool is_drawn = stream.is_video || options.deflicker;
+  const bool is_written = stream.is_video || options.deflicker;
   ImportFacts facts;
   facts.layout = CaptureLayout::kFilm;
   facts.photos_found = stream.count;
   facts.photos_registered = static_cast<int>(scene.views.size());
   if (options.poses == FilmPoses::kAuto) {
-    FindFilmPoses(is_drawn ? context.scratch_folder() : context.scene_folder(),
+    FindFilmPoses(is_written ? context.scratch_folder() : context.scene_folder(),
                   import,
                   context,
                   &scene,
                   &facts);
   }
-  if (is_drawn) {
+  if (is_written) {
     for (const View& view : scene.views) {
-      context.TakeOutput(view.image_file, context.scratch_folder() / view.image_file);
+      context.MoveOutput(view.image_file, context.scratch_folder() / view.image_file);
     }
   }
   std::vector<std::string> warnings;
   if (import.hold_out_every_eighth) HoldOutEveryEighth(&scene, &warnings);
   if (import.hold_out_block > 0.0) HoldOutBlock(import.hold_out_block, &scene);
-  for (const std::string& warning : warnings) context.progress().OnWarning(warning);
+  for (const std::string& warning : warnings) context.Warn(warning);
   context.WriteOutput(artifact::kScene, SceneToJson(scene));
   context.WriteOutput(artifact::kImportFacts, ImportFactsToJson(facts));
 }
@@ -210,12 +211,12 @@ void ImportVideo(const std::string& file,
         file);
   }
   FilmReader film(context.scene_folder() / file, &context.cancel());
-  const std::vector<int> wanted = Wanted(film.times(), options);
+  const std::vector<int> wanted = RequestedFilmFrames(film.times(), options);
   if (film.facts().interlaced) {
-    context.progress().OnWarning("the film is interlaced: one field of each frame is taken");
+    context.Warn("the film is interlaced: one field of each frame is taken");
   }
   for (const std::string& note : film.facts().notes) {
-    context.progress().OnWarning("the film " + note);
+    context.Warn("the film " + note);
   }
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());
@@ -232,7 +233,7 @@ void ImportPictures(const FilmOptions& options,
   const fs::path folder = context.scene_folder() / kFramesFolder;
   const std::vector<std::string> files = PicturesIn(folder);
   const std::vector<double> times = TimesOfPictures(files, options, context);
-  const std::vector<int> wanted = Wanted(times, options);
+  const std::vector<int> wanted = RequestedFilmFrames(times, options);
   FrameStream stream;
   stream.count = static_cast<int>(wanted.size());
   stream.time_s = [&](int i) { return times[wanted[i]]; };
@@ -252,7 +253,7 @@ void FilmOptions::Validate() const {
   if (end_s) check("end_s", *end_s, 0.01, 1e6);
   if (frames_per_second) check("frames_per_second", *frames_per_second, 1, 120);
   if (end_s && *end_s <= begin_s) {
-    throw InvalidArgument("the film's part ends ({} s) before it begins ({} s)", *end_s, begin_s);
+    throw InvalidArgument("film_end_s is {} s, before film_begin_s ({} s)", *end_s, begin_s);
   }
 }
 

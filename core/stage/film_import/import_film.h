@@ -1,5 +1,5 @@
-// A film as a scene: its frames are the views, all of one camera that is not known, unless its
-// poses are asked for and found. For the import stage only.
+// Imports a film of one camera: its frames are the views, without poses unless these are requested
+// and found. For the import stage only.
 #pragma once
 
 #include <filesystem>
@@ -12,18 +12,17 @@
 
 namespace color3d {
 
-// The film among the files of a scene: a video file, or "frames/" for pictures in that folder.
+// Returns the film among the files of a scene: a video file, or "frames/" for pictures there.
 // Requires: the scene is laid out as a film (DetectCapture).
 std::string FindFilm(const std::vector<std::string>& files);
 
-// Leaves kScene, kImportFacts and, of a video file or where exposure is made steady, the frames in
-// grey as kGivenViews; with poses kMovingRegions and kSfmLog, too. Of `import`, every eighth frame
-// held out and, for poses, what is said of structure-from-motion count. Frames that cannot be
-// decoded are left out; those, and blank and torn ones, are named in a warning. Throws
-// Error{kInvalidArgument}: no film that can be read, nothing between the times that are asked for,
-// one frame, more than kMaxFilmFrames (with the stride and the length that would do), frames that
-// are too small for a movie, of different sizes or of names that differ in their endings only, a
-// rate for a video file, a camera to hold out.
+// Writes kScene, kImportFacts and, for videos and with deflicker, the frames in grey as
+// kGivenViews; with poses also kMovingRegions and kSfmLog. Of `import`, only held-out frames and
+// options of structure-from-motion have an effect. Frames that cannot be decoded are left out;
+// warnings name them, and blank and torn ones. Throws Error{kInvalidArgument}: an unreadable film,
+// no frame or one frame in the requested part, more than kMaxFilmFrames, frames too small for a
+// movie, of different sizes or with names that differ in their extension only, a rate for a video
+// file, a held-out camera.
 void ImportFilm(const std::string& film,
                 const FilmOptions& options,
                 const ImportOptions& import,

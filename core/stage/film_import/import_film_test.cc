@@ -25,7 +25,7 @@ using testing::HasSubstr;
 
 constexpr int kWidth = 96, kHeight = 64;
 
-// Waves of their own for each place, that wander.
+// Moving waves, different for each place.
 Image FrameOf(int place, int frame) {
   Image image(kWidth, kHeight, 3);
   for (int y = 0; y < kHeight; ++y) {
@@ -72,7 +72,7 @@ class ImportFilmTest : public StageTest {
   }
 };
 
-TEST_F(ImportFilmTest, FramesOfAVideoAreViewsWithTheirMoments) {
+TEST_F(ImportFilmTest, MakesViewsWithTimesOfVideo) {
   WriteVideo(24, 24);
   EXPECT_EQ(FindFilm(ListFiles(scratch_.path())), "film.mp4");
   ImportOptions options;
@@ -95,7 +95,7 @@ TEST_F(ImportFilmTest, FramesOfAVideoAreViewsWithTheirMoments) {
   EXPECT_EQ(observer_.text, "");
 }
 
-TEST_F(ImportFilmTest, InterlacedFilmsAreTakenByTheFieldAndToldSo) {
+TEST_F(ImportFilmTest, ReadsOneFieldOfInterlacedFilm) {
   WriteInterlacedFilm(scratch_.path() / "tape.mov", kWidth, kHeight, 6, [](int, int field, int x) {
     return 0.3 + 0.1 * field + 0.3 * std::sin(0.2 * x);
   });
@@ -107,20 +107,21 @@ TEST_F(ImportFilmTest, InterlacedFilmsAreTakenByTheFieldAndToldSo) {
   EXPECT_NEAR(frame.At(0, 20, 30), frame.At(0, 21, 30), 0.02) << "no line of the other field";
 }
 
-TEST_F(ImportFilmTest, PartsStridesAndCuts) {
+TEST_F(ImportFilmTest, AppliesPartsAndStridesAndFindsCuts) {
   WriteVideo(40, 20);
   EXPECT_EQ(Import().views[25].moment->shot, 1);
-  EXPECT_THAT(observer_.text, HasSubstr("cut before f000020.png: 2 shots"));
+  EXPECT_THAT(observer_.text, HasSubstr("cuts before f000020.png: 2 shots"));
   const Scene part = Import({.stride = 3, .begin_s = 0.5, .end_s = 1.55});
   ASSERT_EQ(part.views.size(), 4u);  // frames 5, 8, 11, 14
   EXPECT_EQ(part.views[1].name, "f000008.png");
   EXPECT_THAT(Complaint({.begin_s = 9.0}), HasSubstr("it lasts 3.90 s"));
-  EXPECT_THAT(Complaint({.begin_s = 2.0, .end_s = 1.0}), HasSubstr("ends"));
+  EXPECT_THAT(Complaint({.begin_s = 2.0, .end_s = 1.0}),
+              HasSubstr("film_end_s is 1 s, before film_begin_s (2 s)"));
   EXPECT_THAT(Complaint({.stride = 0}), HasSubstr("stride"));
-  EXPECT_THAT(Complaint({.stride = 900}), HasSubstr("one frame is no film"));
+  EXPECT_THAT(Complaint({.stride = 900}), HasSubstr("a film needs at least two frames"));
 }
 
-TEST_F(ImportFilmTest, PicturesInFramesAreAFilm) {
+TEST_F(ImportFilmTest, ImportsPicturesInFrames) {
   for (int i = 0; i < 9; ++i) WriteFrame("n" + std::to_string(i) + ".png", FrameOf(1, i));
   WriteFrame("n4.png", Image(kWidth, kHeight, 3, 0.01f));
   EXPECT_EQ(FindFilm(ListFiles(scratch_.path())), "frames/");
@@ -130,12 +131,12 @@ TEST_F(ImportFilmTest, PicturesInFramesAreAFilm) {
   EXPECT_NEAR(scene.views[2].moment->time_s, 0.08, 1e-9);
   EXPECT_EQ(scene.views[5].moment->shot, 0);
   EXPECT_EQ(scene.views[4].moment->shot, 1);
-  EXPECT_THAT(observer_.text, HasSubstr("1 frame of one grey all over: n4.png"));
+  EXPECT_THAT(observer_.text, HasSubstr("1 frame with no detail: n4.png"));
   WriteFrame("n7.png", Image(kWidth, kHeight + 8, 3, 0.5f));
   EXPECT_THAT(Complaint(), HasSubstr("n7.png"));
 }
 
-TEST_F(ImportFilmTest, PicturesWhoseNumbersHaveNoZerosComeInTheirOrder) {
+TEST_F(ImportFilmTest, SortsPicturesByNumber) {
   for (int i = 1; i <= 12; ++i) WriteFrame("n" + std::to_string(i) + ".png", FrameOf(1, i));
   const Scene scene = Import();
   ASSERT_EQ(scene.views.size(), 12u);
@@ -145,7 +146,7 @@ TEST_F(ImportFilmTest, PicturesWhoseNumbersHaveNoZerosComeInTheirOrder) {
   }
 }
 
-TEST_F(ImportFilmTest, FramesThatAreMissingLeaveTheirTime) {
+TEST_F(ImportFilmTest, MissingFramesLeaveGaps) {
   for (const int i : {0, 1, 2, 3, 7, 8}) {
     WriteFrame(fmt::format("shot_{:04}.png", i), FrameOf(1, i));
   }
@@ -157,7 +158,7 @@ TEST_F(ImportFilmTest, FramesThatAreMissingLeaveTheirTime) {
               HasSubstr("3 frames are missing between shot_0003.png and shot_0007.png"));
 }
 
-TEST_F(ImportFilmTest, HdrIsTold) {
+TEST_F(ImportFilmTest, WarnsOfHdr) {
   ASSERT_TRUE(WriteToneFilm(scratch_.path() / "film.mkv",
                             {{.pixel_format = "yuv420p10le",
                               .range = "tv",
@@ -167,7 +168,7 @@ TEST_F(ImportFilmTest, HdrIsTold) {
   EXPECT_THAT(observer_.text, HasSubstr("the film is HDR (PQ): its tones are mapped"));
 }
 
-TEST_F(ImportFilmTest, PicturesHaveTheRateThatIsGiven) {
+TEST_F(ImportFilmTest, AppliesFrameRateToPictures) {
   for (int i = 0; i < 5; ++i) WriteFrame("n" + std::to_string(i) + ".png", FrameOf(1, i));
   EXPECT_NEAR(Import({.frames_per_second = 16}).views[4].moment->time_s, 0.25, 1e-12);
   EXPECT_NEAR(Import({.frames_per_second = 18}).views[3].moment->time_s, 3 / 18.0, 1e-12);
@@ -177,7 +178,7 @@ TEST_F(ImportFilmTest, PicturesHaveTheRateThatIsGiven) {
   EXPECT_THAT(Complaint({.frames_per_second = 16}), HasSubstr("film.mp4 has times of its own"));
 }
 
-TEST_F(ImportFilmTest, ACameraToHoldOutIsRefusedInsteadOfLosingThePoses) {
+TEST_F(ImportFilmTest, RefusesHeldOutCamera) {
   WriteVideo(4, 4);
   for (const FilmPoses poses : {FilmPoses::kOff, FilmPoses::kAuto}) {
     ImportOptions options;
@@ -187,19 +188,19 @@ TEST_F(ImportFilmTest, ACameraToHoldOutIsRefusedInsteadOfLosingThePoses) {
   }
 }
 
-TEST_F(ImportFilmTest, FramesOfOneStemAreRefused) {
+TEST_F(ImportFilmTest, RefusesFramesWithOneStem) {
   WriteFrame("a.png", FrameOf(1, 0));
   WriteFrame("b.png", FrameOf(1, 1));
   WriteFileAtomic(scratch_.path() / "frames/a.jpg", EncodeJpeg(FrameOf(1, 2), 90));
   EXPECT_THAT(Complaint(), HasSubstr("a.jpg"));
 }
 
-TEST_F(ImportFilmTest, OneFrameIsNoFilm) {
+TEST_F(ImportFilmTest, RefusesOneFrame) {
   WriteVideo(1, 1);
-  EXPECT_THAT(Complaint(), HasSubstr("one frame is no film"));
+  EXPECT_THAT(Complaint(), HasSubstr("a film needs at least two frames"));
 }
 
-TEST_F(ImportFilmTest, FramesThatAreTooSmallForAMovieAreRefusedAtOnce) {
+TEST_F(ImportFilmTest, RefusesFramesTooSmallForAMovie) {
   for (int i = 0; i < 2; ++i) {
     WriteFrame("n" + std::to_string(i) + ".png", Image(96, 15, 3, 0.3f + 0.1f * i));
   }
@@ -213,22 +214,22 @@ TEST_F(ImportFilmTest, FramesThatAreTooSmallForAMovieAreRefusedAtOnce) {
   EXPECT_EQ(Complaint(), "");
 }
 
-TEST_F(ImportFilmTest, FourHoursAreRefusedWithNumbers) {
+TEST_F(ImportFilmTest, RefusesFourHoursWithRemedy) {
   ThreadPool pool(1);
   Mp4Writer writer(scratch_.path() / "film.mp4",
                    {.width = 32, .height = 16, .frames_per_second = 1, .ticks_per_second = 1000});
-  constexpr int kFrames = 4 * 3600 / 4;  // one in four seconds
+  constexpr int kFrames = 4 * 3600 / 4;  // one every 4 s
   const Image gray(32, 16, 3, 0.5f);
   for (int i = 0; i < kFrames; ++i) writer.AddAt(4.0 * i, 4.0, gray, pool);
   writer.Finish();
   const std::string complaint = Complaint();
   EXPECT_THAT(complaint, HasSubstr("3600 frames (14396 s)"));
-  EXPECT_THAT(complaint, HasSubstr("take every 2th"));
-  EXPECT_THAT(complaint, HasSubstr("part of 11996 s"));
+  EXPECT_THAT(complaint, HasSubstr("set film_stride to 2"));
+  EXPECT_THAT(complaint, HasSubstr("part of at most 11996 s"));
   EXPECT_EQ(Import({.begin_s = 100.0, .end_s = 140.0}).views.size(), 10u);
 }
 
-TEST_F(ImportFilmTest, DuplicateFramesAreNoCutAndNoFault) {
+TEST_F(ImportFilmTest, AcceptsDuplicateFrames) {
   ThreadPool pool(1);
   Mp4Writer writer(scratch_.path() / "film.mp4",
                    {.width = kWidth, .height = kHeight, .frames_per_second = 24, .threads = 1});
@@ -238,7 +239,7 @@ TEST_F(ImportFilmTest, DuplicateFramesAreNoCutAndNoFault) {
   EXPECT_EQ(observer_.text, "");
 }
 
-TEST_F(ImportFilmTest, ADamagedPartIsLeftOutAndNamed) {
+TEST_F(ImportFilmTest, LeavesOutDamagedPart) {
   WriteVideo(90, 90);  // key frames every 2 s: 0, 20, 40, ...
   std::string bytes = ReadFile(scratch_.path() / "film.mp4");
   const size_t data = bytes.find("mdat");
@@ -249,11 +250,11 @@ TEST_F(ImportFilmTest, ADamagedPartIsLeftOutAndNamed) {
   EXPECT_LT(scene.views.size(), 90u);
   EXPECT_GT(scene.views.size(), 50u);
   EXPECT_THAT(observer_.text, HasSubstr("cannot be decoded and are left out: f0000"));
-  EXPECT_NEAR(scene.views.back().moment->time_s, 8.9, 1e-6) << "what follows keeps its time";
+  EXPECT_NEAR(scene.views.back().moment->time_s, 8.9, 1e-6) << "later frames keep their times";
 }
 
-TEST_F(ImportFilmTest, ExposureIsSteadied) {
-  // Of pictures and of a video alike.
+TEST_F(ImportFilmTest, SteadiesExposure) {
+  // For pictures and for a video.
   const auto exposed = [](int i) {
     Image image = FrameOf(1, i);
     for (float& v : image.data) v *= i % 2 == 0 ? 0.8f : 1.0f;
@@ -289,7 +290,7 @@ TEST_F(ImportFilmTest, ExposureIsSteadied) {
   EXPECT_GT(flicker(Import()), 0.08);
 }
 
-TEST_F(ImportFilmTest, PhotosBesideAVideoAreNoFilm) {
+TEST_F(ImportFilmTest, IgnoresVideoBesidePhotos) {
   WriteVideo(3, 3);
   WriteFileAtomic(scratch_.path() / "photo.png", EncodePng8(FrameOf(1, 0)));
   EXPECT_NE(DetectCapture(ListFiles(scratch_.path())), CaptureLayout::kFilm);

@@ -31,8 +31,8 @@ void MovingRegionFiles::Write(int view, const Image& moving) const {
   WriteFileAtomic(MovingFile(view), EncodePng8(moving));
   Image still = moving;
   for (float& v : still.data) v = 1.0f - v;
-  // A mask that leaves nothing is none: such a frame finds its place by what moves, or not at all.
-  if (std::all_of(still.data.begin(), still.data.end(), [](float v) { return v == 0.0f; })) return;
+  // Without static background there is no mask: such a frame is placed by its moving objects.
+  if (std::ranges::all_of(still.data, [](float v) { return v == 0.0f; })) return;
   const Camera& camera = scene_.views[view].captured_camera;
   WriteFileAtomic(folder_ / "still" / Name(view),
                   EncodePng8(ResizeMask(still, camera.width, camera.height)));
@@ -45,9 +45,9 @@ fs::path MovingRegionFiles::StillFile(int view) const {
   return fs::exists(file) ? file : fs::path();
 }
 
-void MovingRegionFiles::Leave(const Scene& placed, StageContext& context) const {
+void MovingRegionFiles::Publish(const Scene& placed, StageContext& context) const {
   for (const View& view : placed.views) {
-    context.TakeOutput(ViewArtifact(artifact::kMovingRegions, view, ".png"),
+    context.MoveOutput(ViewArtifact(artifact::kMovingRegions, view),
                        MovingFile(scene_.FindView(view.name)));
   }
 }
@@ -65,8 +65,7 @@ ShotMotion WriteMovingRegions(const fs::path& frames_root,
                            context.cancel(),
                            [&](int frame, const Image& moving) {
                              files.Write(shot[frame], moving);
-                             context.progress().OnProgress(
-                                 ++done, count, "looking for what moves on its own");
+                             context.ReportProgress(++done, count, "finding moving objects");
                            });
 }
 

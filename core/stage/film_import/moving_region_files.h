@@ -1,4 +1,4 @@
-// What of a film's frames moves on its own, as files. For this folder only.
+// Files with the moving regions of the frames of a film. For this folder only.
 #pragma once
 
 #include <filesystem>
@@ -11,25 +11,27 @@
 
 namespace color3d {
 
-// Of each frame what moves, as a picture, and what stands still, as a mask of the frame's size.
+// For each frame a picture of the moving regions and a mask of the static background, which has the
+// size of the frame.
 class MovingRegionFiles {
  public:
-  MovingRegionFiles(const Scene& scene, std::filesystem::path folder);  // the scene outlives it
+  // The scene must outlive the object.
+  MovingRegionFiles(const Scene& scene, std::filesystem::path folder);
 
   void Write(int view, const Image& moving) const;
   std::filesystem::path MovingFile(int view) const;
-  // None where nothing stands still.
+  // Empty if the frame has no static background.
   std::filesystem::path StillFile(int view) const;
-  // Of the scene's frames that `placed` has views of, by name: as kMovingRegions.
-  void Leave(const Scene& placed, StageContext& context) const;
+  // Publishes kMovingRegions of the frames that `placed` has, by name.
+  void Publish(const Scene& placed, StageContext& context) const;
 
  private:
   const Scene& scene_;
   std::filesystem::path folder_;
 };
 
-// Looks for what moves in the frames `shot` of one camera, in their order, whose pictures lie below
-// `frames_root`, and writes it. Throws Error{kCancelled}, and for frames that cannot be read.
+// Finds and writes the moving regions of the frames `shot` of one camera, in order. Their
+// image_file is relative to `frames_root`. Throws Error{kCancelled}, and for unreadable frames.
 ShotMotion WriteMovingRegions(const std::filesystem::path& frames_root,
                               const Scene& scene,
                               const std::vector<int>& shot,

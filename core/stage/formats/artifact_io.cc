@@ -7,10 +7,12 @@
 
 #include "core/base/error.h"
 #include "core/carry/confidence.h"
+#include "core/catalogue/stages.h"
 #include "core/image/codec.h"
 #include "core/image/fill_holes.h"
 #include "core/image/weighted_resize.h"
 #include "core/stage/context/stage_context.h"
+#include "core/stage/formats/json_artifact.h"
 
 namespace color3d {
 
@@ -56,8 +58,7 @@ std::string ImportFactsToJson(const ImportFacts& f) {
 }
 
 ImportFacts ImportFactsFromJson(std::string_view json) {
-  try {
-    const auto value = nlohmann::json::parse(json);
+  return ParseArtifact(artifact::kImportFacts, json, [](const nlohmann::ordered_json& value) {
     ImportFacts f;
     f.layout = LayoutOfName(value.at("layout").get<std::string>());
     f.ran_structure_from_motion = value.at("ran_structure_from_motion");
@@ -76,13 +77,11 @@ ImportFacts ImportFactsFromJson(std::string_view json) {
                 .path_unevenness = film.at("path_unevenness"),
                 .motion_energy = film.at("motion_energy")};
     }
-    for (const auto& camera : value.value("cameras", nlohmann::json::array())) {
+    for (const auto& camera : value.value("cameras", nlohmann::ordered_json::array())) {
       f.cameras.push_back({.name = camera.at("name"), .film = camera.at("film")});
     }
     return f;
-  } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument("{} is damaged: {}", artifact::kImportFacts, e.what());
-  }
+  });
 }
 
 Scene ReadScene(const StageContext& context) {
@@ -97,26 +96,35 @@ const CaptureKindInfo& ColoredAs(const StageContext& context, const Scene& scene
 }
 
 int ReadKeyView(const StageContext& context, const Scene& scene) {
-  try {
-    const auto value = nlohmann::json::parse(context.ReadInput(artifact::kKeyView));
+  return ParseArtifact(context, artifact::kKeyView, [&](const nlohmann::ordered_json& value) {
     return scene.FindView(value.at("view").get<std::string>());
-  } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument("{} is damaged: {}", artifact::kKeyView, e.what());
-  }
+  });
 }
 
 nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& name) {
-  try {
-    return nlohmann::ordered_json::parse(context.ReadInput(name));
-  } catch (const nlohmann::json::exception& e) {
-    throw InvalidArgument("{} is damaged: {}", name, e.what());
-  }
+  return ParseArtifact(context, name, [](nlohmann::ordered_json json) { return json; });
+}
+
+Error DamagedArtifact(std::string_view name, const nlohmann::json::exception& error) {
+  const Stage* writer = FindProducer(name);
+  return InvalidArgument("{} is damaged: {}; run {} again",
+                         name,
+                         error.what(),
+                         writer != nullptr ? writer->kind : "its stage");
+}
+
+Image ReadPicture(const StageContext& context, const std::string& name) {
+  return DecodeImage(context.ReadInput(name), name);
+}
+
+AbMap ReadAbMap(const StageContext& context, const std::string& name) {
+  return DecodeAbPng(context.ReadInput(name), name);
 }
 
 CarriedColor ReadKeyColor(const StageContext& context, int width, int height) {
-  const AbMap map = DecodeAbPng(context.ReadInput(artifact::kKeyColor), artifact::kKeyColor);
+  const AbMap map = ReadAbMap(context, artifact::kKeyColor);
   const auto unpainted = [](float confidence) { return confidence == 0.0f; };
-  if (std::none_of(map.confidence.data.begin(), map.confidence.data.end(), unpainted)) {
+  if (std::ranges::none_of(map.confidence.data, unpainted)) {
     return {Resize(map.ab, width, height), Resize(map.confidence, width, height)};
   }
   Image painted = map.confidence;
@@ -131,34 +139,33 @@ CarriedColor ReadKeyColor(const StageContext& context, int width, int height) {
 }
 
 CarriedColor ReadCarried(const StageContext& context, const View& view, int width, int height) {
-  const std::string name = ViewArtifact(artifact::kCarried, view, ".png");
+  const std::string name = ViewArtifact(artifact::kCarried, view);
   if (!context.HasInput(name)) return {Image(width, height, 2), Image(width, height, 1)};
-  AbMap map = DecodeAbPng(context.ReadInput(name), name);
+  AbMap map = ReadAbMap(context, name);
   FillHoles(map.confidence, &map.ab);
   return {ResizeWeighted(map.ab, map.confidence, width, height),
           Resize(map.confidence, width, height)};
 }
 
 int ColoredSide(const StageContext& context, const View& view) {
-  const std::string name = ViewArtifact(artifact::kViewsAb, view, ".png");
+  const std::string name = ViewArtifact(artifact::kViewsAb, view);
   const ImageInfo info = ProbeImage(context.ReadInput(name), name);
   return std::max(info.width, info.height);
 }
 
 std::string ViewAbArtifact(const StageContext& context, const View& view) {
-  const std::string corrected = ViewArtifact(artifact::kCorrectedAb, view, ".png");
-  return context.HasInput(corrected) ? corrected : ViewArtifact(artifact::kViewsAb, view, ".png");
+  const std::string corrected = ViewArtifact(artifact::kCorrectedAb, view);
+  return context.HasInput(corrected) ? corrected : ViewArtifact(artifact::kViewsAb, view);
 }
 
 std::string ProvenanceArtifact(const StageContext& context, const View& view) {
-  const std::string corrected = ViewArtifact(artifact::kCorrectedProvenance, view, ".png");
-  return context.HasInput(corrected) ? corrected
-                                     : ViewArtifact(artifact::kProvenance, view, ".png");
+  const std::string corrected = ViewArtifact(artifact::kCorrectedProvenance, view);
+  return context.HasInput(corrected) ? corrected : ViewArtifact(artifact::kProvenance, view);
 }
 
 Image ReadViewAb(const StageContext& context, const View& view, int width, int height) {
   const std::string name = ViewAbArtifact(context, view);
-  AbMap map = DecodeAbPng(context.ReadInput(name), name);
+  AbMap map = ReadAbMap(context, name);
   if (map.ab.width == width && map.ab.height == height) return std::move(map.ab);
   return Resize(map.ab, width, height);
 }
@@ -166,7 +173,7 @@ Image ReadViewAb(const StageContext& context, const View& view, int width, int h
 Image ReadTargetAb(
     const StageContext& context, const View& view, bool is_key, int width, int height) {
   Image ab = ReadViewAb(context, view, width, height);
-  if (!is_key || context.HasInput(ViewArtifact(artifact::kCorrectedAb, view, ".png"))) return ab;
+  if (!is_key || context.HasInput(ViewArtifact(artifact::kCorrectedAb, view))) return ab;
   const CarriedColor own = ReadKeyColor(context, width, height);
   for (int c = 0; c < 2; ++c) {
     for (size_t i = 0; i < own.confidence.data.size(); ++i) {
@@ -179,7 +186,7 @@ Image ReadTargetAb(
 Image ReadProvenance(const StageContext& context, const View& view, int width, int height) {
   const std::string name = ProvenanceArtifact(context, view);
   if (!context.HasInput(name)) return {};
-  const Image shares = DecodeImage(context.ReadInput(name), name);
+  const Image shares = ReadPicture(context, name);
   if (shares.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
   return Resize(shares, width, height);
 }

@@ -11,6 +11,7 @@
 #include "core/carry/carry.h"
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/captures.h"
+#include "core/image/codec.h"
 #include "core/scene/scene.h"
 
 namespace color3d {
@@ -19,7 +20,9 @@ class StageContext;
 
 // E.g. "views_ab/0001.png" for the view "0001.jpg". Requires: stems are unique, which the import
 // checks (CheckStemsAreUnique).
-std::string ViewArtifact(std::string_view folder, const View& view, std::string_view extension);
+std::string ViewArtifact(std::string_view folder,
+                         const View& view,
+                         std::string_view extension = ".png");
 
 // Throws Error{kInvalidArgument} with the names of two photos that differ in their extension only,
 // because their results would overwrite each other.
@@ -66,6 +69,10 @@ const CaptureKindInfo& ColoredAs(const StageContext& context, const Scene& scene
 int ReadKeyView(const StageContext& context, const Scene& scene);
 // Throws Error{kInvalidArgument} with the name of the artifact if it is not JSON.
 nlohmann::ordered_json ReadJson(const StageContext& context, const std::string& name);
+
+// Picture among the inputs; ab and confidence. Throws Error{kInvalidArgument} if it is damaged.
+Image ReadPicture(const StageContext& context, const std::string& name);
+AbMap ReadAbMap(const StageContext& context, const std::string& name);
 
 // The colour of the key view, resized. Confidence is 0 where it is not painted.
 CarriedColor ReadKeyColor(const StageContext& context, int width, int height);

@@ -56,7 +56,7 @@ TEST_F(StageTest, DynamicSceneWithoutGeometryIsColoredAsFilm) {
       << "without poses there is no geometry";
 }
 
-TEST(ViewArtifact, DropsTheExtensionAndFindsCollisions) {
+TEST(ViewArtifactTest, DropsTheExtensionAndFindsCollisions) {
   Scene scene;
   scene.views.resize(2);
   scene.views[0].name = "left/a.jpg";

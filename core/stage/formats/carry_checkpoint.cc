@@ -80,11 +80,14 @@ CarryCheckpoint::CarryCheckpoint(const Scene& scene, StageContext& context)
     : scene_(scene),
       context_(context),
       was_done_(scene.views.size(), 0),
-      is_done_(scene.views.size(), 0),
       coverage_(scene.views.size(), 0.0),
+      is_done_(scene.views.size(), 0),
       records_(kind::kCarryColor, kMagic, context) {
   records_.Restore([&](const json& record) { CheckRecord(record, scene_); },
-                   [&](const json& record) { Restore(record); });
+                   [&](const json& record) {
+                     const MutexLock lock(mutex_);
+                     Restore(record);
+                   });
 }
 
 void CarryCheckpoint::Restore(const json& record) {
@@ -100,7 +103,7 @@ void CarryCheckpoint::Restore(const json& record) {
 }
 
 void CarryCheckpoint::Keep(size_t view, double coverage, const std::string& png) {
-  const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view], ".png");
+  const std::string name = ViewArtifact(artifact::kCarried, scene_.views[view]);
   if (is_done_[view] != 0) {
     context_.RewriteOutput(name, png);
   } else {
@@ -115,32 +118,31 @@ void CarryCheckpoint::Keep(size_t view, double coverage, const std::string& png)
 }
 
 void CarryCheckpoint::Add(int view, double coverage, const std::string& png) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto index = static_cast<size_t>(view);
   Keep(index, coverage, png);
-  context_.progress().OnProgress(done_,
-                                 static_cast<int64_t>(scene_.views.size()),
-                                 "carrying colour into " + scene_.views[index].name);
+  context_.ReportProgress(
+      done_, std::ssize(scene_.views), "carrying colour into " + scene_.views[index].name);
   SaveWhenDue();
 }
 
 void CarryCheckpoint::ReportProgress(const std::string& message) const {
-  const std::lock_guard lock(mutex_);
-  context_.progress().OnProgress(done_, static_cast<int64_t>(scene_.views.size()), message);
+  const MutexLock lock(mutex_);
+  context_.ReportProgress(done_, std::ssize(scene_.views), message);
 }
 
 std::string CarryCheckpoint::Png(int view) const {
-  return context_.ReadOutput(ViewArtifact(artifact::kCarried, scene_.views[view], ".png"));
+  return context_.ReadOutput(ViewArtifact(artifact::kCarried, scene_.views[view]));
 }
 
 void CarryCheckpoint::Replace(int view, double coverage, const std::string& png) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Keep(static_cast<size_t>(view), coverage, png);
   SaveWhenDue();
 }
 
 void CarryCheckpoint::SaveWhenDue() {
-  records_.SaveWhenDue([&] {
+  records_.SaveWhenDue([this]() COLOR3D_REQUIRES(mutex_) {
     std::vector<json> walks;
     for (const auto& [place, walk] : walks_) walks.push_back(RecordOf(walk, scene_));
     return walks;
@@ -148,14 +150,14 @@ void CarryCheckpoint::SaveWhenDue() {
 }
 
 std::vector<FilmWalk> CarryCheckpoint::Walks() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<FilmWalk> walks;
   for (const auto& [place, walk] : walks_) walks.push_back(walk);
   return walks;
 }
 
 void CarryCheckpoint::SetWalk(const FilmWalk& walk) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   walks_[{walk.key, walk.direction}] = walk;
 }
 

@@ -3,12 +3,12 @@
 #pragma once
 
 #include <map>
-#include <mutex>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "core/film/film_carry.h"
 #include "core/scene/scene.h"
 #include "core/stage/context/stage_context.h"
@@ -40,19 +40,20 @@ class CarryCheckpoint {
   void SetWalk(const FilmWalk& walk);
 
  private:
-  void Restore(const nlohmann::json& record);
-  void Keep(size_t view, double coverage, const std::string& png);
-  void SaveWhenDue();
+  void Restore(const nlohmann::json& record) COLOR3D_REQUIRES(mutex_);
+  void Keep(size_t view, double coverage, const std::string& png) COLOR3D_REQUIRES(mutex_);
+  void SaveWhenDue() COLOR3D_REQUIRES(mutex_);
 
   const Scene& scene_;
   StageContext& context_;
   std::vector<char> was_done_;
-  std::vector<char> is_done_;
-  mutable std::mutex mutex_;
   std::vector<double> coverage_;
-  int64_t done_ = 0;
-  std::map<std::pair<int, int>, FilmWalk> walks_;  // by key frame and direction
-  RecordCheckpoint records_;
+  mutable Mutex mutex_;
+  std::vector<char> is_done_ COLOR3D_GUARDED_BY(mutex_);
+  int64_t done_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  // By key frame and direction.
+  std::map<std::pair<int, int>, FilmWalk> walks_ COLOR3D_GUARDED_BY(mutex_);
+  RecordCheckpoint records_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

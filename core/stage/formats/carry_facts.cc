@@ -5,6 +5,7 @@
 #include "core/base/error.h"
 #include "core/catalogue/stages.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/json_artifact.h"
 
 namespace color3d {
 
@@ -13,19 +14,13 @@ using nlohmann::ordered_json;
 CarryFacts ReadCarryFacts(const StageContext& context) {
   CarryFacts facts;
   if (!context.HasInput(artifact::kCarryFacts)) return facts;
-  try {
-    const auto json = ordered_json::parse(context.ReadInput(artifact::kCarryFacts));
+  ParseArtifact(context, artifact::kCarryFacts, [&](const ordered_json& json) {
     if (json.contains("coverage")) facts.coverage = json.at("coverage").get<double>();
-    if (json.contains("key_views")) json.at("key_views").get_to(facts.key_views);
-    if (json.contains("views")) {
-      for (const ordered_json& view : json.at("views")) {
-        facts.view_coverage[view.at("view").get<std::string>()] = view.at("coverage").get<double>();
-      }
+    facts.key_views = json.value("key_views", facts.key_views);
+    for (const ordered_json& view : json.value("views", ordered_json::array())) {
+      facts.view_coverage[view.at("view").get<std::string>()] = view.at("coverage").get<double>();
     }
-  } catch (const ordered_json::exception& e) {
-    throw InvalidArgument(
-        "{} is damaged: {}; run {} again", artifact::kCarryFacts, e.what(), kind::kCarryColor);
-  }
+  });
   return facts;
 }
 

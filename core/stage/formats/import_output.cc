@@ -9,7 +9,7 @@ void WriteImported(const ImportResult& result,
                    const std::map<std::string, std::string>& films,
                    const std::optional<FilmFindings>& film) {
   CheckStemsAreUnique(result.scene);
-  for (const std::string& warning : result.warnings) context.progress().OnWarning(warning);
+  for (const std::string& warning : result.warnings) context.Warn(warning);
   ImportFacts facts;
   facts.layout = result.layout;
   facts.ran_structure_from_motion = result.ran_structure_from_motion;

@@ -52,8 +52,8 @@ std::string DescribeKeyView(const KeyViewRanking& ranking) {
         ranking.expected_error.back());
   }
   if (ranking.strategy == "manual") return "Chosen by the user.";
-  const size_t kept = static_cast<size_t>(std::count_if(
-      ranked.begin(), ranked.end(), [](const RankedView& view) { return view.set_aside.empty(); }));
+  const size_t kept = static_cast<size_t>(
+      std::ranges::count_if(ranked, [](const RankedView& view) { return view.set_aside.empty(); }));
   std::string text;
   if (kept < 2) {
     text = "The only view that can be coloured.";
@@ -108,8 +108,7 @@ std::string KeyViewSheetJpeg(const KeyViewRanking& ranking, const Image& chosen_
       continue;
     }
     const bool chosen = ranked.index == ranking.selection.index ||
-                        std::find(ranking.together.begin(), ranking.together.end(), ranked.index) !=
-                            ranking.together.end();
+                        std::ranges::find(ranking.together, ranked.index) != ranking.together.end();
     Image thumbnail = Thumbnail(ranking, ranked.index);
     if (thumbnail.Empty() && chosen) thumbnail = chosen_thumbnail;
     const std::string note = aside ? ranked.set_aside

@@ -18,7 +18,7 @@ namespace {
 
 CarriedColor Resized(AbMap map, int width, int height) {
   const std::vector<float>& confidence = map.confidence.data;
-  if (std::all_of(confidence.begin(), confidence.end(), [](float c) { return c == 1.0f; })) {
+  if (std::ranges::all_of(confidence, [](float c) { return c == 1.0f; })) {
     return {Resize(map.ab, width, height), Image(width, height, 1, 1.0f)};
   }
   CarriedColor color{ResizeWeighted(map.ab, map.confidence, width, height),
@@ -45,7 +45,7 @@ std::vector<int> ReadKeyViews(const StageContext& context,
   std::vector<int> views = {ReadKeyView(context, scene)};
   for (const std::string& name : additional) {
     const int view = FindAdditionalKeyView(scene, name);
-    if (std::find(views.begin(), views.end(), view) != views.end()) {
+    if (std::ranges::find(views, view) != views.end()) {
       throw InvalidArgument("the view {} is a key view already; name each once",
                             scene.views[view].name);
     }
@@ -72,8 +72,7 @@ CarriedColor ReadAdditionalKeyColor(const StageContext& context,
     if (ReadJson(context, folder + artifact::kKeyColorFacts).value("view", "") != name) continue;
     const std::string file = folder + artifact::kKeyColor;
     const Camera camera = images.WorkingCamera(view);
-    CarriedColor color =
-        Resized(DecodeAbPng(context.ReadInput(file), file), camera.width, camera.height);
+    CarriedColor color = Resized(ReadAbMap(context, file), camera.width, camera.height);
     ClearMasked(images.Mask(view).get(), &color.confidence);
     return color;
   }

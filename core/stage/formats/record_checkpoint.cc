@@ -72,8 +72,7 @@ void RecordCheckpoint::Restore(const OnRecord& check, const OnRecord& take) {
     }
   } catch (const Error& e) {
     if (e.code() != ErrorCode::kDataLoss && e.code() != ErrorCode::kNotFound) throw;
-    context_.progress().OnWarning(
-        fmt::format("{} starts afresh: its checkpoint is damaged ({})", stage_, e.what()));
+    context_.Warn("{} starts afresh: its checkpoint is damaged ({})", stage_, e.what());
   }
   fs::remove(before);
 }

@@ -43,6 +43,7 @@ ViewsCheckpoint::ViewsCheckpoint(const Scene& scene, StageContext& context)
       },
       [&](const json& record) {
         const int view = view_of(record);
+        const MutexLock lock(mutex_);
         Keep(view, BytesAt(record, "ab"), BytesAt(record, "provenance"));
         was_done_[static_cast<size_t>(view)] = 1;
       });
@@ -51,16 +52,15 @@ ViewsCheckpoint::ViewsCheckpoint(const Scene& scene, StageContext& context)
 void ViewsCheckpoint::Add(int view, const FusedColor& color) {
   const std::string ab = EncodeAbPng(color.ab);
   const std::string provenance = EncodePng8(color.provenance);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Keep(view, ab, provenance);
-  context_.progress().OnProgress(
-      done_, static_cast<int64_t>(scene_.views.size()), "colouring " + scene_.views[view].name);
+  context_.ReportProgress(done_, std::ssize(scene_.views), "colouring " + scene_.views[view].name);
   records_.SaveWhenDue();
 }
 
 void ViewsCheckpoint::Keep(int view, const std::string& ab, const std::string& provenance) {
-  context_.WriteOutput(ViewArtifact(artifact::kViewsAb, scene_.views[view], ".png"), ab);
-  context_.WriteOutput(ViewArtifact(artifact::kProvenance, scene_.views[view], ".png"), provenance);
+  context_.WriteOutput(ViewArtifact(artifact::kViewsAb, scene_.views[view]), ab);
+  context_.WriteOutput(ViewArtifact(artifact::kProvenance, scene_.views[view]), provenance);
   ++done_;
   records_.Append(
       {{"view", scene_.views[view].name}, {"ab", Binary(ab)}, {"provenance", Binary(provenance)}});

@@ -3,11 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <mutex>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
+#include "core/base/mutex.h"
 #include "core/carry/view_color.h"
 #include "core/scene/scene.h"
 #include "core/stage/context/stage_context.h"
@@ -27,14 +27,15 @@ class ViewsCheckpoint {
   void Add(int view, const FusedColor& color);
 
  private:
-  void Keep(int view, const std::string& ab, const std::string& provenance);
+  void Keep(int view, const std::string& ab, const std::string& provenance)
+      COLOR3D_REQUIRES(mutex_);
 
   const Scene& scene_;
   StageContext& context_;
   std::vector<char> was_done_;
-  std::mutex mutex_;
-  int64_t done_ = 0;
-  RecordCheckpoint records_;
+  Mutex mutex_;
+  int64_t done_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  RecordCheckpoint records_ COLOR3D_GUARDED_BY(mutex_);
 };
 
 }  // namespace color3d

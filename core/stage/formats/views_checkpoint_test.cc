@@ -18,7 +18,7 @@ class ViewsCheckpointTest : public StageTest {
             Image(kWidth, kHeight, 3, 0.25f * static_cast<float>(view))};
   }
   std::string Output(const char* artifact, int view) const {
-    return ReadFile(scratch_.path() / "out" / ViewArtifact(artifact, scene_.views[view], ".png"));
+    return ReadFile(scratch_.path() / "out" / ViewArtifact(artifact, scene_.views[view]));
   }
 
   const Scene scene_ = RampScene(scratch_.path(), kWidth, kHeight);

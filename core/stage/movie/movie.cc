@@ -13,10 +13,10 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/scene/formats/camera_file.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/movie/film_clock.h"
 #include "core/stage/sources/focus.h"
+#include "core/stage/sources/render_view.h"
 #include "core/video/mp4_writer.h"
 #include "core/view/path/camera_path.h"
 
@@ -142,10 +142,7 @@ double TimeOnPath(const SmoothPath& path, const std::vector<PathCamera>& station
 
 Eigen::Vector3d FocusOfView(const View& view, const GaussianModel& model, ThreadPool& pool) {
   const Camera small = view.camera.FitWithin(kFocusSidePx);
-  return FocusOf(
-      view,
-      small,
-      RenderView(model, small, view.cam_from_world, pool, 0.0f, view.time_s()).median_depth);
+  return FocusOf(view, small, RenderView(model, view, small, pool).median_depth);
 }
 
 // The camera at the size of all frames.
@@ -193,11 +190,11 @@ std::vector<PathCamera> SmoothFrames(const RenderOptions& options,
   return frames;
 }
 
-std::vector<PathCamera> Turning(const RenderOptions& options,
-                                const Scene& scene,
-                                int home,
-                                const Eigen::Vector3d& focus,
-                                const Camera& picture) {
+std::vector<PathCamera> OrbitFrames(const RenderOptions& options,
+                                    const Scene& scene,
+                                    int home,
+                                    const Eigen::Vector3d& focus,
+                                    const Camera& picture) {
   const std::vector<double> shares =
       FrameShares(options.frames.value_or(kDefaultMovieFrames), options.bounce, true);
   std::vector<PathCamera> frames = TurnFrames(scene, home, focus, shares);
@@ -228,7 +225,7 @@ std::vector<PathCamera> FramesOf(const RenderOptions& options,
     const Eigen::Vector3d focus = FocusOfView(view, model, context.pool());
     const double unit = (focus - view.cam_from_world.Center()).norm();
     frames = options.path == RenderOptions::Path::kOrbit
-                 ? Turning(options, scene, home, focus, picture)
+                 ? OrbitFrames(options, scene, home, focus, picture)
                  : SmoothFrames(options, stations, unit, file_tells);
   }
   const bool told = file_tells || (one_by_one && stations.have_times);
@@ -277,11 +274,11 @@ Mp4Options MovieOf(const RenderOptions& options,
 
 void WarnOf(const Mp4Writer& movie, StageContext& context) {
   if (movie.encoder() == "mpeg4") {
-    context.progress().OnWarning(
+    context.Warn(
         "this machine's libavcodec has no H.264 encoder (libx264): the movie is MPEG-4 part 2, "
         "which browsers do not show");
   }
-  if (!movie.sound_warning().empty()) context.progress().OnWarning(movie.sound_warning());
+  if (!movie.sound_warning().empty()) context.Warn(movie.sound_warning());
 }
 
 }  // namespace
@@ -309,9 +306,9 @@ void RenderMovie(const RenderOptions& options,
     movie.emplace(file, MovieOf(options, scene, home, frames, clock, context));
     WarnOf(*movie, context);
   }
-  const int64_t count = static_cast<int64_t>(frames.size());
+  const int64_t count = std::ssize(frames);
   for (int64_t i = 0; i < count; ++i) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     const PathCamera& frame = frames[i];
     const Image srgb = SrgbFromLab(
         RenderView(model, frame.camera, frame.cam_from_world, context.pool(), 0.0f, frame.time_s)
@@ -324,11 +321,11 @@ void RenderMovie(const RenderOptions& options,
     if (options.pictures) {
       context.WriteOutput(fmt::format("{}{:05}.png", artifact::kFrames, i + 1), EncodePng8(srgb));
     }
-    context.progress().OnProgress(i + 1, count, "rendering frames");
+    context.ReportProgress(i + 1, count, "rendering frames");
   }
   if (!movie) return;
   movie->Finish();
-  context.TakeOutput(artifact::kMovie, file);
+  context.MoveOutput(artifact::kMovie, file);
 }
 
 }  // namespace color3d

@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 
 class MovieTest : public EvaluatedSceneTest {
  protected:
-  // Runs the stage; the folder of results.
+  // Runs the stage and returns the folder of results.
   std::filesystem::path Render(const RenderOptions& options) {
     std::filesystem::remove_all(scratch_.path() / "out");
     StageContext context = MakeContext();
@@ -46,7 +46,7 @@ class MovieTest : public EvaluatedSceneTest {
            "],[0,-1,0,0],[0,0,-1,0],[0,0,0,1]]}";
   }
 
-  // The scene's views at these times, of one camera, and what moves in it.
+  // Makes a dynamic scene: the views at these times, of one camera, and a moving ball.
   void MakeMoving(const std::vector<double>& times) {
     for (size_t i = 0; i < times.size(); ++i) scene_.views[i].moment = Moment{times[i], 0};
     AddInput(artifact::kScene, SceneToJson(scene_));
@@ -57,7 +57,7 @@ class MovieTest : public EvaluatedSceneTest {
   std::vector<std::string> outputs_;
 };
 
-// The column of the bright ball, px.
+// Column of the bright ball, px.
 double BallColumn(const Image& image) {
   double sum = 0.0, weighted = 0.0;
   for (int y = 0; y < image.height; ++y) {
@@ -70,12 +70,12 @@ double BallColumn(const Image& image) {
   return weighted / sum;
 }
 
-// Where a camera of RampScene at that x sees it.
+// Column in which a camera of RampScene at x = `camera_x` sees a ball, px.
 double ColumnOf(double ball_x, double camera_x = 0.0) {
   return 24.0 + 50.0 * (ball_x - camera_x) / kBallDepth;
 }
 
-// Mean over the pixels of the root of the mean squared difference in sRGB, as a peak ratio.
+// Peak signal-to-noise ratio in sRGB, dB.
 double PsnrDb(const Image& a, const Image& b) {
   double sum = 0.0;
   for (size_t i = 0; i < a.data.size(); ++i) sum += std::pow(a.data[i] - b.data[i], 2.0);
@@ -108,7 +108,7 @@ TEST_F(MovieTest, MovieEqualsPictures) {
     EXPECT_EQ(outputs_.front(), "frames/00001.png");
     EXPECT_EQ(outputs_.back(), "scene.mp4");
     EXPECT_GT(moved, -40.0) << "nothing moves";
-    EXPECT_GT(PsnrDb(first, last), 25.0) << "the end meets the beginning";
+    EXPECT_GT(PsnrDb(first, last), 25.0) << "the path is closed";
   }
 }
 
@@ -130,7 +130,7 @@ TEST_F(MovieTest, OriginalPathStartsAtTheFirstPhoto) {
 TEST_F(MovieTest, FrameWithoutPoseLeavesAGap) {
   scene_.views.push_back(scene_.views[0]);
   scene_.views.push_back(scene_.views[1]);
-  const double times[] = {0.0, 0.5, 0.75, 1.0, 1.25};  // the second found no place
+  const double times[] = {0.0, 0.5, 0.75, 1.0, 1.25};  // the second one has no pose
   for (int i = 0; i < 5; ++i) {
     scene_.views[i].name = "f" + std::to_string(i) + ".png";
     scene_.views[i].moment = Moment{times[i], 0};
@@ -181,7 +181,7 @@ TEST_F(MovieTest, OrbitShowsOneTime) {
   RenderOptions later = options;
   later.time_s = 2.5;
   EXPECT_NE(bytes(later)[1], frozen[1]);
-  // The same as the scene of that moment, of which nothing moves.
+  // The static scene of that time gives the same pictures.
   ThreadPool pool(1);
   AddInput(artifact::kModel, SerializeGaussians(ModelAt(BallBeforeWall(0.0, 2.5), 1.0, pool)));
   EXPECT_EQ(bytes(options), frozen);
@@ -192,7 +192,7 @@ TEST_F(MovieTest, RefusesATimeAfterTheEnd) {
   RenderOptions options{.path = Path::kOrbit, .frames = 2, .time_s = 3.0};
   EXPECT_THAT(Complaint(options),
               HasSubstr("(time_s) is at 3 s, but the scene lasts from 0 to 2.96667 s"));
-  options.time_s = 2.96667;  // as it is told
+  options.time_s = 2.96667;  // as the message gives it
   EXPECT_EQ(Complaint(options), "none");
 }
 
@@ -211,7 +211,7 @@ TEST_F(MovieTest, FileOfCamerasMayHaveTimes) {
     const Image frame = ReadImage(out / ("frames/0000" + std::to_string(i + 1) + ".png"));
     EXPECT_NEAR(BallColumn(frame), ColumnOf(ball_x[i]), 0.6) << i;
   }
-  options.frames = 3;  // on a smooth way, from the first of two to the other
+  options.frames = 3;  // on a smooth path from the first camera to the second
   options.cameras = CameraFile(at(0.0) + "," + at(2.0));
   out = Render(options);
   for (int i = 0; i < 3; ++i) {
@@ -231,7 +231,7 @@ TEST_F(MovieTest, FileOfCamerasIsExactOrSmooth) {
   auto out = Render(options);
   EXPECT_EQ(DecodeMovie(out / "scene.mp4").frames.size(), 3u);
   const Image third = ReadImage(out / "frames/00003.png");
-  // The file's OpenGL axes, x right, y up: these are the photos' cameras.
+  // In OpenGL axes (x right, y up), these are the cameras of the photos.
   const auto views = Render({.views = {"p2.png"}});
   EXPECT_GT(PsnrDb(third, ReadImage(views / "renders/p2.png")), 60.0);
   options.bounce = true;

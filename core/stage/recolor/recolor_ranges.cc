@@ -6,29 +6,30 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/base/mutex.h"
 #include "core/carry/confidence.h"
+#include "core/colorizer/colorizer.h"
 #include "core/colorizer/corrector.h"
-#include "core/colorizer/personal/train_colorizer.h"
 #include "core/film/film_carry.h"
-#include "core/film/steady_colors.h"
 #include "core/image/codec.h"
-#include "core/image/optical_flow.h"
 #include "core/scene/view_images.h"
 #include "core/stage/film/between_anchors.h"
+#include "core/stage/film/frames_of_views.h"
+#include "core/stage/film/steady_frames.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/key_views.h"
 #include "core/stage/recolor/time_ranges.h"
+#include "core/stage/sources/given_colors.h"
 
 namespace color3d {
 namespace {
 
-constexpr size_t kAtOnce = 16;  // frames; bounds memory
+constexpr int kAtOnce = 16;  // frames; bounds memory
 // Neighbouring frames are read several times.
 constexpr int64_t kRecoloredFramesCacheBytes = int64_t{32} << 20;
 
@@ -49,21 +50,12 @@ struct FilmToRecolor {
   }
 };
 
-void MixIn(const CarriedColor& color, Image* ab) {
-  for (int c = 0; c < 2; ++c) {
-    for (size_t i = 0; i < color.confidence.data.size(); ++i) {
-      float& value = ab->Plane(c)[i];
-      value += color.confidence.data[i] * (color.ab.Plane(c)[i] - value);
-    }
-  }
-}
-
 // Channels to propagate from a key view: a, b and the painted share. Unpainted parts have their
 // present colours. Confidence is 1 everywhere.
 CarriedColor PaintOver(Image ab, const CarriedColor& color) {
-  MixIn(color, &ab);
+  MixIn(color.ab, color.confidence, &ab);
   CarriedColor key{Image(ab.width, ab.height, 3), Image(ab.width, ab.height, 1, 1.0f)};
-  std::copy(ab.data.begin(), ab.data.end(), key.ab.data.begin());
+  std::ranges::copy(ab.data, key.ab.data.begin());
   std::copy_n(color.confidence.data.begin(), ab.PlaneSize(), key.ab.Plane(2));
   return key;
 }
@@ -129,38 +121,36 @@ class RangeColorer {
   // Calls `deliver` once for each frame of the range, from several threads.
   void Run(const std::function<void(int view, const FusedColor& color)>& deliver) {
     ReadKeys();
-    Carry();
-    for (size_t begin = 0; begin < range_.views.size(); begin += kAtOnce) {
-      const size_t end = std::min(range_.views.size(), begin + kAtOnce);
-      Color(end - begin);
-      Deliver(end == range_.views.size(), deliver);
+    SteadyFrames steady(Carry());
+    const auto count = static_cast<int>(range_.views.size());
+    for (int begin = 0; begin < count; begin += kAtOnce) {
+      const int end = std::min(count, begin + kAtOnce);
+      steady.Add(Color(begin, end));
+      steady.Deliver(end == count, film_.context, [&](int frame, const FusedColor& color) {
+        deliver(range_.views[frame], color);
+      });
     }
   }
 
  private:
-  struct Recolored {
-    FusedColor color;
-    std::shared_ptr<const FlowPair> flow_from_last;
-  };
-
   void ReadKeys() {
     std::vector<Correction> corrections;
     for (const RecoloredRange::Key& key : range_.keys) {
       CarriedColor color =
           ReadAdditionalKeyColor(film_.context, film_.scene, key.view, film_.images);
       const std::vector<float>& painted = color.confidence.data;
-      if (std::none_of(painted.begin(), painted.end(), [](float p) { return p > 0.0f; })) {
+      if (std::ranges::none_of(painted, [](float p) { return p > 0.0f; })) {
         throw InvalidArgument(
             "the key view {} has no painted pixels to recolour its range with; paint on it",
             film_.scene.views[key.view].name);
       }
       PlacedPicture picture = film_.Picture(key.view);
-      const auto frame = std::find(range_.views.begin(), range_.views.end(), key.view);
+      const auto frame = std::ranges::find(range_.views, key.view);
       keys_.push_back(
           {static_cast<int>(frame - range_.views.begin()), PaintOver(picture.ab, color)});
       // Unpainted parts are right as they are, and correct nothing.
       Image wanted = picture.ab;
-      MixIn(color, &wanted);
+      MixIn(color.ab, color.confidence, &wanted);
       Image sure(wanted.width, wanted.height, 1, 1.0f);
       corrections.push_back({std::move(picture), std::move(wanted), std::move(sure)});
     }
@@ -172,16 +162,11 @@ class RangeColorer {
     }
   }
 
-  void Carry() {
-    FilmFrames frames;
-    frames.shot.resize(range_.views.size());
-    frames.luminance = [&](int frame) { return film_.images.Luminance(range_.views[frame]); };
-    for (const int view : range_.views) {
-      frames.time_s.push_back(film_.scene.views[view].time_s());
-    }
+  // Carries the colours of the key views along the range. Returns the nearest ones of each frame.
+  std::vector<NearKeyFrames> Carry() const {
+    const FilmFrames frames = FramesOfViews(film_.scene, range_.views, film_.images);
     std::vector<int> key_frames;
     for (const FilmKey& key : keys_) key_frames.push_back(key.frame);
-    near_ = NearestKeyFrames(frames, key_frames);
     const auto keep = [&](int frame, const CarriedColor& color) {
       Image ab(color.ab.width, color.ab.height, 2), painted(color.ab.width, color.ab.height, 1);
       std::copy_n(color.ab.data.begin(), ab.data.size(), ab.data.begin());
@@ -200,6 +185,7 @@ class RangeColorer {
                      CarriedColor color = PropagatedColor(frame);
                      if (FillUncertain(second, &color) > 0) keep(frame, color);
                    });
+    return NearestKeyFrames(frames, key_frames);
   }
 
   std::filesystem::path FileOf(int frame, const char* what) const {
@@ -210,33 +196,29 @@ class RangeColorer {
     const AbMap map = DecodeAbPng(ReadFile(FileOf(frame, "colors")), "colors");
     const Image painted = DecodeImage(ReadFile(FileOf(frame, "painted")), "painted");
     CarriedColor color{Image(map.ab.width, map.ab.height, 3), map.confidence};
-    std::copy(map.ab.data.begin(), map.ab.data.end(), color.ab.data.begin());
+    std::ranges::copy(map.ab.data, color.ab.data.begin());
     std::copy_n(painted.data.begin(), map.ab.PlaneSize(), color.ab.Plane(2));
     return color;
   }
 
   const FilmKey* KeyAt(int frame) const {
-    const auto key = std::find_if(
-        keys_.begin(), keys_.end(), [&](const FilmKey& k) { return k.frame == frame; });
+    const auto key = std::ranges::find(keys_, frame, &FilmKey::frame);
     return key == keys_.end() ? nullptr : &*key;
   }
 
-  // Recolours the next `count` frames.
-  void Color(size_t count) {
-    const size_t begin = first_ + colored_.size();
-    const size_t place = colored_.size();
-    colored_.resize(place + count);
-    film_.context.pool().ForEach(static_cast<int64_t>(count), [&](int64_t i, int) {
-      film_.context.cancel().ThrowIfCancelled();
-      const int frame = static_cast<int>(begin) + static_cast<int>(i);
-      Recolored& colored = colored_[place + static_cast<size_t>(i)];
-      colored.color = ColorOf(frame);
+  // Recolours the frames from `begin` to `end`.
+  std::vector<SteadyFrames::Frame> Color(int begin, int end) const {
+    std::vector<SteadyFrames::Frame> colored(end - begin);
+    film_.context.pool().ForEach(end - begin, [&](int64_t i, int) {
+      film_.context.ThrowIfCancelled();
+      const int frame = begin + static_cast<int>(i);
+      colored[i].frame = frame;
+      colored[i].color = ColorOf(frame);
       if (frame == 0) return;
-      const auto earlier = film_.images.Luminance(range_.views[frame - 1]);
-      const auto later = film_.images.Luminance(range_.views[frame]);
-      colored.flow_from_last = std::make_shared<const FlowPair>(
-          FlowPair{DenseFlow(*earlier, *later), DenseFlow(*later, *earlier)});
+      colored[i].flow_from_last = FlowBetween(*film_.images.Luminance(range_.views[frame - 1]),
+                                              *film_.images.Luminance(range_.views[frame]));
     });
+    return colored;
   }
 
   FusedColor ColorOf(int frame) const {
@@ -264,7 +246,7 @@ class RangeColorer {
                                {},
                                film_.colorizer.relative_chroma()};
     ThreadPool one(1);
-    FusedColor color = ColorOfView(luminance, known, sources, one, film_.context.cancel());
+    FusedColor color = FuseViewColor(luminance, known, sources, one, film_.context.cancel());
     SetProvenance(recolored, is_old, &color.provenance);
     if (const FilmKey* key = KeyAt(frame)) {
       std::copy_n(key->color.ab.data.begin(), color.ab.data.size(), color.ab.data.begin());
@@ -272,42 +254,11 @@ class RangeColorer {
     return color;
   }
 
-  // Delivers the frames whose neighbours are recoloured, and keeps those that later ones need.
-  void Deliver(bool is_end, const std::function<void(int view, const FusedColor& color)>& deliver) {
-    const auto reach = static_cast<size_t>(steady_.reach);
-    const size_t end =
-        is_end ? colored_.size() : colored_.size() - std::min(colored_.size(), reach);
-    // Colours of different key views are not averaged.
-    std::vector<MovingFrame> neighbors;
-    for (size_t i = 0; i < colored_.size(); ++i) {
-      const size_t frame = first_ + i;
-      const bool alike = frame > 0 && near_[frame].nearest == near_[frame - 1].nearest;
-      neighbors.push_back({&colored_[i].color.ab, alike ? colored_[i].flow_from_last : nullptr});
-    }
-    film_.context.pool().ForEach(static_cast<int64_t>(end - delivered_), [&](int64_t i, int) {
-      film_.context.cancel().ThrowIfCancelled();
-      const int index = static_cast<int>(delivered_) + static_cast<int>(i);
-      const int frame = static_cast<int>(first_) + index;
-      FusedColor color = colored_[index].color;
-      if (KeyAt(frame) == nullptr) color.ab = SteadyColors(neighbors, index, steady_);
-      deliver(range_.views[frame], color);
-    });
-    const size_t done_with = end - std::min(end, reach);
-    colored_.erase(colored_.begin(), colored_.begin() + static_cast<std::ptrdiff_t>(done_with));
-    first_ += done_with;
-    delivered_ = end - done_with;
-  }
-
   const RecoloredRange& range_;
   const FilmToRecolor& film_;
   const std::filesystem::path folder_;
-  std::vector<FilmKey> keys_;        // FilmKey::frame: index in range_.views
-  std::vector<NearKeyFrames> near_;  // of each frame of the range
+  std::vector<FilmKey> keys_;  // FilmKey::frame: index in range_.views
   std::unique_ptr<const Corrector> corrector_;
-  const SteadyColorsOptions steady_;
-  std::vector<Recolored> colored_;  // successive frames
-  size_t first_ = 0;                // index of the first of these
-  size_t delivered_ = 0;            // number of these
 };
 
 nlohmann::ordered_json FactsOf(const std::vector<RecoloredRange>& ranges, const Scene& scene) {
@@ -342,19 +293,18 @@ void RecolorRanges(const std::vector<RangeKeyView>& keys,
                           kRecoloredFramesCacheBytes);
   const FilmToRecolor film{scene, images, *colorizer, key, context};
   int64_t total = 0, done = 0;
-  for (const RecoloredRange& range : ranges) total += static_cast<int64_t>(range.views.size());
-  std::mutex outputs;
+  for (const RecoloredRange& range : ranges) total += std::ssize(range.views);
+  Mutex outputs;
   for (size_t i = 0; i < ranges.size(); ++i) {
     RangeColorer(ranges[i], film, context.scratch_folder() / fmt::format("range_{}", i))
         .Run([&](int index, const FusedColor& color) {
           const View& view = scene.views[index];
           const std::string ab = EncodeAbPng(color.ab);
           const std::string provenance = EncodePng8(color.provenance);
-          const std::lock_guard lock(outputs);
-          context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view, ".png"), ab);
-          context.WriteOutput(ViewArtifact(artifact::kCorrectedProvenance, view, ".png"),
-                              provenance);
-          context.progress().OnProgress(++done, total, "recolouring " + view.name);
+          const MutexLock lock(outputs);
+          context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view), ab);
+          context.WriteOutput(ViewArtifact(artifact::kCorrectedProvenance, view), provenance);
+          context.ReportProgress(++done, total, "recolouring " + view.name);
         });
   }
   nlohmann::ordered_json facts;

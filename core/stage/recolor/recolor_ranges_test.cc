@@ -158,13 +158,13 @@ TEST_F(RecolorRangesTest, RefusesCorrectionsWithoutRangeBesideThem) {
   options.corrections = {{"f03.png", {}}};
   try {
     options.Validate();
-    FAIL() << "it was taken";
+    FAIL() << "it was accepted";
   } catch (const Error& e) {
     EXPECT_THAT(e.what(), HasSubstr("f03.png has no range of time"));
   }
 }
 
-// They are computed once more for the proposed views, so that not all have to be kept.
+// The colours of proposed views are computed again, which bounds memory.
 TEST_F(RecolorRangesTest, PicturesToPaintOnHaveCorrectedColors) {
   const PaintedColors colors{PaintedColors::Kind::kPicture, PaintedFile(9, -25.0f, 0, kWidth / 2)};
   RunForInputs([&](StageContext& context) {
@@ -176,7 +176,7 @@ TEST_F(RecolorRangesTest, PicturesToPaintOnHaveCorrectedColors) {
   ASSERT_FALSE(places.empty());
   for (const auto& place : places) {
     const int index = scene_.FindView(place.at("view").get<std::string>());
-    const std::string name = ViewArtifact(artifact::kPaint, scene_.views[index], ".png");
+    const std::string name = ViewArtifact(artifact::kPaint, scene_.views[index]);
     const Image painted = LabFromSrgb(DecodeImage(context.ReadInput(name), name));
     double error = 0.0;
     for (size_t i = 0; i < after[index].data.size(); ++i) {

@@ -74,9 +74,7 @@ void AddTo(std::vector<RecoloredRange>* ranges,
            const Scene& scene) {
   const std::string& name = scene.views[key.view].name;
   for (RecoloredRange& range : *ranges) {
-    const bool meet =
-        std::find_first_of(range.views.begin(), range.views.end(), views.begin(), views.end()) !=
-        range.views.end();
+    const bool meet = std::ranges::find_first_of(range.views, views) != range.views.end();
     if (!meet) continue;
     if (range.views != views) {
       throw InvalidArgument(

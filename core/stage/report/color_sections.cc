@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <utility>
 
 #include "core/carry/confidence.h"
@@ -12,6 +13,8 @@
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/json_artifact.h"
+#include "core/stage/report/key_view_section.h"
 #include "core/stage/report/source_overlay.h"
 
 namespace color3d {
@@ -26,25 +29,34 @@ constexpr size_t kMaxPictures =
 
 std::string Percent(double share) { return fmt::format("{:.0f} %", 100.0 * share); }
 
+// Names of the sources by ProvenancePlane.
+constexpr const char* kSourceNames[] = {"guessed", "seen", "inferred"};
+constexpr ProvenancePlane kMostCertainFirst[] = {kSeenPlane, kInferredPlane, kGuessedPlane};
+
 SourceShares SharesOf(const Image& provenance) {
-  double sum[kProvenancePlanes] = {0.0, 0.0, 0.0};
+  SourceShares shares;
+  double total = 0.0;
   for (int c = 0; c < kProvenancePlanes; ++c) {
     const float* plane = provenance.Plane(c);
-    for (size_t i = 0; i < provenance.PlaneSize(); ++i) sum[c] += plane[i];
+    shares[c] = std::accumulate(plane, plane + provenance.PlaneSize(), 0.0);
+    total += shares[c];
   }
-  const double total = sum[0] + sum[1] + sum[2];
   if (!(total > 0.0)) return {1.0, 0.0, 0.0};
-  return {sum[0] / total, sum[1] / total, sum[2] / total};
+  for (double& share : shares) share /= total;
+  return shares;
+}
+
+// Percentages of seen, inferred and guessed colour.
+std::vector<std::string> Percentages(const SourceShares& shares) {
+  std::vector<std::string> texts;
+  for (const ProvenancePlane plane : kMostCertainFirst) texts.push_back(Percent(shares[plane]));
+  return texts;
 }
 
 std::vector<std::string> KeysOf(const std::map<std::string, double>& figures) {
   std::vector<std::string> keys;
   for (const auto& [key, value] : figures) keys.push_back(key);
   return keys;
-}
-
-ReportPicture SmallPicture(const Image& image, std::string caption) {
-  return {std::move(caption), EncodeJpeg(FitWithin(image, kPictureSidePx), 88)};
 }
 
 }  // namespace
@@ -62,7 +74,7 @@ void ColorFacts::ReadProvenance() {
   for (size_t i = 0; i < scene_.views.size(); ++i) {
     const std::string name = ProvenanceArtifact(context_, scene_.views[i]);
     if (!context_.HasInput(name)) continue;
-    const Image image = DecodeImage(context_.ReadInput(name), name);
+    const Image image = ReadPicture(context_, name);
     if (image.channels != 3) throw InvalidArgument("{} is grey; it must be RGB", name);
     const bool scored = context_.HasInput(ViewArtifact(artifact::kTruths, scene_.views[i], ".jpg"));
     views_.push_back({static_cast<int>(i), scored, SharesOf(image)});
@@ -71,22 +83,19 @@ void ColorFacts::ReadProvenance() {
 
 // All 0 if there are no such views.
 SourceShares ColorFacts::MeanShares(bool scored_only) const {
-  SourceShares mean;
+  SourceShares mean{};
   double count = 0.0;
   for (const ViewFacts& view : views_) {
     if (scored_only && !view.scored) continue;
-    mean.guessed += view.shares.guessed;
-    mean.seen += view.shares.seen;
-    mean.inferred += view.shares.inferred;
+    for (int c = 0; c < kProvenancePlanes; ++c) mean[c] += view.shares[c];
     count += 1.0;
   }
-  if (count == 0.0) return mean;
-  return {mean.guessed / count, mean.seen / count, mean.inferred / count};
+  for (double& share : mean) share /= std::max(count, 1.0);
+  return mean;
 }
 
 void ColorFacts::ReadAugmentations() {
-  const ordered_json facts = ReadJson(context_, artifact::kAugmentationFacts);
-  try {
+  ParseArtifact(context_, artifact::kAugmentationFacts, [&](const ordered_json& facts) {
     for (const auto& sample : facts.at("samples")) {
       const std::string source = sample.at("source");
       augmentations_.push_back(
@@ -94,9 +103,7 @@ void ColorFacts::ReadAugmentations() {
               ? source
               : fmt::format("{} ({})", sample.at("name").get<std::string>(), source));
     }
-  } catch (const ordered_json::exception& e) {
-    throw InvalidArgument("{} is damaged: {}", artifact::kAugmentationFacts, e.what());
-  }
+  });
 }
 
 void ColorFacts::AddRows(const ordered_json& found, std::vector<Agreement>* rows) {
@@ -112,37 +119,24 @@ void ColorFacts::AddRows(const ordered_json& found, std::vector<Agreement>* rows
 }
 
 void ColorFacts::ReadScores() {
-  const ordered_json scores = ReadJson(context_, artifact::kScores);
-  try {
-    if (const auto found = scores.find("consistency"); found != scores.end()) {
-      AddRows(*found, &agreement_);
-    }
-    if (const auto found = scores.find("temporal"); found != scores.end()) {
-      AddRows(*found, &steadiness_);
-    }
-    if (const auto found = scores.find("sources"); found != scores.end()) {
-      errors_by_source_ = found->get<std::map<std::string, double>>();
-    }
-  } catch (const ordered_json::exception& e) {
-    throw InvalidArgument("{} is damaged: {}", artifact::kScores, e.what());
-  }
+  ParseArtifact(context_, artifact::kScores, [&](const ordered_json& scores) {
+    AddRows(scores.value("consistency", ordered_json::object()), &agreement_);
+    AddRows(scores.value("temporal", ordered_json::object()), &steadiness_);
+    errors_by_source_ = scores.value("sources", errors_by_source_);
+  });
 }
 
 std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
   std::vector<std::pair<std::string, double>> metrics;
   if (carry_.coverage) metrics.emplace_back("coverage", *carry_.coverage);
-  if (!views_.empty()) {
-    const SourceShares mean = MeanShares(/*scored_only=*/false);
-    metrics.emplace_back("share_seen", mean.seen);
-    metrics.emplace_back("share_inferred", mean.inferred);
-    metrics.emplace_back("share_guessed", mean.guessed);
-  }
-  if (std::any_of(views_.begin(), views_.end(), [](const ViewFacts& v) { return v.scored; })) {
-    const SourceShares mean = MeanShares(/*scored_only=*/true);
-    metrics.emplace_back("share_seen_scored", mean.seen);
-    metrics.emplace_back("share_inferred_scored", mean.inferred);
-    metrics.emplace_back("share_guessed_scored", mean.guessed);
-  }
+  const auto add_shares = [&](bool scored_only, const char* suffix) {
+    const SourceShares mean = MeanShares(scored_only);
+    for (const ProvenancePlane plane : kMostCertainFirst) {
+      metrics.emplace_back(fmt::format("share_{}{}", kSourceNames[plane], suffix), mean[plane]);
+    }
+  };
+  if (!views_.empty()) add_shares(/*scored_only=*/false, "");
+  if (std::ranges::any_of(views_, &ViewFacts::scored)) add_shares(/*scored_only=*/true, "_scored");
   for (const auto& [name, value] : errors_by_source_) {
     if (!name.starts_with("share_")) metrics.emplace_back(name, value);
   }
@@ -168,25 +162,24 @@ std::vector<std::pair<std::string, double>> ColorFacts::Metrics() const {
 
 std::string ColorFacts::SourceSummary() const {
   std::string summary;
+  const auto percentages = [&](bool scored_only) { return Percentages(MeanShares(scored_only)); };
   if (!views_.empty()) {
-    const SourceShares mean = MeanShares(/*scored_only=*/false);
+    const auto all = percentages(/*scored_only=*/false);
     summary = fmt::format(
         "{} of all pixels show a surface that a key view shows, {} resemble something in it, and "
-        "{} "
-        "are guessed. ",
-        Percent(mean.seen),
-        Percent(mean.inferred),
-        Percent(mean.guessed));
+        "{} are guessed. ",
+        all[0],
+        all[1],
+        all[2]);
   }
-  const auto scored =
-      std::count_if(views_.begin(), views_.end(), [](const ViewFacts& v) { return v.scored; });
+  const auto scored = std::ranges::count_if(views_, &ViewFacts::scored);
   if (scored > 0) {
-    const SourceShares mean = MeanShares(/*scored_only=*/true);
+    const auto of_scored = percentages(/*scored_only=*/true);
     summary += fmt::format("In the {} scored views these are {}, {} and {}. ",
                            scored,
-                           Percent(mean.seen),
-                           Percent(mean.inferred),
-                           Percent(mean.guessed));
+                           of_scored[0],
+                           of_scored[1],
+                           of_scored[2]);
   }
   if (carry_.coverage) {
     summary += fmt::format("The key {} {} of the other views' pixels.",
@@ -198,8 +191,8 @@ std::string ColorFacts::SourceSummary() const {
 
 std::vector<ColorFacts::ViewFacts> ColorFacts::LeastCertainFirst() const {
   std::vector<ViewFacts> views = views_;
-  std::stable_sort(views.begin(), views.end(), [](const ViewFacts& x, const ViewFacts& y) {
-    return x.shares.seen + 0.5 * x.shares.inferred < y.shares.seen + 0.5 * y.shares.inferred;
+  std::ranges::stable_sort(views, {}, [](const ViewFacts& view) {
+    return view.shares[kSeenPlane] + 0.5 * view.shares[kInferredPlane];
   });
   return views;
 }
@@ -208,11 +201,9 @@ ReportTable ColorFacts::ShareTable() const {
   const std::vector<ViewFacts> views = LeastCertainFirst();
   ReportTable table{{"view, least certain first", "seen", "inferred", "guessed"}, {}};
   for (size_t i = 0; i < std::min(views.size(), kMaxRows); ++i) {
-    const SourceShares& s = views[i].shares;
-    table.rows.push_back({scene_.views[views[i].view].name,
-                          Percent(s.seen),
-                          Percent(s.inferred),
-                          Percent(s.guessed)});
+    std::vector<std::string> cells = Percentages(views[i].shares);
+    cells.insert(cells.begin(), scene_.views[views[i].view].name);
+    table.rows.push_back(std::move(cells));
   }
   if (views.size() > kMaxRows) {
     table.rows.push_back({fmt::format("and {} more", views.size() - kMaxRows)});
@@ -222,9 +213,10 @@ ReportTable ColorFacts::ShareTable() const {
 
 ReportTable ColorFacts::ErrorTable() const {
   ReportTable table{{"held-out pixels", "share", "colour error, CIEDE2000"}, {}};
-  for (const char* source : {"seen", "inferred", "guessed"}) {
-    const auto share = errors_by_source_.find(std::string("share_") + source);
-    const auto error = errors_by_source_.find(std::string("delta_e00_") + source);
+  for (const ProvenancePlane plane : kMostCertainFirst) {
+    const std::string source = kSourceNames[plane];
+    const auto share = errors_by_source_.find("share_" + source);
+    const auto error = errors_by_source_.find("delta_e00_" + source);
     if (share == errors_by_source_.end() || error == errors_by_source_.end()) continue;
     table.rows.push_back({source, Percent(share->second), MetricText(error->first, error->second)});
   }
@@ -242,19 +234,21 @@ std::vector<ReportRow> ColorFacts::ProvenanceRows() const {
     ReportRow& row = rows[k];
     row.title = view.name;
     for (const std::string& name : {ViewArtifact(artifact::kColored2d, view, ".jpg"),
-                                    ViewArtifact(artifact::kRenders, view, ".png")}) {
+                                    ViewArtifact(artifact::kRenders, view)}) {
       if (!context_.HasInput(name)) continue;
       row.pictures.push_back(
-          SmallPicture(DecodeImage(context_.ReadInput(name), name), "its colours"));
+          SmallPicture(ReadPicture(context_, name), "its colours", kPictureSidePx));
       break;
     }
     const std::string name = ProvenanceArtifact(context_, view);
-    row.pictures.push_back(SmallPicture(
-        ShadeBySource(photos.Srgb(facts.view), DecodeImage(context_.ReadInput(name), name)),
-        fmt::format("where they come from: {} seen, {} inferred, {} guessed",
-                    Percent(facts.shares.seen),
-                    Percent(facts.shares.inferred),
-                    Percent(facts.shares.guessed))));
+    const auto shares = Percentages(facts.shares);
+    row.pictures.push_back(
+        SmallPicture(ShadeBySource(photos.Srgb(facts.view), ReadPicture(context_, name)),
+                     fmt::format("where they come from: {} seen, {} inferred, {} guessed",
+                                 shares[0],
+                                 shares[1],
+                                 shares[2]),
+                     kPictureSidePx));
   });
   return rows;
 }
@@ -280,12 +274,11 @@ ReportSection ColorFacts::SourceSection() const {
   if (!errors_by_source_.empty()) section.tables.push_back(ErrorTable());
   section.rows = ProvenanceRows();
   if (!section.rows.empty()) {
-    const SourceShares mean = MeanShares(/*scored_only=*/false);
+    const auto mean = Percentages(MeanShares(/*scored_only=*/false));
     section.legend = {
-        {"seen", "seen in a key view: " + Percent(mean.seen) + " (plain photo)"},
-        {"inferred",
-         "inferred, as it resembles something there: " + Percent(mean.inferred) + " (blue tint)"},
-        {"guessed", "guessed: " + Percent(mean.guessed) + " (orange hatching)"}};
+        {"seen", "seen in a key view: " + mean[0] + " (plain photo)"},
+        {"inferred", "inferred, as it resembles something there: " + mean[1] + " (blue tint)"},
+        {"guessed", "guessed: " + mean[2] + " (orange hatching)"}};
   }
   return section;
 }
@@ -375,18 +368,14 @@ ReportSection ColorFacts::PersonalizationSection(std::vector<CurvePoint> curves)
 }
 
 std::vector<ReportSection> ColorFacts::Sections(std::vector<CurvePoint> personalization) const {
-  std::vector<ReportSection> sections;
-  for (ReportSection& section :
-       std::vector<ReportSection>{SourceSection(),
-                                  AgreementSection(),
-                                  SteadinessSection(),
-                                  PersonalizationSection(std::move(personalization))}) {
-    if (section.notes.empty() && section.tables.empty() && section.curves.empty() &&
-        section.wide.bytes.empty()) {
-      continue;
-    }
-    sections.push_back(std::move(section));
-  }
+  std::vector<ReportSection> sections = {SourceSection(),
+                                         AgreementSection(),
+                                         SteadinessSection(),
+                                         PersonalizationSection(std::move(personalization))};
+  std::erase_if(sections, [](const ReportSection& section) {
+    return section.notes.empty() && section.tables.empty() && section.curves.empty() &&
+           section.wide.bytes.empty();
+  });
   return sections;
 }
 

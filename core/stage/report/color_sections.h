@@ -2,6 +2,7 @@
 // personalized colorizer. For the report stage only.
 #pragma once
 
+#include <array>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -9,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/carry/confidence.h"
 #include "core/catalogue/metrics.h"
 #include "core/report/report_page.h"
 #include "core/scene/scene.h"
@@ -18,12 +20,9 @@
 
 namespace color3d {
 
-// Mean shares of the sources of the colour over the pixels of a view. They sum to 1.
-struct SourceShares {
-  double guessed = 0.0;
-  double seen = 0.0;
-  double inferred = 0.0;
-};
+// Mean shares of the sources of the colour over the pixels of a view, by ProvenancePlane. They sum
+// to 1.
+using SourceShares = std::array<double, kProvenancePlanes>;
 
 // Read once from provenance/*, carry.json and scores.json, each of which may be absent. Not
 // thread-safe.
@@ -47,7 +46,7 @@ class ColorFacts {
   struct ViewFacts {
     int view = 0;
     bool scored = false;
-    SourceShares shares;
+    SourceShares shares = {};
   };
   // The metrics of one kind of picture: a row of a table.
   struct Agreement {

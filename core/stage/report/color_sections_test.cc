@@ -12,7 +12,7 @@ namespace {
 
 using ColorSectionsTest = EvaluatedSceneTest;
 
-TEST_F(ColorSectionsTest, TellsSourcesAndTheNextKeyView) {
+TEST_F(ColorSectionsTest, ReportsSourcesAndNextKeyView) {
   AddProvenance("p1.png", Halves({0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f}));
   AddProvenance("p2.png", Halves({1.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f}));
   AddInput(artifact::kCarryFacts, R"({"coverage": 0.61, "key_views": ["p1.png"]})");

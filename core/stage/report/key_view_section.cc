@@ -53,11 +53,11 @@ void AddRegions(const std::string& folder, const StageContext& context, ReportKe
       {"regions of the words in the prompt", context.ReadInput(regions)});
 }
 
-ReportPicture SmallPicture(std::string caption, const Image& image, int side_px) {
+}  // namespace
+
+ReportPicture SmallPicture(const Image& image, std::string caption, int side_px) {
   return {std::move(caption), EncodeJpeg(FitWithin(image, side_px), 88)};
 }
-
-}  // namespace
 
 ReportKeyView KeyViewChapter(ReportRow pictures, const StageContext& context) {
   ReportKeyView report;
@@ -82,12 +82,12 @@ std::vector<ReportKeyView> AdditionalKeyViewChapters(const Scene& scene,
   for (const std::string& folder : AdditionalKeyViewFolders(context)) {
     const ordered_json facts = ReadJson(context, folder + artifact::kKeyColorFacts);
     const View& view = scene.views[scene.FindView(facts.value("view", ""))];
-    const std::string colored = folder + artifact::kKeyViewColored;
     ReportKeyView report;
     report.pictures = {
         view.name,
-        {SmallPicture("as captured", ReadImage(context.scene_folder() / view.image_file), side_px),
-         SmallPicture("coloured", DecodeImage(context.ReadInput(colored), colored), side_px)}};
+        {SmallPicture(ReadImage(context.scene_folder() / view.image_file), "as captured", side_px),
+         SmallPicture(
+             ReadPicture(context, folder + artifact::kKeyViewColored), "coloured", side_px)}};
     AddColor(facts, &report);
     AddRegions(folder, context, &report);
     reports.push_back(std::move(report));

@@ -1,6 +1,7 @@
 // Chapters of the report on key views.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "core/report/report_page.h"
@@ -8,6 +9,9 @@
 #include "core/stage/context/stage_context.h"
 
 namespace color3d {
+
+// Picture for the page, a JPEG within `side_px`.
+ReportPicture SmallPicture(const Image& image, std::string caption, int side_px);
 
 // The key view: its choice and the source of its colour, as far as there are artifacts. Throws
 // Error{kInvalidArgument} if an artifact is damaged.

@@ -39,7 +39,7 @@ std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
   for (size_t k = 0; k < training.size(); ++k) {
     const View& view = scene.views[training[k]];
     photos.push_back(context.scene_folder() / view.image_file);
-    if (std::find(key_views.begin(), key_views.end(), view.name) != key_views.end()) {
+    if (std::ranges::find(key_views, view.name) != key_views.end()) {
       keys.push_back(static_cast<int>(k));
     }
   }

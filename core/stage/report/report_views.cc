@@ -9,8 +9,8 @@
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/splat/model/gaussian_model.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {
@@ -22,7 +22,7 @@ constexpr double kViewsAtLargest =
 constexpr int kQuality = 82;
 
 bool HasRender(const View& view, const StageContext& context) {
-  return context.HasInput(ViewArtifact(artifact::kRenders, view, ".png"));
+  return context.HasInput(ViewArtifact(artifact::kRenders, view));
 }
 
 std::vector<int> ChosenViews(const Scene& scene, bool has_model, const StageContext& context) {
@@ -63,24 +63,18 @@ std::vector<ReportView> ReportViews(const Scene& scene, StageContext& context) {
   // Renders one view at a time with all threads; the other pictures are made by one thread each.
   std::vector<Image> renders(chosen.size());
   for (size_t i = 0; model && i < chosen.size(); ++i) {
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     const View& view = scene.views[chosen[i]];
-    renders[i] = RenderView(*model,
-                            photos.WorkingCamera(chosen[i]),
-                            view.cam_from_world,
-                            context.pool(),
-                            0.0f,
-                            view.time_s())
-                     .lab;
+    renders[i] = RenderView(*model, view, photos.WorkingCamera(chosen[i]), context.pool()).lab;
   }
   std::vector<ReportView> views(chosen.size());
-  context.pool().ForEach(static_cast<int64_t>(chosen.size()), [&](int64_t i, int) {
-    context.cancel().ThrowIfCancelled();
+  context.pool().ForEach(std::ssize(chosen), [&](int64_t i, int) {
+    context.ThrowIfCancelled();
     const View& view = scene.views[chosen[i]];
     const auto artifact_of = [&](const char* folder, const char* extension) {
       const std::string name = ViewArtifact(folder, view, extension);
       if (!context.HasInput(name)) return Image();
-      return FitWithin(DecodeImage(context.ReadInput(name), name), side_px);
+      return FitWithin(ReadPicture(context, name), side_px);
     };
     ReportView& shown = views[i];
     shown.name = view.name + (view.held_out ? " (held out)" : "");

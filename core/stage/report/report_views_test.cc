@@ -43,7 +43,7 @@ TEST_F(ReportViewsTest, ReportsUnfinishedWork) {
   EXPECT_THAT(html, testing::Not(testing::HasSubstr("view.html")));
 }
 
-TEST_F(ReportViewsTest, TellsWhetherAPosedFilmMoves) {
+TEST_F(ReportViewsTest, ReportsMotionOfPosedFilm) {
   for (int i = 0; i < 3; ++i) scene_.views[i].moment = Moment{0.5 * i, 0};
   AddInput(artifact::kScene, SceneToJson(scene_));
   AddInput(artifact::kImportFacts, ImportFactsToJson({.layout = CaptureLayout::kFilm}));
@@ -90,7 +90,7 @@ TEST_F(ReportViewsTest, PlanNamesTheStrategyAndEveryStage) {
 }
 
 // A metric without a row in core/catalogue/metrics.cc is shown by its key.
-TEST_F(ReportViewsTest, UnknownMetricsDoNotVanish) {
+TEST_F(ReportViewsTest, ShowsUnknownMetrics) {
   AddInput(artifact::kScores,
            R"({"mean": {"colorfulness_2d": 20.5, "sharpness": 7.25},
                "consistency": {"rendered": {"pairs": 1, "matches": 1, "me": 0.02, "flicker": 0.125}}})");
@@ -106,7 +106,7 @@ TEST_F(ReportViewsTest, UnknownMetricsDoNotVanish) {
   EXPECT_THAT(html, testing::HasSubstr("flicker"));
 }
 
-TEST(SourceOverlay, SourcesDifferByLightnessAndPattern) {
+TEST(SourceOverlayTest, SourcesDifferByLightnessAndPattern) {
   const Image photo(32, 16, 3, 0.6f);
   const auto shaded = [&](float guessed, float seen, float inferred) {
     Image shares(32, 16, 3);

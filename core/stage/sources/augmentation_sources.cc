@@ -61,7 +61,7 @@ std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageCon
   std::vector<Augmentation> pictures;
   for (const std::string& file : ListFiles(context.scene_folder())) {
     if (!file.starts_with(kFolder)) continue;
-    context.cancel().ThrowIfCancelled();
+    context.ThrowIfCancelled();
     if (!HasImageExtension(file)) {
       throw InvalidArgument(
           "{} is no picture ({}); remove it from {}", file, ReadableImageFormats(), kFolder);
@@ -80,13 +80,12 @@ std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageCon
   return pictures;
 }
 
-std::vector<Augmentation> AugmentationsFromBackend(const std::string& backend,
+std::vector<Augmentation> AugmentationsFromBackend(const AugmentationOptions& options,
                                                    RemoteColorizer& remote,
                                                    const RemoteInfo& info,
                                                    AugmentationKind kind,
                                                    int count,
                                                    const Image& key_srgb,
-                                                   int max_side_px,
                                                    StageContext& context) {
   const std::string name = AugmentationKindName(kind);
   RemoteGenerateRequest request;
@@ -105,8 +104,8 @@ std::vector<Augmentation> AugmentationsFromBackend(const std::string& backend,
   const std::vector<std::string> answers =
       remote.Generate(request, context.progress(), context.cancel());
   if (answers.size() < static_cast<size_t>(count)) {
-    context.progress().OnWarning(fmt::format(
-        "the backend '{}' made {} of {} {} pictures", backend, answers.size(), count, name));
+    context.Warn(
+        "the backend '{}' made {} of {} {} pictures", options.backend, answers.size(), count, name);
   }
   std::vector<Augmentation> made;
   for (const std::string& bytes : answers) {
@@ -117,12 +116,12 @@ std::vector<Augmentation> AugmentationsFromBackend(const std::string& backend,
       ProbeImage(bytes, what, limits);
       made.push_back({AugmentationName(name, made.size()),
                       name,
-                      "backend " + backend,
-                      PictureOf(CheckedLab(DecodeImage(bytes, what), max_side_px, what))});
+                      "backend " + options.backend,
+                      PictureOf(CheckedLab(DecodeImage(bytes, what), options.max_side_px, what))});
     } catch (const Error& e) {
       throw Error(ErrorCode::kFailedPrecondition,
                   "the backend '{}' did not make usable {} pictures: {}",
-                  backend,
+                  options.backend,
                   name,
                   e.what());
     }

@@ -30,15 +30,14 @@ struct Augmentation {
 std::vector<Augmentation> AugmentationsFromFiles(int max_side_px, const StageContext& context);
 
 // Requests `count` pictures of one kind, made from `key_srgb` (3 channels, 0..1), from the
-// generator `backend`, which must support the kind. Throws the errors of RemoteColorizer, and
+// generator options.backend, which must support the kind. Throws the errors of RemoteColorizer, and
 // Error{kFailedPrecondition} for answers that are no coloured pictures.
-std::vector<Augmentation> AugmentationsFromBackend(const std::string& backend,
+std::vector<Augmentation> AugmentationsFromBackend(const AugmentationOptions& options,
                                                    RemoteColorizer& remote,
                                                    const RemoteInfo& info,
                                                    AugmentationKind kind,
                                                    int count,
                                                    const Image& key_srgb,
-                                                   int max_side_px,
                                                    StageContext& context);
 
 }  // namespace color3d

@@ -54,14 +54,14 @@ Image ReadPainted(const std::filesystem::path& file, const Image& photo) {
   const Image color = ResizeWeighted(Channels(painted, 0, 3), alpha, width, height);
   const Image small_alpha = Resize(alpha, width, height);
   Image fitted(width, height, 4);
-  std::copy(color.data.begin(), color.data.end(), fitted.data.begin());
-  std::copy(small_alpha.data.begin(), small_alpha.data.end(), fitted.Plane(3));
+  std::ranges::copy(color.data, fitted.data.begin());
+  std::ranges::copy(small_alpha.data, fitted.Plane(3));
   return fitted;
 }
 
 GivenColors FromMap(HintMap map, const Image& photo) {
   GivenColors colors{std::move(map.ab), Image(photo.width, photo.height, 1)};
-  std::copy(map.hinted.begin(), map.hinted.end(), colors.given.data.begin());
+  std::ranges::copy(map.hinted, colors.given.data.begin());
   return colors;
 }
 
@@ -82,9 +82,8 @@ GivenColors FromPicture(const Image& painted, const Image& srgb, const Image& cu
 GivenColors FromHints(const PaintedColors& painted, const Image& srgb, StageContext& context) {
   const auto hints = ParseHintsJson(ReadFile(painted.file, kMaxHintsBytes));
   const Image labels = painted.labels.empty() ? Image() : ReadStoredValues(painted.labels);
-  const bool asks_automatic = std::any_of(hints.begin(), hints.end(), [](const ColorHint& hint) {
-    return hint.fill == ColorHint::Fill::kAutomatic;
-  });
+  const bool asks_automatic = std::ranges::any_of(
+      hints, [](const ColorHint& hint) { return hint.fill == ColorHint::Fill::kAutomatic; });
   const Image automatic = asks_automatic
                               ? AutomaticColorizer::Embedded()->Colorize(LuminanceFromSrgb(srgb)).ab
                               : Image();
@@ -102,7 +101,7 @@ GivenColors Read(const PaintedColors& painted,
                  StageContext& context) {
   switch (painted.kind) {
     case PaintedColors::Kind::kStrokes:
-      return FromMap(HintsFromStrokes(ReadPainted(painted.file, srgb)), srgb);
+      return FromMap(HintsOfStrokes(ReadPainted(painted.file, srgb)), srgb);
     case PaintedColors::Kind::kPoints:
       return FromHints(painted, srgb, context);
     case PaintedColors::Kind::kPicture:
@@ -124,10 +123,19 @@ GivenColors ReadGivenColors(const PaintedColors& painted,
                             StageContext& context) {
   GivenColors colors = Read(painted, srgb, current_ab, context);
   const auto given = [](float value) { return value > 0.0f; };
-  if (std::none_of(colors.given.data.begin(), colors.given.data.end(), given)) {
+  if (std::ranges::none_of(colors.given.data, given)) {
     throw InvalidArgument("it changes no pixel of the photo");
   }
   return colors;
+}
+
+void MixIn(const Image& ab, const Image& share, Image* colors) {
+  for (int c = 0; c < 2; ++c) {
+    for (size_t i = 0; i < share.data.size(); ++i) {
+      float& value = colors->Plane(c)[i];
+      value += share.data[i] * (ab.Plane(c)[i] - value);
+    }
+  }
 }
 
 CarriedColor UndistortGivenColors(const Image& ab,

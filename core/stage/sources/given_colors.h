@@ -28,6 +28,9 @@ GivenColors ReadGivenColors(const PaintedColors& painted,
                             const Image& current_ab,
                             StageContext& context);
 
+// Blends `ab` into `colors` (both 2 channels) by `share` (1 channel, 0..1).
+void MixIn(const Image& ab, const Image& share, Image* colors);
+
 // Undistorts colours of the photo of `view` (2 channels, size as captured) to the size of `images`.
 // `given`: 1 channel, 0..1, their weight, so that pixels without a colour do not leak into others.
 CarriedColor UndistortGivenColors(const Image& ab,

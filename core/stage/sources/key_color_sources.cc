@@ -69,9 +69,8 @@ KeyColorResult FromStrokes(const Options& options, const KeyPhoto& photo, StageC
 KeyColorResult FromPoints(const Options& options, const KeyPhoto& photo, StageContext& context) {
   const auto hints = ParseHintsJson(ReadFile(options.file, kMaxPointsBytes));
   const Image labels = options.labels.empty() ? Image() : ReadStoredValues(options.labels);
-  const bool asks_automatic = std::any_of(hints.begin(), hints.end(), [](const ColorHint& hint) {
-    return hint.fill == ColorHint::Fill::kAutomatic;
-  });
+  const bool asks_automatic = std::ranges::any_of(
+      hints, [](const ColorHint& hint) { return hint.fill == ColorHint::Fill::kAutomatic; });
   const Image automatic =
       asks_automatic ? AutomaticColorizer::Embedded()->Colorize(photo.luminance).ab : Image();
   HintPictures pictures;
@@ -104,7 +103,7 @@ KeyColorResult FromReferences(const Options& options,
 }
 
 KeyColorResult FromScript(const Options& options, const KeyPhoto& photo, StageContext& context) {
-  context.progress().OnProgress(0, 1, "running the script " + options.name);
+  context.ReportProgress(0, 1, "running the script " + options.name);
   ScriptColor color = KeyColorFromScript(photo.luminance, context.Model(options.name));
   return {std::move(color.ab),
           {{"script", options.name}, {"mean_luminance_difference", color.luminance_deviation}}};
@@ -150,8 +149,8 @@ KeyColorResult FromAutomatic(const Options& options, const KeyPhoto& photo, Stag
   const auto colorizer = options.name.empty()
                              ? AutomaticColorizer::Embedded()
                              : AutomaticColorizer::FromWeightFile(context.Model(options.name));
-  context.cancel().ThrowIfCancelled();
-  context.progress().OnProgress(0, 1, "colouring the key view");
+  context.ThrowIfCancelled();
+  context.ReportProgress(0, 1, "colouring the key view");
   AutomaticColor color = colorizer->Colorize(photo.luminance);
   KeyColorResult result{std::move(color.ab), {{"description", colorizer->description()}}};
   result.confidence = std::move(color.confidence);
@@ -187,7 +186,7 @@ ordered_json RegionFacts(const std::vector<PromptRegion>& regions) {
 
 KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageContext& context) {
   const auto clip = ClipModel::FromWeightFile(context.Model(options.name));
-  context.cancel().ThrowIfCancelled();
+  context.ThrowIfCancelled();
   // Regions of no phrase are coloured automatically.
   const Image rest = AutomaticColorizer::Embedded()->Colorize(photo.luminance).ab;
   PromptOptions prompt;
@@ -222,9 +221,7 @@ constexpr SourceRow kSources[] = {{Options::Source::kImage, "image", FromImage},
                                   {Options::Source::kEdit, "edit", FromEdit}};
 
 const SourceRow& Find(Options::Source source) {
-  const auto* found = std::find_if(std::begin(kSources),
-                                   std::end(kSources),
-                                   [&](const SourceRow& entry) { return entry.source == source; });
+  const auto* found = std::ranges::find(kSources, source, &SourceRow::source);
   if (found == std::end(kSources)) {
     throw Error(ErrorCode::kInternal, "a source of key colour is missing in the table");
   }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/splat/raster/render.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {
@@ -56,8 +56,7 @@ SeenSamples SeenByGeometry(const Scene& scene,
     cancel.ThrowIfCancelled();
     const Camera camera = scene.views[view].camera.FitWithin(kDepthSidePx);
     const Pose& pose = scene.views[view].cam_from_world;
-    RenderedView rendered =
-        RenderView(geometry, camera, pose, pool, 0.0f, scene.views[view].time_s());
+    RenderedView rendered = RenderView(geometry, scene.views[view], camera, pool);
     for (size_t i = 0; i < rendered.depth.data.size(); ++i) {
       if (rendered.opacity.data[i] < kMinOpacity) rendered.depth.data[i] = 0.0f;
     }

@@ -6,8 +6,8 @@
 
 #include "core/base/median.h"
 #include "core/scene/photo_masks.h"
-#include "core/splat/raster/render.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/sources/render_view.h"
 
 namespace color3d {
 namespace {
@@ -62,8 +62,7 @@ Image ViewPositions::Of(int view,
   if (!geometry_) return {};
   const Pose& pose = scene_.views[view].cam_from_world;
   ThreadPool one(1);
-  const RenderedView rendered =
-      RenderView(*geometry_, camera, pose, one, 0.0f, scene_.views[view].time_s());
+  const RenderedView rendered = RenderView(*geometry_, scene_.views[view], camera, one);
   Image position(camera.width, camera.height, 4);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {

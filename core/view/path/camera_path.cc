@@ -17,7 +17,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 constexpr double kRamp = 0.12;       // share of a way on which its speed grows, and falls again
-constexpr double kLeastGap = 1e-3;   // of what the curve counts, where cameras are the same
+constexpr double kLeastGap = 1e-3;   // in curve parameters, for equal cameras
 constexpr double kLeastWay = 1e-12;  // between two steps, so that the way always grows
 
 double AngleBetween(const Eigen::Vector4d& a, const Eigen::Vector4d& b) {

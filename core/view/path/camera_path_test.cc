@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 double AngleBetween(const Pose& a, const Pose& b) { return a.rotation.angularDistance(b.rotation); }
 
-// Cameras on a bow, at uneven distances, that look inwards and are level; `up` is -y.
+// Level cameras on an arc, at uneven distances, that look inwards; `up` is -y.
 std::vector<PathCamera> Bow(int count) {
   std::vector<PathCamera> cameras;
   Random random(5);

@@ -8,7 +8,7 @@ namespace color3d {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-constexpr double kLargestGap = kTwoPi / 4;  // between neighbours that stand all around
+constexpr double kLargestGap = kTwoPi / 4;  // between neighbours of a full circle
 constexpr double kLeastReach = 0.1, kMostReach = 0.35;
 // Standard deviations in the weight of a photo: azimuth from the current position, elevation and
 // logarithm of distance from the key view.

@@ -48,7 +48,7 @@ TEST(TurnTest, SurroundingPhotosGiveCircleOthersSway) {
   EXPECT_TRUE(TurnOf(SceneOf(ring), 3).around);
   ring.resize(6);  // a quarter and more without photos
   EXPECT_FALSE(TurnOf(SceneOf(ring), 3).around);
-  // The key view in the middle of a wide arc: to both sides alike.
+  // The key view in the middle of a wide arc: equally to both sides.
   Turn turn = TurnOf(SceneOf({-40, -20, 0, 20, 40}), 2);
   EXPECT_FALSE(turn.around);
   EXPECT_NEAR(turn.middle, 0.0, 1e-9);
@@ -56,7 +56,7 @@ TEST(TurnTest, SurroundingPhotosGiveCircleOthersSway) {
   // At an end of it: to the other side only.
   turn = TurnOf(SceneOf({-60, -40, -20, 0}), 3);
   EXPECT_NEAR(std::abs(turn.middle), turn.reach, 1e-9);
-  // Few degrees: not far beyond them.
+  // A narrow arc: not far beyond it.
   turn = TurnOf(SceneOf({-10, 0, 10}), 1);
   EXPECT_NEAR(turn.reach, 10.0 * kDegree, 0.01);
   EXPECT_NEAR(TurnOf(SceneOf({0}), 0).reach, 0.1, 1e-9);
@@ -110,7 +110,7 @@ TEST(TurnFramesTest, LoopClosesUprightAndCentered) {
     const std::vector<PathCamera> frames =
         TurnFrames(scene, 2, kFocus, FrameShares(kFrames, false, true));
     ASSERT_EQ(frames.size(), static_cast<size_t>(kFrames));
-    const Vector3d level = UpVector(scene.views);  // as far as cameras tell
+    const Vector3d level = UpVector(scene.views);  // estimated from the cameras
     const Vector3d key = scene.views[2].cam_from_world.Center();
     EXPECT_LT((frames[0].cam_from_world.Center() - key).norm(), 1e-9);
     double longest = 0.0, shortest = 1e9;
@@ -122,7 +122,7 @@ TEST(TurnFramesTest, LoopClosesUprightAndCentered) {
       EXPECT_GT(up.dot(kUp), 0.9);
       const Vector3d seen = pose.Apply(kFocus);
       EXPECT_LT(seen.head<2>().norm(), 1e-9);
-      EXPECT_NEAR(seen.z(), std::sqrt(17.0), 1e-9) << "all photos stand as far away";
+      EXPECT_NEAR(seen.z(), std::sqrt(17.0), 1e-9) << "all photos are at the same distance";
       EXPECT_EQ(frames[i].camera.cx, 320.0);
       EXPECT_EQ(frames[i].camera.fy, 510.0);
       const double step =

@@ -3,10 +3,13 @@
 #include <charconv>
 #include <set>
 
+#include "color3d/v1/blob.grpc.pb.h"
 #include "server/rpc/calls/convert.h"
 
 namespace color3d {
 namespace {
+using grpc::CallbackServerContext;
+using grpc::ServerUnaryReactor;
 
 std::vector<std::string> SplitSlashes(const std::string& text) {
   std::vector<std::string> parts;
@@ -31,6 +34,38 @@ FileDigest ParseDigest(const std::string& sha256, const std::string& size) {
   return FromProto(digest);
 }
 
+class BlobServiceImpl final : public v1::BlobService::CallbackService {
+ public:
+  explicit BlobServiceImpl(const RpcParts& parts) : parts_(parts) {}
+
+  ServerUnaryReactor* FindMissingBlobs(CallbackServerContext* context,
+                                       const v1::FindMissingBlobsRequest* request,
+                                       v1::FindMissingBlobsResponse* response) override {
+    return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
+      if (request->digests_size() > 10'000) {
+        throw InvalidArgument("digests has {} entries; at most 10000 are allowed",
+                              request->digests_size());
+      }
+      std::vector<std::string> asked;
+      for (const v1::Digest& proto : request->digests()) {
+        asked.push_back(FromProto(proto).sha256);
+      }
+      const std::set<std::string> held = call.store.HeldBlobs(asked);
+      std::set<std::string> seen;
+      for (const v1::Digest& proto : request->digests()) {
+        const FileDigest digest = FromProto(proto);
+        if (!seen.insert(digest.sha256).second) continue;
+        if (!held.contains(digest.sha256) || !parts_.blobs.Touch(digest)) {
+          *response->add_missing() = proto;
+        }
+      }
+    });
+  }
+
+ private:
+  const RpcParts& parts_;
+};
+
 }  // namespace
 
 UploadName ParseUploadName(const std::string& resource) {
@@ -52,33 +87,8 @@ FileDigest ParseBlobName(const std::string& resource) {
   return ParseDigest(parts[1], parts[2]);
 }
 
-grpc::ServerUnaryReactor* BlobServiceImpl::FindMissingBlobs(
-    grpc::CallbackServerContext* context,
-    const v1::FindMissingBlobsRequest* request,
-    v1::FindMissingBlobsResponse* response) {
-  return AnswerWrite(parts_,
-                     context,
-                     request,
-                     response,
-                     [this](const Call& call, const auto& in, v1::FindMissingBlobsResponse* out) {
-                       if (in.digests_size() > 10'000) {
-                         throw InvalidArgument("digests has {} entries; at most 10000 are allowed",
-                                               in.digests_size());
-                       }
-                       std::vector<std::string> asked;
-                       for (const v1::Digest& proto : in.digests()) {
-                         asked.push_back(FromProto(proto).sha256);
-                       }
-                       const std::set<std::string> held = call.store.HeldBlobs(asked);
-                       std::set<std::string> seen;
-                       for (const v1::Digest& proto : in.digests()) {
-                         const FileDigest digest = FromProto(proto);
-                         if (!seen.insert(digest.sha256).second) continue;
-                         if (!held.contains(digest.sha256) || !parts_.blobs.Touch(digest)) {
-                           *out->add_missing() = proto;
-                         }
-                       }
-                     });
+std::unique_ptr<grpc::Service> MakeBlobService(const RpcParts& parts) {
+  return std::make_unique<BlobServiceImpl>(parts);
 }
 
 }  // namespace color3d

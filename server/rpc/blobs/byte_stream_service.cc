@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "google/bytestream/bytestream.grpc.pb.h"
 #include "server/base/service_error.h"
 #include "server/rpc/blobs/blob_service.h"
 
@@ -17,15 +18,15 @@ using google::bytestream::ReadRequest;
 using google::bytestream::ReadResponse;
 using google::bytestream::WriteRequest;
 using google::bytestream::WriteResponse;
+using grpc::CallbackServerContext;
+using grpc::ServerUnaryReactor;
 
 constexpr int64_t kReadChunkBytes = 256 << 10;
 constexpr size_t kNameBytes = 1024;  // size of a message besides its data
 
 class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
  public:
-  BlobReader(const RpcParts& parts,
-             grpc::CallbackServerContext& context,
-             const ReadRequest& request)
+  BlobReader(const RpcParts& parts, CallbackServerContext& context, const ReadRequest& request)
       : parts_(parts),
         context_(context),
         request_(request),
@@ -128,7 +129,7 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
   }
 
   const RpcParts& parts_;
-  grpc::CallbackServerContext& context_;
+  CallbackServerContext& context_;
   const ReadRequest request_;
   ReadResponse response_;
   int fd_ = -1;
@@ -144,9 +145,7 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
 
 class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
  public:
-  BlobWriter(const RpcParts& parts,
-             const grpc::CallbackServerContext& context,
-             WriteResponse* response)
+  BlobWriter(const RpcParts& parts, const CallbackServerContext& context, WriteResponse* response)
       : parts_(parts),
         response_(response),
         silence_(parts.silence, [this] { parts_.bulk.Post([this] { GiveUp(); }); }) {
@@ -255,35 +254,42 @@ class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
   SilenceWatch::Stream silence_;
 };
 
+class ByteStreamServiceImpl final : public google::bytestream::ByteStream::CallbackService {
+ public:
+  explicit ByteStreamServiceImpl(const RpcParts& parts) : parts_(parts) {}
+
+  grpc::ServerWriteReactor<ReadResponse>* Read(CallbackServerContext* context,
+                                               const ReadRequest* request) override {
+    return new BlobReader(parts_, *context, *request);
+  }
+
+  grpc::ServerReadReactor<WriteRequest>* Write(CallbackServerContext* context,
+                                               WriteResponse* response) override {
+    return new BlobWriter(parts_, *context, response);
+  }
+
+  ServerUnaryReactor* QueryWriteStatus(
+      CallbackServerContext* context,
+      const google::bytestream::QueryWriteStatusRequest* request,
+      google::bytestream::QueryWriteStatusResponse* response) override {
+    return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
+      UploadName name = ParseUploadName(request->resource_name());
+      name.owner = call.caller.project;
+      const bool complete = HasBlob(parts_, call.store, name.digest);
+      response->set_complete(complete);
+      response->set_committed_size(complete ? name.digest.size_bytes
+                                            : parts_.uploads.CommittedSize(name));
+    });
+  }
+
+ private:
+  const RpcParts& parts_;
+};
+
 }  // namespace
 
-grpc::ServerWriteReactor<ReadResponse>* ByteStreamServiceImpl::Read(
-    grpc::CallbackServerContext* context, const ReadRequest* request) {
-  return new BlobReader(parts_, *context, *request);
-}
-
-grpc::ServerReadReactor<WriteRequest>* ByteStreamServiceImpl::Write(
-    grpc::CallbackServerContext* context, WriteResponse* response) {
-  return new BlobWriter(parts_, *context, response);
-}
-
-grpc::ServerUnaryReactor* ByteStreamServiceImpl::QueryWriteStatus(
-    grpc::CallbackServerContext* context,
-    const google::bytestream::QueryWriteStatusRequest* request,
-    google::bytestream::QueryWriteStatusResponse* response) {
-  return AnswerWrite(
-      parts_,
-      context,
-      request,
-      response,
-      [this](const Call& call, const auto& in, google::bytestream::QueryWriteStatusResponse* out) {
-        UploadName name = ParseUploadName(in.resource_name());
-        name.owner = call.caller.project;
-        const bool complete = HasBlob(parts_, call.store, name.digest);
-        out->set_complete(complete);
-        out->set_committed_size(complete ? name.digest.size_bytes
-                                         : parts_.uploads.CommittedSize(name));
-      });
+std::unique_ptr<grpc::Service> MakeByteStreamService(const RpcParts& parts) {
+  return std::make_unique<ByteStreamServiceImpl>(parts);
 }
 
 }  // namespace color3d

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::string_view kScheme = "Bearer ";
 
-std::string_view AuthorizationOf(const grpc::CallbackServerContext& context) {
+std::string_view AuthorizationHeader(const grpc::CallbackServerContext& context) {
   const auto entry = context.client_metadata().find("authorization");
   if (entry == context.client_metadata().end()) return {};
   return {entry->second.data(), entry->second.size()};
@@ -51,7 +51,7 @@ void Access::LogRefusal(const std::string& why, const grpc::CallbackServerContex
 
 Caller Access::Require(Role role, const grpc::CallbackServerContext& context) const {
   if (!tokens_ && !certificates_) return {};
-  const std::string_view token = ParseBearerToken(AuthorizationOf(context));
+  const std::string_view token = ParseBearerToken(AuthorizationHeader(context));
   const bool by_token = tokens_ && (!certificates_ || !token.empty());
   const Caller caller = by_token ? ByToken(token, context) : ByCertificate(context);
   if (caller.role < role) {

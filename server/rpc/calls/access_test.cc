@@ -10,15 +10,16 @@
 
 #include "server/access/tls.h"
 #include "tests/support/service/rpc_fixture.h"
+#include "tests/support/service/rpc_methods.h"
 #include "tests/support/service/test_certificates.h"
 
 namespace color3d::testing {
 namespace {
 using grpc::StatusCode;
 
-// RPCs that readers may call. All others require the role of a submitter: a new RPC is guarded
-// until it is listed here.
-const std::set<std::string> kLooking = {"GetScene",
+// RPCs that require only the role of a reader. All others require at least that of a submitter, so
+// a new RPC fails this test until its role is checked.
+const std::set<std::string> kReading = {"GetScene",
                                         "ListScenes",
                                         "GetJob",
                                         "ListJobs",
@@ -86,50 +87,37 @@ class AccessTest : public RpcTest {
 TEST_F(AccessTest, EveryRpcRequiresRole) {
   Start();
   const auto channel = Open(grpc::InsecureChannelCredentials());
-  int methods = 0;
-  for (const google::protobuf::FileDescriptor* file :
-       {v1::Scene::descriptor()->file(),
-        v1::FindMissingBlobsRequest::descriptor()->file(),
-        v1::CreateJobRequest::descriptor()->file(),
-        v1::Colorizer::descriptor()->file(),
-        v1::ServerInfo::descriptor()->file(),
-        v1::CollectRequest::descriptor()->file(),
-        google::bytestream::ReadRequest::descriptor()->file()}) {
-    ASSERT_GT(file->service_count(), 0) << file->name();
-    for (int s = 0; s < file->service_count(); ++s) {
-      for (int m = 0; m < file->service(s)->method_count(); ++m) {
-        ++methods;
-        const std::string name = file->service(s)->method(m)->name();
-        const bool is_admins = file->service(s)->name() == "AdminService";
-        SCOPED_TRACE(name);
-        const auto call = [&](const std::string& authorization) {
-          return Call(channel, "/" + file->service(s)->full_name() + "/" + name, authorization);
-        };
-        EXPECT_EQ(call("").error_code(), StatusCode::UNAUTHENTICATED);
-        EXPECT_EQ(ReasonOfStatus(call("")), "TOKEN_MISSING");
-        EXPECT_EQ(ReasonOfStatus(call(submit_)), "TOKEN_MISSING") << "not a bearer token";
-        EXPECT_EQ(ReasonOfStatus(call("Bearer " + std::string(68, 'x'))), "TOKEN_UNKNOWN");
-        const grpc::Status reader = call("Bearer " + read_);
-        if (kLooking.contains(name)) {
-          EXPECT_NE(reader.error_code(), StatusCode::PERMISSION_DENIED);
-        } else {
-          EXPECT_EQ(reader.error_code(), StatusCode::PERMISSION_DENIED);
-          EXPECT_EQ(ReasonOfStatus(reader), "ROLE_TOO_LOW");
-        }
-        if (is_admins) {
-          EXPECT_EQ(ReasonOfStatus(call("Bearer " + submit_)), "ROLE_TOO_LOW");
-        }
-        for (const std::string& token : {submit_, admin_}) {
-          if (is_admins && token == submit_) continue;
-          const StatusCode code = call("Bearer " + token).error_code();
-          EXPECT_NE(code, StatusCode::UNAUTHENTICATED);
-          EXPECT_NE(code, StatusCode::PERMISSION_DENIED);
-          EXPECT_NE(code, StatusCode::UNIMPLEMENTED);
-        }
-      }
+  const auto methods = AllRpcMethods(std::filesystem::path(COLOR3D_SOURCE_DIR) / "proto");
+  EXPECT_GE(methods.size(), 28u);
+  for (const google::protobuf::MethodDescriptor* method : methods) {
+    const std::string& name = method->name();
+    const bool is_admins = method->service()->name() == "AdminService";
+    SCOPED_TRACE(name);
+    const auto call = [&](const std::string& authorization) {
+      return Call(channel, "/" + method->service()->full_name() + "/" + name, authorization);
+    };
+    EXPECT_EQ(call("").error_code(), StatusCode::UNAUTHENTICATED);
+    EXPECT_EQ(ReasonOfStatus(call("")), "TOKEN_MISSING");
+    EXPECT_EQ(ReasonOfStatus(call(submit_)), "TOKEN_MISSING") << "not a bearer token";
+    EXPECT_EQ(ReasonOfStatus(call("Bearer " + std::string(68, 'x'))), "TOKEN_UNKNOWN");
+    const grpc::Status reader = call("Bearer " + read_);
+    if (kReading.contains(name)) {
+      EXPECT_NE(reader.error_code(), StatusCode::PERMISSION_DENIED);
+    } else {
+      EXPECT_EQ(reader.error_code(), StatusCode::PERMISSION_DENIED);
+      EXPECT_EQ(ReasonOfStatus(reader), "ROLE_TOO_LOW");
+    }
+    if (is_admins) {
+      EXPECT_EQ(ReasonOfStatus(call("Bearer " + submit_)), "ROLE_TOO_LOW");
+    }
+    for (const std::string& token : {submit_, admin_}) {
+      if (is_admins && token == submit_) continue;
+      const StatusCode code = call("Bearer " + token).error_code();
+      EXPECT_NE(code, StatusCode::UNAUTHENTICATED);
+      EXPECT_NE(code, StatusCode::PERMISSION_DENIED);
+      EXPECT_NE(code, StatusCode::UNIMPLEMENTED);
     }
   }
-  EXPECT_GE(methods, 28);
 }
 
 TEST_F(AccessTest, TlsRequiresTrustedCertificates) {

@@ -126,8 +126,8 @@ v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limi
 // Returns why workers get no jobs, for people; empty if they do.
 std::string HoldReason(const RpcParts& parts);
 
-// Runs `body(call, request, response)` on the executor, in the queue of the caller's project, if
-// the caller has the role. `body` may block and throw.
+// Runs `body(call)`, which reads the request and fills the response, on the executor, in the queue
+// of the caller's project, if the caller has the role. `body` may block and throw.
 template <typename Request, typename Response, typename Body>
 grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       Executor& executor,
@@ -146,10 +146,10 @@ grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
   }
   const std::string owner = call->caller.project;
   const bool accepted = executor.TryPost(
-      [call = *std::move(call), reactor, request, response, body] {
+      [call = *std::move(call), reactor, response, body] {
         reactor->Finish(Guard([&] {
           reactor->RequireShare();
-          body(call, *request, response);
+          body(call);
           reactor->Hold(*response);
         }));
       },

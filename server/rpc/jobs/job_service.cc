@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <set>
 
+#include "color3d/v1/job.grpc.pb.h"
 #include "core/catalogue/scene_files.h"
 #include "core/catalogue/stages.h"
 #include "server/access/notify_targets.h"
@@ -20,6 +21,8 @@
 
 namespace color3d {
 namespace {
+using grpc::CallbackServerContext;
+using grpc::ServerUnaryReactor;
 
 // Size of the rows of a graph, before it is known which of its blobs the project holds.
 int64_t EstimateRowBytes(const NewGraph& graph) {
@@ -69,7 +72,7 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
   return inputs;
 }
 
-SceneFacts FactsOf(const SceneRecord& scene) {
+SceneFacts SceneFactsFrom(const SceneRecord& scene) {
   return {.pictures = scene.photo_count,
           .layout = scene.layout,
           .augment_files = static_cast<int>(
@@ -103,14 +106,14 @@ SceneRouteInputs LoadRoute(const ProjectStore& store,
                           key_color.kind,
                           kind::kColorizeKeyView);
   }
-  SceneRouteInputs inputs{store.GetInputs(key_color), FactsOf(scene)};
+  SceneRouteInputs inputs{store.GetInputs(key_color), SceneFactsFrom(scene)};
   inputs.jobs.push_back(key_color);
   return inputs;
 }
 
 NewGraph PlanRequest(const ProjectStore& store, const v1::JobSpec& spec) {
   if (!spec.has_personalize_scenes()) {
-    return PlanJob(spec, LoadInputs(store, spec), FactsOf(store.GetScene(spec.scene())));
+    return PlanJob(spec, LoadInputs(store, spec), SceneFactsFrom(store.GetScene(spec.scene())));
   }
   std::vector<SceneRouteInputs> routes;
   for (const auto& route : spec.personalize_scenes().routes()) {
@@ -192,99 +195,100 @@ void ListJobPage(const ProjectStore& store,
       [&](const JobRecord& job) { return Put(ToWaitingProto(store, job), response->add_jobs()); });
 }
 
+class JobServiceImpl final : public v1::JobService::CallbackService {
+ public:
+  JobServiceImpl(const RpcParts& parts, WatchHub& hub) : parts_(parts), hub_(hub) {}
+
+  ServerUnaryReactor* CreateJob(CallbackServerContext* context,
+                                const v1::CreateJobRequest* request,
+                                v1::Job* response) override {
+    return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
+      *response = ToProto(CreateJobRecord(parts_, call, *request));
+    });
+  }
+
+  ServerUnaryReactor* GetJob(CallbackServerContext* context,
+                             const v1::GetJobRequest* request,
+                             v1::Job* response) override {
+    return AnswerRead(parts_, context, request, response, [=](const Call& call) {
+      CheckName(request->name(), "jobs");
+      *response = ToWaitingProto(call.store, call.store.GetJob(request->name()));
+    });
+  }
+
+  ServerUnaryReactor* ListJobs(CallbackServerContext* context,
+                               const v1::ListJobsRequest* request,
+                               v1::ListJobsResponse* response) override {
+    return AnswerRead(parts_, context, request, response, [=](const Call& call) {
+      ListJobPage(call.store, *request, response);
+    });
+  }
+
+  ServerUnaryReactor* CancelJob(CallbackServerContext* context,
+                                const v1::CancelJobRequest* request,
+                                v1::Job* response) override {
+    return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
+      CheckName(request->name(), "jobs");
+      *response = ToProto(RetryAfterMakingRoom(parts_.make_room, [&] {
+        return call.store.Cancel(request->name(), IdempotencyKey("CancelJob", *request));
+      }));
+      spdlog::info("[job={}] cancellation requested", request->name());
+    });
+  }
+
+  ServerUnaryReactor* RetryJob(CallbackServerContext* context,
+                               const v1::RetryJobRequest* request,
+                               v1::Job* response) override {
+    return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
+      CheckName(request->name(), "jobs");
+      const RequestKey key = IdempotencyKey("RetryJob", *request);
+      RequireNotDraining(parts_);
+      if (!call.store.FindRequest(key)) RequireRoomForRows(parts_, call.store, 0);
+      *response = ToProto(
+          call.store.Retry(request->name(), request->from_scratch(), key, GetQueueLimits(parts_)));
+      spdlog::info("[job={}] retried", request->name());
+    });
+  }
+
+  ServerUnaryReactor* DeleteJob(CallbackServerContext* context,
+                                const v1::DeleteJobRequest* request,
+                                v1::DeleteJobResponse* response) override {
+    return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
+      CheckName(request->name(), "jobs");
+      RetryAfterMakingRoom(parts_.make_room, [&] {
+        call.store.Delete(request->name(), IdempotencyKey("DeleteJob", *request));
+      });
+    });
+  }
+
+  ServerUnaryReactor* PinJob(CallbackServerContext* context,
+                             const v1::PinJobRequest* request,
+                             v1::Job* response) override {
+    return AnswerWrite(parts_, context, request, response, [=](const Call& call) {
+      CheckName(request->name(), "jobs");
+      *response = ToProto(call.store.Pin(request->name(), request->pinned()));
+    });
+  }
+
+  grpc::ServerWriteReactor<v1::JobLogChunk>* ReadJobLog(
+      CallbackServerContext* context, const v1::ReadJobLogRequest* request) override {
+    return StreamJobLog(parts_, *context, *request);
+  }
+
+  grpc::ServerWriteReactor<v1::JobEvent>* WatchJobs(CallbackServerContext* context,
+                                                    const v1::WatchJobsRequest* request) override {
+    return hub_.Watch(*context, *request);
+  }
+
+ private:
+  const RpcParts& parts_;
+  WatchHub& hub_;
+};
+
 }  // namespace
 
-grpc::ServerUnaryReactor* JobServiceImpl::CreateJob(grpc::CallbackServerContext* context,
-                                                    const v1::CreateJobRequest* request,
-                                                    v1::Job* response) {
-  return AnswerWrite(
-      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
-        *out = ToProto(CreateJobRecord(parts_, call, in));
-      });
-}
-
-grpc::ServerUnaryReactor* JobServiceImpl::GetJob(grpc::CallbackServerContext* context,
-                                                 const v1::GetJobRequest* request,
-                                                 v1::Job* response) {
-  return AnswerRead(
-      parts_, context, request, response, [](const Call& call, const auto& in, v1::Job* out) {
-        CheckName(in.name(), "jobs");
-        *out = ToWaitingProto(call.store, call.store.GetJob(in.name()));
-      });
-}
-
-grpc::ServerUnaryReactor* JobServiceImpl::ListJobs(grpc::CallbackServerContext* context,
-                                                   const v1::ListJobsRequest* request,
-                                                   v1::ListJobsResponse* response) {
-  return AnswerRead(parts_,
-                    context,
-                    request,
-                    response,
-                    [](const Call& call, const auto& in, v1::ListJobsResponse* out) {
-                      ListJobPage(call.store, in, out);
-                    });
-}
-
-grpc::ServerUnaryReactor* JobServiceImpl::CancelJob(grpc::CallbackServerContext* context,
-                                                    const v1::CancelJobRequest* request,
-                                                    v1::Job* response) {
-  return AnswerWrite(
-      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
-        CheckName(in.name(), "jobs");
-        *out = ToProto(RetryAfterMakingRoom(parts_.make_room, [&] {
-          return call.store.Cancel(in.name(), IdempotencyKey("CancelJob", in));
-        }));
-        spdlog::info("[job={}] cancellation requested", in.name());
-      });
-}
-
-grpc::ServerUnaryReactor* JobServiceImpl::RetryJob(grpc::CallbackServerContext* context,
-                                                   const v1::RetryJobRequest* request,
-                                                   v1::Job* response) {
-  return AnswerWrite(
-      parts_, context, request, response, [this](const Call& call, const auto& in, v1::Job* out) {
-        CheckName(in.name(), "jobs");
-        const RequestKey key = IdempotencyKey("RetryJob", in);
-        RequireNotDraining(parts_);
-        if (!call.store.FindRequest(key)) RequireRoomForRows(parts_, call.store, 0);
-        *out = ToProto(call.store.Retry(in.name(), in.from_scratch(), key, GetQueueLimits(parts_)));
-        spdlog::info("[job={}] retried", in.name());
-      });
-}
-
-grpc::ServerUnaryReactor* JobServiceImpl::DeleteJob(grpc::CallbackServerContext* context,
-                                                    const v1::DeleteJobRequest* request,
-                                                    v1::DeleteJobResponse* response) {
-  return AnswerWrite(parts_,
-                     context,
-                     request,
-                     response,
-                     [this](const Call& call, const auto& in, v1::DeleteJobResponse*) {
-                       CheckName(in.name(), "jobs");
-                       RetryAfterMakingRoom(parts_.make_room, [&] {
-                         call.store.Delete(in.name(), IdempotencyKey("DeleteJob", in));
-                       });
-                     });
-}
-
-grpc::ServerUnaryReactor* JobServiceImpl::PinJob(grpc::CallbackServerContext* context,
-                                                 const v1::PinJobRequest* request,
-                                                 v1::Job* response) {
-  return AnswerWrite(
-      parts_, context, request, response, [](const Call& call, const auto& in, v1::Job* out) {
-        CheckName(in.name(), "jobs");
-        *out = ToProto(call.store.Pin(in.name(), in.pinned()));
-      });
-}
-
-grpc::ServerWriteReactor<v1::JobLogChunk>* JobServiceImpl::ReadJobLog(
-    grpc::CallbackServerContext* context, const v1::ReadJobLogRequest* request) {
-  return StreamJobLog(parts_, *context, *request);
-}
-
-grpc::ServerWriteReactor<v1::JobEvent>* JobServiceImpl::WatchJobs(
-    grpc::CallbackServerContext* context, const v1::WatchJobsRequest* request) {
-  return hub_.Watch(*context, *request);
+std::unique_ptr<grpc::Service> MakeJobService(const RpcParts& parts, WatchHub& hub) {
+  return std::make_unique<JobServiceImpl>(parts, hub);
 }
 
 }  // namespace color3d

@@ -32,7 +32,7 @@ constexpr int64_t kMaxTimesBytes = int64_t{16} << 20;       // about 10 with the
 bool IsReadable(int fd, size_t size, const std::function<bool()>& is_cancelled) {
   std::vector<char> piece(std::min<size_t>(size, 1 << 20));
   for (size_t at = 0; at < size;) {
-    if (is_cancelled()) throw Error(ErrorCode::kCancelled, "the caller is gone");
+    if (is_cancelled()) throw Error(ErrorCode::kCancelled, "the caller has disconnected");
     const ssize_t got = ::pread(fd, piece.data(), piece.size(), static_cast<off_t>(at));
     if (got <= 0) return false;
     at += static_cast<size_t>(got);
@@ -154,7 +154,7 @@ FileChecks::Problem FileChecks::ProblemOf(const SceneFileRecord& file, Part part
 }
 
 void FileChecks::Check(const SceneFileRecord& file, bool is_held, SceneCheck* check) {
-  if (is_cancelled_()) throw Error(ErrorCode::kCancelled, "the caller is gone");
+  if (is_cancelled_()) throw Error(ErrorCode::kCancelled, "the caller has disconnected");
   const auto refuse = [&](const std::string& why) { violations.push_back({file.path, why}); };
   if (!is_held || !blobs_.Touch(file.digest)) {
     return refuse(fmt::format("was not uploaded (blob {})", file.digest.sha256));

@@ -1,5 +1,5 @@
-// Loaded colorizers by key, bounded by bytes: the least recently used ones go first, those in use
-// never. Not thread-safe.
+// Loaded colorizers by key, bounded by bytes. Evicts the least recently used ones, but none in use.
+// Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -17,15 +17,15 @@ namespace color3d {
 struct LoadedColorizer {
   std::shared_ptr<const Colorizer> colorizer;
   std::shared_ptr<const Encoder> encoder;  // shared with other colorizers
-  int64_t bytes = 0;                       // of the colorizer alone
+  int64_t bytes = 0;                       // without the encoder
 };
 
 class ColorizerCache {
  public:
   explicit ColorizerCache(int64_t max_bytes) : max_bytes_(max_bytes) {}
 
-  // Calls `load` when the key is not there; what it throws passes through. Whoever holds the result
-  // keeps it in the cache, even beyond the bound.
+  // Calls `load` if the key is missing; passes its exceptions on. A result stays in the cache while
+  // the caller holds it, even beyond the bound.
   std::shared_ptr<const LoadedColorizer> Get(const std::string& key,
                                              const std::function<LoadedColorizer()>& load);
   int64_t bytes() const { return bytes_; }

@@ -9,7 +9,7 @@ namespace {
 
 LoadedColorizer Sized(int64_t bytes) { return {nullptr, nullptr, bytes}; }
 
-TEST(ColorizerCacheTest, LoadsOnceAndForgetsTheLeastRecentlyUsed) {
+TEST(ColorizerCacheTest, LoadsOnceAndEvictsLeastRecentlyUsed) {
   ColorizerCache cache(100);
   int loads = 0;
   const auto get = [&](const std::string& key) {
@@ -29,7 +29,7 @@ TEST(ColorizerCacheTest, LoadsOnceAndForgetsTheLeastRecentlyUsed) {
   EXPECT_EQ(cache.size(), 2u);
 }
 
-TEST(ColorizerCacheTest, KeepsColorizersInUseBeyondTheBound) {
+TEST(ColorizerCacheTest, KeepsColorizersInUseBeyondBound) {
   ColorizerCache cache(100);
   const auto used = cache.Get("used", [] { return Sized(90); });
   const auto also = cache.Get("also", [] { return Sized(90); });
@@ -40,7 +40,7 @@ TEST(ColorizerCacheTest, KeepsColorizersInUseBeyondTheBound) {
   EXPECT_EQ(cache.Get("also", [] { return Sized(1); }), also);
 }
 
-TEST(ColorizerCacheTest, AFailedLoadLeavesNothing) {
+TEST(ColorizerCacheTest, FailedLoadIsNotCached) {
   ColorizerCache cache(100);
   EXPECT_THROW(cache.Get("a", []() -> LoadedColorizer { throw InvalidArgument("bad"); }), Error);
   EXPECT_EQ(cache.size(), 0u);

@@ -1,4 +1,4 @@
-// ColorizeImages by the method library.
+// Live colorization of pictures with the method library.
 #include <map>
 #include <utility>
 
@@ -17,14 +17,14 @@
 namespace color3d {
 namespace {
 
-// About 60 bytes of memory a pixel while it is coloured.
+// Colouring takes about 60 bytes per pixel.
 constexpr ImageLimits kLimits{.max_pixels = 25'000'000, .max_side_px = 30'000};
-// Decoded pictures that wait to be coloured together.
+// Decoded pictures of a batch.
 constexpr int64_t kMaxGroupPixels = 16'000'000;
-// Examples answer in seconds: at 400 px, as colorizers are trained, each picture takes half as long
-// again.
+// Working size of examples, for answers in seconds: at 400 px, the training size of colorizers, a
+// picture takes half as long again.
 constexpr int kExampleSidePx = 320;
-// A message has room for more, but other clients' gRPC takes 4 MiB at most by default.
+// The server allows larger messages, but gRPC clients accept 4 MiB by default.
 constexpr size_t kMaxMessageImageBytes = 3 << 20;
 constexpr int64_t kMaxFileBytes = int64_t{256} << 20;
 
@@ -39,15 +39,15 @@ class CoreLiveEngine : public LiveEngine {
  private:
   using Request = internal::v1::ColorizeImageRequest;
   struct Picture {
-    std::string key;  // of the colorizer in the cache
+    std::string key;  // key of the colorizer in the cache
     std::shared_ptr<const LoadedColorizer> loaded;
     Image luminance;
     LiveTask* task = nullptr;
   };
   Picture Prepare(const Request& request);
-  // ab of pictures of any scenes; those of one size share a pass of the encoder.
+  // Colours pictures of any scenes; pictures of equal size share a pass of the encoder.
   static std::vector<Image> ColorizeBatch(const std::vector<Picture>& group);
-  // Colours, answers and empties the group.
+  // Colours and answers the group, then empties it.
   void Finish(std::vector<Picture>& group);
   void Answer(const Picture& picture, const Image& ab, internal::v1::ColorizeImageResponse* answer);
   std::string KeyOf(const Request& request);
@@ -62,7 +62,7 @@ class CoreLiveEngine : public LiveEngine {
   ColorizerCache cache_;
   FileDigests digests_;
   std::shared_ptr<const Encoder> embedded_;
-  // The user's, by digest of the file: as long as a colorizer in the cache refers to it.
+  // Encoders of users by digest of the file, kept while a cached colorizer refers to them.
   std::map<std::string, std::weak_ptr<const Encoder>> encoders_;
 };
 
@@ -92,11 +92,11 @@ LoadedColorizer CoreLiveEngine::Load(const Request& request) {
   LoadedColorizer loaded;
   loaded.encoder = FindEncoder(request.encoder());
   loaded.colorizer = LoadColorizer(bytes, loaded.encoder, setup_.threads);
-  loaded.bytes = 2 * static_cast<int64_t>(bytes.size());  // files hold halves
+  loaded.bytes = 2 * static_cast<int64_t>(bytes.size());  // files contain half-precision values
   return loaded;
 }
 
-// The feature neighbours of one coloured picture, with an untrained decoder that has no say.
+// Colorizer of one coloured picture: its feature bank, with an untrained decoder of weight 0.
 LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
   const std::string bytes = ReadBlob(request.example_sha256());
   ProbeImage(bytes, "the example", kLimits);
@@ -124,7 +124,7 @@ LoadedColorizer CoreLiveEngine::FromExample(const Request& request) {
 
 std::string CoreLiveEngine::KeyOf(const Request& request) {
   if (!request.example_sha256().empty()) return "example " + request.example_sha256();
-  // Weights may be replaced under the same name.
+  // The weights of a name may be replaced.
   const auto file = setup_.models.files.find(request.encoder());
   return request.colorizer_sha256() + " " +
          (file == setup_.models.files.end() ? request.encoder() : digests_.Of(file->second).sha256);
@@ -175,7 +175,7 @@ void CoreLiveEngine::Finish(std::vector<Picture>& group) {
   try {
     ab = ColorizeBatch(group);
   } catch (const std::exception&) {
-    // One of them is to blame: below each is tried on its own.
+    // One picture causes the error: each is tried alone below.
   }
   for (size_t i = 0; i < group.size(); ++i) {
     Picture& picture = group[i];

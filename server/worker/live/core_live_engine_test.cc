@@ -1,4 +1,4 @@
-// Real pictures through the embedded encoder.
+// Live colorization with the embedded encoder.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using Request = internal::v1::ColorizeImageRequest;
 using Response = internal::v1::ColorizeImageResponse;
 
-// Stripes and a blob of texture, L 20..80; ab everywhere the same.
+// Stripes and a textured blob, L 20..80, constant ab.
 Image TintedLab(float a, float b, int width = 96, int height = 80) {
   Image lab(width, height, 3);
   for (int y = 0; y < height; ++y) {
@@ -63,7 +63,7 @@ class CoreLiveEngineTest : public ::testing::Test {
     request.set_image(image);
     return request;
   }
-  // What the engine says to all of them at once; an error's text where there is one.
+  // Answers of the engine to a batch; an error is given by its text.
   std::vector<std::string> Run(const std::vector<Request>& requests) {
     responses_.assign(requests.size(), {});
     std::vector<LiveTask> tasks;
@@ -90,7 +90,7 @@ class CoreLiveEngineTest : public ::testing::Test {
   std::vector<Response> responses_;
 };
 
-TEST_F(CoreLiveEngineTest, MixedExamplesDoNotMixAndLuminanceIsKept) {
+TEST_F(CoreLiveEngineTest, KeepsExamplesApartAndLuminance) {
   const std::string red = Example(40, 15), blue = Example(-5, -30);
   std::vector<Request> requests;
   for (int i = 0; i < 6; ++i) {
@@ -154,7 +154,7 @@ TEST_F(CoreLiveEngineTest, BadPictureFailsAlone) {
   EXPECT_NEAR(MeanOf(LabOf(7)).a, 40, 4);
 }
 
-TEST_F(CoreLiveEngineTest, AColorizerOfAnotherEncoderIsRefusedByDigest) {
+TEST_F(CoreLiveEngineTest, RefusesColorizerOfOtherEncoder) {
   ColorizerOptions options;
   options.iterations = 0;
   options.max_side_px = 64;

@@ -17,7 +17,7 @@ grpc::Status EndingStatus() {
                                    "the inference worker is ending; send the picture again"));
 }
 
-// Where memory ran out, with the limit and what to do.
+// Error of exhausted memory with the limit and the remedy.
 void RethrowNamingMemory(const std::exception_ptr& error) {
   if (!error) return;
   try {

@@ -1,5 +1,4 @@
-// Calls that wait for the engine, and the one thread that answers them in batches, oldest first.
-// Thread-safe.
+// Queue of calls and the thread that answers them in batches, oldest first. Thread-safe.
 #pragma once
 
 #include <grpcpp/server_context.h>
@@ -19,7 +18,7 @@ namespace color3d {
 class InferenceQueue final : public internal::v1::InferenceService::CallbackService {
  public:
   InferenceQueue(LiveEngine& engine, int max_batch, size_t max_waiting);
-  // Answers what waits with UNAVAILABLE; waits for the batch under way.
+  // Answers waiting calls with UNAVAILABLE; waits for the running batch.
   ~InferenceQueue() override;
 
   grpc::ServerUnaryReactor* ColorizeImage(grpc::CallbackServerContext* context,
@@ -28,8 +27,9 @@ class InferenceQueue final : public internal::v1::InferenceService::CallbackServ
 
   struct State {
     bool idle = true;
-    std::chrono::steady_clock::duration since{};  // the last change between idle and busy
-    std::chrono::steady_clock::duration batch{};  // of the batch under way; 0: none
+    std::chrono::steady_clock::duration
+        since{};  // time since the last change between idle and busy
+    std::chrono::steady_clock::duration batch{};  // duration of the running batch; 0: none
     int64_t pictures = 0;                         // answered so far
   };
   State state() const;
@@ -42,7 +42,7 @@ class InferenceQueue final : public internal::v1::InferenceService::CallbackServ
     LiveTask task;
   };
   void Loop();
-  // Empty: the end.
+  // Returns an empty batch at the end.
   std::vector<Waiting> Take();
   void Answer(std::vector<Waiting> batch);
 

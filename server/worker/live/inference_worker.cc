@@ -76,7 +76,7 @@ bool InferenceWorker::ShouldEnd() const {
   }
   const int64_t memory = ResidentMemoryBytes();
   if (memory <= options_.recycle_memory_bytes || state.since < kReport) return false;
-  spdlog::info("{} ends with {} MiB, to be started afresh when it is wanted", id_, memory >> 20);
+  spdlog::info("{} ends with {} MiB, to be restarted on demand", id_, memory >> 20);
   return true;
 }
 
@@ -107,7 +107,7 @@ void InferenceWorker::Run() {
     }
     std::this_thread::sleep_for(kLook);
   }
-  // Takes no new calls, and waits for those that are here.
+  // Accepts no new calls and waits for the present ones.
   server_->Shutdown(std::chrono::system_clock::now() + options_.drain_grace);
   try {
     store_.RemoveWorker(id_);

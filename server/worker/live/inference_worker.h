@@ -1,5 +1,5 @@
-// The inference worker: answers ColorizeImage calls of its server over a private socket. Calls that
-// wait are taken together, whatever their scenes.
+// The inference worker: answers ColorizeImage calls of its server over a private socket. Batches
+// waiting calls of all scenes.
 #pragma once
 
 #include <sys/types.h>
@@ -22,17 +22,17 @@ struct InferenceOptions {
   pid_t parent = 0;  // 0: started by hand
   int max_batch = 8;
   size_t max_waiting = 256;
-  // Waiting calls are still answered for so long when the worker is told to stop.
+  // Maximum time to answer waiting calls after a stop was requested.
   std::chrono::milliseconds drain_grace{10'000};
-  // Without work the process ends after a while, or sooner when it has grown big.
+  // The process ends after this time without work, or when idle above recycle_memory_bytes.
   std::chrono::milliseconds idle{15 * 60'000};
   int64_t recycle_memory_bytes = int64_t{2} << 30;
-  // A batch that takes longer is stuck: the process is given up.
+  // The process is ended if a batch takes longer.
   std::chrono::milliseconds stuck{180'000};
 };
 
-// Returns when `draining` turns true, the parent is gone, or there was nothing to do. Throws
-// Error{kFailedPrecondition} when it cannot listen.
+// Returns when `draining` becomes true, the parent has ended, or there was no work. Throws
+// Error{kFailedPrecondition} if it cannot listen.
 void RunInference(const InferenceOptions& options,
                   LiveEngine& engine,
                   const std::atomic<bool>& draining);

@@ -1,5 +1,5 @@
-// What the inference worker (calls, queue, batches) asks of the method library, as stage_runner.h
-// is for jobs.
+// Interface of the method library to the inference worker (calls, queue, batches), like
+// stage_runner.h for jobs.
 #pragma once
 
 #include <cstdint>
@@ -13,31 +13,31 @@
 
 namespace color3d {
 
-// One picture of a batch. `error` is set when there is no answer to it.
+// One picture of a batch. `error` is set if it has no answer.
 struct LiveTask {
   const internal::v1::ColorizeImageRequest* request = nullptr;
   internal::v1::ColorizeImageResponse* response = nullptr;
   std::exception_ptr error;
 };
 
-// Used by one thread.
+// Not thread-safe.
 class LiveEngine {
  public:
   virtual ~LiveEngine() = default;
-  // Loads what every picture needs, so that the first does not wait for it.
+  // Loads shared data, so that the first picture does not wait for it.
   virtual void WarmUp() = 0;
-  // Answers all of them together; what is wrong with one does not touch the others.
+  // Answers all pictures together; errors of one do not affect the others.
   virtual void Colorize(std::vector<LiveTask>& tasks) = 0;
 };
 
 struct LiveEngineSetup {
-  BlobStore& blobs;  // outlives the engine
+  BlobStore& blobs;  // must outlive the engine
   UserModels models;
   int threads = 1;
-  int64_t cache_bytes = int64_t{512} << 20;  // of colorizers
+  int64_t cache_bytes = int64_t{512} << 20;  // size of the colorizer cache
 };
 
-// The real one (core_live_engine.cc).
+// Implemented in core_live_engine.cc.
 std::unique_ptr<LiveEngine> MakeLiveEngine(const LiveEngineSetup& setup);
 
 }  // namespace color3d

@@ -20,7 +20,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kEndMs = 2'000;  // a process that was killed is gone by then
+constexpr int kEndMs = 2'000;  // maximum time until a killed process has ended
 
 std::vector<std::string> CommandLineOf(pid_t pid) {
   std::ifstream stream("/proc/" + std::to_string(pid) + "/cmdline", std::ios::binary);
@@ -34,7 +34,7 @@ std::string ValueAfter(const std::vector<std::string>& words, const char* flag) 
   return found == words.end() || std::next(found) == words.end() ? "" : *std::next(found);
 }
 
-// The id of a worker that another server started for this folder.
+// Id of a worker that another server started for this folder.
 std::optional<std::string> OrphanId(pid_t pid, const fs::path& data_folder) {
   const fs::path process = "/proc/" + std::to_string(pid);
   struct stat status {};
@@ -69,7 +69,7 @@ OrphanedWorkers::OrphanedWorkers(const fs::path& data_folder, std::chrono::milli
     if (!OrphanId(pid, data_folder) || !IsRunning(pid)) continue;
     const int handle = static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));
     if (handle < 0) continue;
-    // Again: the number may have become another's before there was a handle.
+    // Checked again, because the pid may have been reused before the handle was opened.
     const std::optional<std::string> id = OrphanId(pid, data_folder);
     if (!id) {
       ::close(handle);

@@ -1,6 +1,5 @@
-// Workers that have outlived their server. They save and end by themselves when it dies; those that
-// do not, frozen ones among them, are ended by the next server on the same data folder. Not
-// thread-safe.
+// Workers that have outlived their server. Normally they save and end when it dies; the next server
+// on the data folder ends the remaining ones, e.g. frozen ones. Not thread-safe.
 #pragma once
 
 #include <sys/types.h>
@@ -14,22 +13,22 @@ namespace color3d {
 
 class OrphanedWorkers {
  public:
-  // Finds them: processes of this user that were started for this data folder by another server.
-  // Frozen ones are ended at once: one may hold the store's write lock.
+  // Finds processes of this user that another server started for this data folder. Ends frozen ones
+  // at once, because one may hold the write lock of the store.
   OrphanedWorkers(const std::filesystem::path& data_folder, std::chrono::milliseconds grace);
   ~OrphanedWorkers();
   OrphanedWorkers(const OrphanedWorkers&) = delete;
   OrphanedWorkers& operator=(const OrphanedWorkers&) = delete;
 
-  // Ends those that are frozen, and all after the time of grace. Returns the ids, "worker-1-4711",
-  // of those that are gone since the last call.
+  // Ends frozen ones, and all after the grace period. Returns the ids ("worker-1-4711") of those
+  // that have ended since the last call.
   std::vector<std::string> Look();
 
  private:
   struct Orphan {
     std::string id;
     pid_t pid = 0;
-    int handle = -1;  // pidfd: of this process and no other that may get its number
+    int handle = -1;  // pidfd, which is immune to reuse of the pid
     bool killed = false;
   };
   std::vector<Orphan> orphans_;

@@ -19,7 +19,7 @@ namespace {
 constexpr auto kTick = std::chrono::milliseconds(50);
 constexpr auto kListening = std::chrono::seconds(2);
 constexpr auto kOrphans = std::chrono::milliseconds(500);
-// A worker that lived this long did not fail to start.
+// A worker that ran this long did not fail to start.
 constexpr auto kHealthyLife = std::chrono::seconds(60);
 
 }  // namespace
@@ -70,8 +70,8 @@ void Supervisor::StartWorker(Slot* slot) {
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  // Signals as a fresh program expects them (ours are blocked), and a process group of its own so
-  // that Ctrl-C reaches the server alone, which then drains its workers.
+  // Default signals (the server blocks them), and a separate process group, so that Ctrl-C reaches
+  // only the server, which then drains its workers.
   posix_spawnattr_t attributes;
   ::posix_spawnattr_init(&attributes);
   sigset_t none;
@@ -83,7 +83,7 @@ void Supervisor::StartWorker(Slot* slot) {
   ::posix_spawnattr_setpgroup(&attributes, 0);
   ::posix_spawnattr_setflags(
       &attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-  // Neither tokens nor keys of ours: workers decode strangers' files.
+  // Without tokens and keys, because workers decode untrusted files.
   std::vector<std::string> variables = InheritedEnvironment();
   std::vector<char*> environment;
   for (std::string& variable : variables) environment.push_back(variable.data());
@@ -109,7 +109,7 @@ void Supervisor::OnExit(Slot* slot, int status) {
   const bool clean = WIFEXITED(status) && WEXITSTATUS(status) == 0;
   std::string jobs;
   try {
-    for (const std::string& job : store_.ExpireLeasesOf(id)) jobs += " [job=" + job + "]";
+    for (const std::string& job : store_.ExpireLeases(id)) jobs += " [job=" + job + "]";
     store_.RemoveWorker(id);
   } catch (const Error& e) {
     spdlog::warn("{}: {}", id, e.what());
@@ -131,7 +131,7 @@ void Supervisor::OnExit(Slot* slot, int status) {
   } else {
     slot->backoff = std::clamp(slot->backoff * 2, options_.first_backoff, options_.max_backoff);
   }
-  // Ends without a fault (recycling) are not held back, but never spin either.
+  // Ends without a fault (recycling) are restarted soon, but with a minimum pause.
   slot->next_start = now + std::max(slot->backoff, std::chrono::milliseconds(50));
   slot->pid = 0;
 }
@@ -159,20 +159,20 @@ void Supervisor::KillIfFrozen(Slot* slot) {
   }
   const auto stopped = now - slot->last_moving;
   const bool too_long = stopped > options_.max_stopped;
-  if (!too_long && (stopped <= options_.max_stopped_holding || !IsStoreHeld())) return;
+  if (!too_long && (stopped <= options_.max_stopped_holding || !AreWritesBlocked())) return;
   spdlog::error("{} (pid {}) is stopped{}; killing it",
                 slot->name,
                 slot->pid,
-                too_long ? " for too long" : " and nobody can write to the store");
+                too_long ? " for too long" : " and blocks writes to the store");
   ::kill(slot->pid, SIGKILL);
   slot->last_moving = now;
 }
 
-bool Supervisor::IsStoreHeld() const {
+bool Supervisor::AreWritesBlocked() const {
   try {
     return store_.IsHeld();
   } catch (const Error& e) {
-    spdlog::warn("cannot look whether the store is held: {}", e.what());
+    spdlog::warn("cannot check whether the store is blocked: {}", e.what());
     return false;
   }
 }
@@ -181,12 +181,12 @@ bool Supervisor::IsStoreFull() const {
   try {
     return store_.IsFull();
   } catch (const Error& e) {
-    spdlog::warn("cannot look whether the store is full: {}", e.what());
+    spdlog::warn("cannot check whether the disk is full: {}", e.what());
     return false;
   }
 }
 
-// One that hangs outside of an attempt has no lease whose end would tell.
+// A worker that hangs between attempts has no lease that could expire.
 void Supervisor::KillSilentWorkers() {
   const auto now = SteadyClock::now();
   if (now < next_listening_) return;
@@ -197,7 +197,7 @@ void Supervisor::KillSilentWorkers() {
       reports[worker.worker_id] = worker.heartbeat_ms;
     }
   } catch (const Error& e) {
-    spdlog::warn("cannot look after workers: {}", e.what());
+    spdlog::warn("cannot supervise workers: {}", e.what());
     return;
   }
   for (Slot& slot : slots_) {
@@ -209,7 +209,7 @@ void Supervisor::KillSilentWorkers() {
     } else if (now - slot.last_heard > options_.max_silent) {
       slot.last_heard = now;
       if (IsStoreFull()) continue;
-      spdlog::error("{} (pid {}) gives no sign of life; killing it", slot.name, slot.pid);
+      spdlog::error("{} (pid {}) does not report; killing it", slot.name, slot.pid);
       ::kill(slot.pid, SIGKILL);
     }
   }
@@ -221,8 +221,8 @@ void Supervisor::EndOrphans() {
   next_orphans_ = now + kOrphans;
   for (const std::string& id : options_.orphans->Look()) {
     try {
-      for (const std::string& job : store_.ExpireLeasesOf(id)) {
-        spdlog::info("[job={}] its worker {} is gone", job, id);
+      for (const std::string& job : store_.ExpireLeases(id)) {
+        spdlog::info("[job={}] its worker {} has ended", job, id);
       }
       store_.RemoveWorker(id);
     } catch (const Error& e) {
@@ -231,13 +231,13 @@ void Supervisor::EndOrphans() {
   }
 }
 
-// As the first process of a container we inherit whatever has lost its parent.
-void Supervisor::ReapStrangers() {
+// As the first process of a container, the server inherits orphaned processes.
+void Supervisor::ReapInheritedProcesses() {
   while (true) {
     siginfo_t ended{};
     if (::waitid(P_ALL, 0, &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid == 0) return;
     const auto is_it = [&](const Slot& slot) { return slot.pid == ended.si_pid; };
-    if (std::ranges::any_of(slots_, is_it)) return;  // at the next turn
+    if (std::ranges::any_of(slots_, is_it)) return;  // in the next round
     ::waitpid(ended.si_pid, nullptr, WNOHANG);
   }
 }
@@ -245,7 +245,7 @@ void Supervisor::ReapStrangers() {
 void Supervisor::Loop() {
   while (true) {
     for (Slot& slot : slots_) CheckWorker(&slot);
-    ReapStrangers();
+    ReapInheritedProcesses();
     EndOrphans();
     KillSilentWorkers();
     if (draining_.load()) {

@@ -1,5 +1,5 @@
-// Starts worker processes, starts them again when they end, and ends them at a drain. One thread,
-// which also is the one that the kernel ties the workers' lives to.
+// Starts worker processes, restarts them when they end, and ends them at a drain. Runs one thread;
+// the kernel ends the workers when that thread ends. Thread-safe.
 #pragma once
 
 #include <sys/types.h>
@@ -18,15 +18,14 @@
 
 namespace color3d {
 
-// Asked for by RPCs, heeded by the supervisor: whether the inference worker should be running.
-// Thread-safe.
+// Demand for the inference worker: set by RPCs, read by the supervisor. Thread-safe.
 class InferenceDemand {
  public:
-  // While a copy of what this returns lives, the worker is not drained.
+  // The worker is not drained while a copy of the result exists.
   std::shared_ptr<void> Hold() const { return hold_; }
   bool Held() const { return hold_.use_count() > 1; }
   void Request() { requested_ = std::chrono::steady_clock::now().time_since_epoch().count(); }
-  // Within the last minute. A worker that ends by itself afterwards is not missed.
+  // Returns true if requested within the last minute. A worker that ends later is not restarted.
   bool Recent() const {
     const std::chrono::steady_clock::duration requested(requested_.load());
     return requested.count() != 0 &&
@@ -41,37 +40,37 @@ class InferenceDemand {
 
 struct SupervisorOptions {
   std::filesystem::path program;
-  std::vector<std::string> arguments;  // besides --name and --parent-pid
+  std::vector<std::string> arguments;  // in addition to --name and --parent-pid
   int workers = 1;
-  // Arguments of the inference worker, and when it is wanted; null: there is none.
+  // Arguments and demand of the inference worker; null: none.
   std::vector<std::string> inference_arguments;
   std::shared_ptr<const InferenceDemand> inference_demand;
   std::chrono::milliseconds first_backoff{500};
   std::chrono::milliseconds max_backoff{10'000};
-  // A worker that is stopped (SIGSTOP, a debugger) for this long is killed: it has lost its lease.
+  // A worker that is stopped (SIGSTOP, debugger) for this time has lost its lease and is killed.
   std::chrono::milliseconds max_stopped{180'000};
-  // ... or for this long while nobody can write to the store, which it may have stopped in: before
-  // the leases of all others run out with its own.
+  // The same while writes to the store are blocked, because the stopped worker may hold the lock:
+  // less than a lease, so that others do not lose theirs.
   std::chrono::milliseconds max_stopped_holding{10'000};
-  // Those of an earlier server, to be seen to their end; may be null.
+  // Workers of an earlier server, to be ended; may be null.
   std::shared_ptr<OrphanedWorkers> orphans;
-  // A worker that runs but has not reported itself for so long is killed, too; not where no report
-  // can be written, for the disk is full.
+  // A running worker without a report for this time is killed, unless the full disk prevents
+  // reports.
   std::chrono::milliseconds max_silent{180'000};
 };
 
 class Supervisor {
  public:
-  // Starts the workers. The store outlives the supervisor; it learns of dead workers at once, so
-  // that their jobs need not wait for the lease's end.
+  // Starts the workers. The store must outlive the supervisor, which ends the leases of dead
+  // workers at once.
   Supervisor(const SupervisorOptions& options, ChoreStore& store);
-  // Kills what still runs.
+  // Kills running workers.
   ~Supervisor();
   Supervisor(const Supervisor&) = delete;
   Supervisor& operator=(const Supervisor&) = delete;
 
-  // SIGTERM to all workers, to the inference worker once nobody holds it; no more restarts; SIGKILL
-  // to those that still run after `grace`.
+  // Sends SIGTERM to all workers, to the inference worker once it is not held, and SIGKILL after
+  // `grace`. Restarts none.
   void Drain(std::chrono::milliseconds grace);
   // Waits until all workers have ended after Drain.
   void Wait();
@@ -81,13 +80,13 @@ class Supervisor {
   struct Slot {
     std::string name;
     bool on_demand = false;  // the inference worker
-    bool told = false;       // to end, by SIGTERM
+    bool told = false;       // SIGTERM was sent
     pid_t pid = 0;           // 0: not running
     SteadyClock::time_point started;
     SteadyClock::time_point next_start;
     std::chrono::milliseconds backoff{0};
     SteadyClock::time_point last_moving;  // not stopped when last seen
-    SteadyClock::time_point last_heard;   // its report was another one
+    SteadyClock::time_point last_heard;   // time of its last new report
     int64_t report_ms = 0;
   };
   void Loop();
@@ -96,11 +95,11 @@ class Supervisor {
   void CheckWorker(Slot* slot);
   void OnExit(Slot* slot, int status);
   void KillIfFrozen(Slot* slot);
-  bool IsStoreHeld() const;
+  bool AreWritesBlocked() const;
   bool IsStoreFull() const;
   void KillSilentWorkers();
   void EndOrphans();
-  void ReapStrangers();
+  void ReapInheritedProcesses();
 
   const SupervisorOptions options_;
   ChoreStore& store_;

@@ -1,4 +1,4 @@
-// Workers that say nothing: killed, but not for a disk that takes no reports.
+// Workers without reports are killed unless the disk is full.
 #include "server/worker/supervision/supervisor.h"
 
 #include <atomic>
@@ -21,7 +21,7 @@ class FullStore : public SqliteJobStore {
   std::atomic<bool> full{true};
 };
 
-TEST_F(JobStoreTest, ASilentWorkerIsKilledUnlessTheDiskIsFull) {
+TEST_F(JobStoreTest, KillsSilentWorkerUnlessDiskIsFull) {
   const fs::path program = scratch_.path() / "worker", starts = scratch_.path() / "starts";
   WriteFileAtomic(program, "#!/bin/sh\necho begun >> " + starts.string() + "\nexec sleep 60\n");
   fs::permissions(program, fs::perms::owner_all);

@@ -1,5 +1,5 @@
-// Settings that `serve` passes on to its worker processes as flags: one list of fields, defaults
-// and hidden flags for both programs. A plain value.
+// Settings that `serve` passes to its worker processes as flags: fields, defaults and hidden flags
+// of both programs. A plain value.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@ namespace color3d {
 struct WorkerSettings {
   std::filesystem::path data_folder;
   int threads = 1;
-  int64_t memory_mib = 0;  // of the process, and of each that it starts; 0: no limit
-  bool sandbox = true;     // lock the process in, where the machine can
+  int64_t memory_mib = 0;  // per process, including started ones; 0: no limit
+  bool sandbox = true;     // if the kernel supports it
   std::string log_level = "info";
   std::string log_format = "text";  // or "json"
   int64_t reserve_mib = 256;        // disk space to keep free
@@ -38,7 +38,7 @@ void VisitTimings(Settings& settings, const Visit& visit) {
   visit("--retry-backoff-ms", settings.retry_backoff_ms);
 }
 
-// Command line flags by which a worker process reads these settings.
+// Returns the flags from which a worker process reads these settings.
 std::vector<std::string> ToFlags(const WorkerSettings& settings);
 
 }  // namespace color3d

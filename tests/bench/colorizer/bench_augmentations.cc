@@ -1,5 +1,5 @@
-// color3d-bench augmentations: writes the generated training pictures of a colour scene, for
-// viewing and for color3d-bench colorizer --pictures.
+// color3d-bench augmentations: writes generated training pictures of a colour scene, for viewing
+// and for color3d-bench colorizer --pictures.
 #include <cstdio>
 
 #include "core/base/files.h"
@@ -61,17 +61,25 @@ void RunAugmentations(const AugmentationsArguments& args) {
 void AddAugmentationsCommand(CLI::App& app) {
   auto args = std::make_shared<AugmentationsArguments>();
   CLI::App* command = app.add_subcommand(
-      "augmentations", "posed photos in colour -> extra training pictures from one key view");
-  command->add_option("--scene", args->scene_folder)->required();
-  command->add_option("--out", args->out_folder, "where artifacts go")->required();
-  command->add_option("--key-view", args->key_view, "default: the middle training view");
-  command->add_option("--samples", args->options.samples);
-  command->add_option("--side", args->options.max_side_px, "px");
-  command->add_option("--threads", args->threads);
-  command->add_option("--seed", args->seed);
-  command->add_option("--geometry-iterations", args->geometry.iterations);
-  command->add_option("--max-gaussians", args->geometry.max_gaussians);
-  command->add_flag("--no-geometry", args->no_geometry, "from the key view alone");
+      "augmentations",
+      "Generate additional training pictures from one key view of posed colour photos");
+  command
+      ->add_option("--scene", args->scene_folder, "Folder of colour photos, with or without poses")
+      ->required();
+  command->add_option("--out", args->out_folder, "Folder for artifacts")->required();
+  command->add_option(
+      "--key-view", args->key_view, "Name of the key view; default: the middle training view");
+  command->add_option("--samples", args->options.samples, "Number of pictures");
+  command->add_option(
+      "--side", args->options.max_side_px, "Longer side of the working pictures, px");
+  command->add_option("--threads", args->threads, "Number of threads");
+  command->add_option("--seed", args->seed, "Seed");
+  command->add_option("--geometry-iterations",
+                      args->geometry.iterations,
+                      "Training iterations of the luminance Gaussians");
+  command->add_option(
+      "--max-gaussians", args->geometry.max_gaussians, "Maximum number of Gaussians");
+  command->add_flag("--no-geometry", args->no_geometry, "Use the key view alone");
   command->callback([args] { RunAugmentations(*args); });
 }
 

@@ -58,7 +58,7 @@ double Number(const std::string& name, const std::string& text) {
   char* end = nullptr;
   const double value = std::strtod(text.c_str(), &end);
   if (text.empty() || *end != '\0') {
-    throw InvalidArgument("the choice {} is \"{}\", which is no number", name, text);
+    throw InvalidArgument("the choice {} is \"{}\"; give a number", name, text);
   }
   return value;
 }
@@ -94,13 +94,14 @@ const std::map<std::string, Setter>& Setters() {
       {"recipe",
        [](const std::string& value, Choice* c) {
          if (value != "paper")
-           throw InvalidArgument("unknown recipe; the only other recipe is \"paper\"");
+           throw InvalidArgument("unknown recipe \"{}\"; give \"paper\", or no choice", value);
          c->options.UsePaperRecipe();
        }},
       {"pictures", [](const std::string& value, Choice* c) { c->pictures = value; }},
       {"geometry_first",
        [](const std::string& value, Choice* c) {
-         if (value != "off") throw InvalidArgument("geometry first is on by default, or \"off\"");
+         if (value != "off")
+           throw InvalidArgument("geometry_first is \"{}\"; give \"off\", or no choice", value);
          c->carry = false;
        }},
   };
@@ -120,7 +121,7 @@ Choice ChoiceFrom(const std::string& text, const ChoicesArguments& args) {
   if (equals == std::string::npos || setter == Setters().end()) {
     std::string known;
     for (const auto& [name, set] : Setters()) known += ", " + name + "=";
-    throw InvalidArgument("the choice \"{}\" is none of default{}", text, known);
+    throw InvalidArgument("unknown choice \"{}\"; choose from default{}", text, known);
   }
   choice.value = text.substr(equals + 1);
   setter->second(choice.value, &choice);
@@ -219,11 +220,12 @@ class ChoiceBench {
           ReadCarried(context, scene_.views[view], luminance.width, luminance.height);
       point->alone += ChromaError(truth, JoinLab(luminance, colorizer.Colorize(luminance)));
       const FusedColor fused =
-          ColorOfView(luminance, carried, SourcesOf(colorizer), pool_, cancel_);
+          FuseViewColor(luminance, carried, SourcesOf(colorizer), pool_, cancel_);
       point->delivered += ChromaError(truth, JoinLab(luminance, fused.ab));
       ++point->views;
     }
-    if (point->views == 0) throw InvalidArgument("the scene has no view to be held out");
+    if (point->views == 0)
+      throw InvalidArgument("the scene has no held-out view; give more photos");
     point->alone /= point->views;
     point->delivered /= point->views;
   }
@@ -290,7 +292,7 @@ void MeasureAll(const ChoicesArguments& args) {
       }
       if (std::chrono::steady_clock::now() - start >
           std::chrono::duration<double>(args.stop_after_seconds)) {
-        throw Error(ErrorCode::kAborted, "out of time; the same command goes on");
+        throw Error(ErrorCode::kAborted, "out of time; repeat the command to continue");
       }
       const ChoicePoint point = bench.Measure(choice, iterations);
       AppendChoicePoint(file, point);
@@ -317,34 +319,36 @@ void RunChoices(const ChoicesArguments& args) {
 void AddChoicesCommand(CLI::App& app) {
   auto args = std::make_shared<ChoicesArguments>();
   CLI::App* command = app.add_subcommand(
-      "choices",
-      "posed photos in colour -> error against seconds for each choice of the colorizer");
-  auto* scene = command->add_option("--scene", args->scene_folder, "folder of photos");
-  auto* out = command->add_option("--out", args->out_folder, "choices.jsonl, one line per point");
+      "choices", "Measure error against seconds for each choice of the colorizer");
+  auto* scene = command->add_option(
+      "--scene", args->scene_folder, "Folder of colour photos, with or without poses");
+  auto* out = command->add_option(
+      "--out", args->out_folder, "Folder for choices.jsonl, one line per point");
   scene->needs(out);
   command
       ->add_option("--geometry",
                    args->geometry_file,
-                   "geometry.c3g of an earlier run of the scene, in place of training")
+                   "geometry.c3g of an earlier run of the scene, instead of training")
       ->check(CLI::ExistingFile);
-  command->add_option("--choice",
-                      args->choices,
-                      "default, encoder=random, encoder=squeezenet=FILE, adapter_stages=, "
-                      "decoder_width=, crop=, precision=, learning_rate=, average_decay=, "
-                      "consistency=, recipe=paper, pictures=KIND, geometry_first=off; several");
-  command->add_option("--iterations", args->iterations, "of each choice, ascending")
+  command->add_option(
+      "--choice",
+      args->choices,
+      "Choice to measure: default, encoder=random, encoder=squeezenet=FILE, adapter_stages=, "
+      "decoder_width=, crop=, precision=, learning_rate=, average_decay=, consistency=, "
+      "recipe=paper, pictures=KIND or geometry_first=off. May be repeated");
+  command->add_option("--iterations", args->iterations, "Iterations of each choice, ascending")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--max-side", args->max_side_px, "working size, px");
-  command->add_option("--threads", args->threads);
-  command->add_option("--seed", args->seed);
+  command->add_option("--max-side", args->max_side_px, "Longer side of the working pictures, px");
+  command->add_option("--threads", args->threads, "Number of threads");
+  command->add_option("--seed", args->seed, "Seed");
   command->add_option(
-      "--stop-after", args->stop_after_seconds, "begin no point later than this, s");
+      "--stop-after", args->stop_after_seconds, "Start no point after these seconds");
   command->add_flag("--carry,!--no-carry",
                     args->carry,
-                    "the default has carried colours; without, it is what a scene gets in which "
-                    "nothing could be carried (an --out of its own)");
-  command->add_option("--table", args->table_folders, "--out folders: print tables, run nothing")
+                    "Carry colours (default), or not, as in a scene where nothing can be carried "
+                    "(use another --out)");
+  command->add_option("--table", args->table_folders, "Output folders: only print their tables")
       ->excludes(scene);
   command->callback([args] {
     if (args->scene_folder.empty() == args->table_folders.empty()) {

@@ -1,4 +1,4 @@
-// color3d-bench colorizer: personalization on one key view, colour error on every eighth view.
+// color3d-bench colorizer: personalizes on one key view and scores every eighth view.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -265,41 +265,52 @@ void RunColorizer(const ColorizerArguments& args) {
 void AddColorizerCommand(CLI::App& app) {
   auto args = std::make_shared<ColorizerArguments>();
   CLI::App* command = app.add_subcommand(
-      "colorizer", "personalize on one photo of a colour folder, score on every eighth one");
-  auto* photos = command->add_option("--photos", args->photos_folder);
-  command->add_option("--all-in-one", args->all_in_one, "photo folders, trained in one batch")
+      "colorizer", "Personalize on one colour photo of a folder and score every eighth photo");
+  auto* photos = command->add_option("--photos", args->photos_folder, "Folder of colour photos");
+  command->add_option("--all-in-one", args->all_in_one, "Folders of photos, trained in one batch")
       ->excludes(photos);
   command->add_flag("!--no-one-after-another",
                     args->one_after_another,
-                    "with --all-in-one: leave the comparison out");
+                    "With --all-in-one: skip the comparison with one after another");
   command->add_flag("--memory",
                     args->memory,
-                    "with --all-in-one: peak memory of 1, 2, 4, ... scenes, and its parts");
-  command->add_option("--json", args->json_file, "write the result here");
-  command->add_option("--key", args->key, "file name; default: the middle one");
-  command->add_option("--out", args->out_folder, "where coloured views are written");
-  command->add_option("--side", args->side_px, "px");
-  command->add_option("--iterations", args->options.iterations);
-  command->add_option("--time-limit", args->options.time_limit_seconds, "seconds");
-  command->add_option("--threads", args->threads);
+                    "With --all-in-one: measure peak memory of 1, 2, 4, ... scenes, and its parts");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
+  command->add_option("--key", args->key, "File name of the key view; default: the middle one");
+  command->add_option("--out", args->out_folder, "Folder for coloured views");
+  command->add_option("--side", args->side_px, "Longer side of the working pictures, px");
+  command->add_option("--iterations", args->options.iterations, "Iterations of personalization");
+  command->add_option(
+      "--time-limit", args->options.time_limit_seconds, "Time limit of personalization, s");
+  command->add_option("--threads", args->threads, "Number of threads");
   command
-      ->add_option(
-          "--encoder", args->encoder, "embedded, random, squeezenet=FILE.onnx, or a weight file")
+      ->add_option("--encoder",
+                   args->encoder,
+                   "Encoder: embedded, random, squeezenet=FILE.onnx, or a weight file")
       ->capture_default_str();
-  command->add_option("--consistency", args->options.consistency_weight);
+  command->add_option(
+      "--consistency", args->options.consistency_weight, "Weight of the consistency loss");
   command->add_option("--pictures",
                       args->pictures_folder,
-                      "what color3d-bench augmentations left: trained on beside the key view");
-  command->add_option("--kinds", args->kinds, "only these of them, e.g. outpaint,novel_view");
-  command->add_option("--picture-share", args->picture_share, "of them all, against the key's 1");
-  command->add_option("--crop", args->crop_px, "px");
-  command->add_option("--seed", args->options.seed);
-  command->add_option("--average-decay", args->options.average_decay, "0: off");
-  command->add_option("--min-improvement", args->options.min_improvement, "0: no early stop");
-  command->add_option("--precision", args->precision, "auto, float32 or bfloat16")
+                      "Output folder of `augmentations`: also train on its pictures");
+  command->add_option(
+      "--kinds", args->kinds, "Kinds of these pictures to use, e.g. outpaint,novel_view");
+  command->add_option("--picture-share",
+                      args->picture_share,
+                      "Share of these pictures, relative to the key view's 1");
+  command->add_option("--crop", args->crop_px, "Size of crops, px");
+  command->add_option("--seed", args->options.seed, "Seed");
+  command->add_option("--average-decay",
+                      args->options.average_decay,
+                      "Decay of the average of the parameters; 0: off");
+  command->add_option("--min-improvement",
+                      args->options.min_improvement,
+                      "Minimum improvement to continue; 0: no early stop");
+  command->add_option("--precision", args->precision, "Precision: auto, float32 or bfloat16")
       ->check(CLI::IsMember({"auto", "float32", "bfloat16"}))
       ->capture_default_str();
-  command->add_flag("--paper", args->paper, "the paper's recipe");
+  command->add_flag("--paper", args->paper, "Use the paper's recipe");
   command->callback([args] {
     if (args->photos_folder.empty() && args->all_in_one.empty()) {
       throw CLI::RequiredError("--photos or --all-in-one");

@@ -40,7 +40,7 @@ TEST(ChoiceResults, IgnoreTruncatedLine) {
   AppendChoicePoint(file, PointOf("fern", "crop", "128", 20, 4.0));
   const auto points = ReadChoicePoints(file);
   ASSERT_EQ(points.size(), 2u);
-  EXPECT_EQ(points[0].alone, 2.0) << "the later point does not win";
+  EXPECT_EQ(points[0].alone, 2.0) << "an earlier point won";
   EXPECT_EQ(points[0].delivered, 1.0);
   EXPECT_EQ(points[0].seconds, 6.0);
   EXPECT_TRUE(points[1].SameWork(PointOf("fern", "crop", "128", 20, 0.0)));
@@ -66,7 +66,7 @@ TEST(ChoicePlots, ShowMeansOverScenes) {
   EXPECT_EQ(plots[0].series[0].points[1].seconds, 6.0);
   EXPECT_EQ(plots[0].series[0].points[1].value, 2.0);
   ASSERT_EQ(plots[1].series.size(), 2u);
-  EXPECT_EQ(plots[1].series[0].points.size(), 2u) << "the default's curve is whole";
+  EXPECT_EQ(plots[1].series[0].points.size(), 2u) << "the curve of the default is incomplete";
   EXPECT_EQ(plots[1].series[1].name, "128");
   EXPECT_EQ(plots[1].series[1].points[0].value, 2.25);
 }

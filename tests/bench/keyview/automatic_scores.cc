@@ -40,7 +40,7 @@ std::vector<std::filesystem::path> PhotosBelow(const std::filesystem::path& fold
       files.push_back(entry.path());
     }
   }
-  if (files.empty()) throw InvalidArgument("{} holds no photographs", folder.string());
+  if (files.empty()) throw InvalidArgument("{} has no photographs", folder.string());
   std::sort(files.begin(), files.end());
   const size_t wanted = static_cast<size_t>(count);
   if (count <= 0 || wanted >= files.size()) return files;

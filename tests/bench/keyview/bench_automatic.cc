@@ -64,17 +64,23 @@ void RunAutomatic(const AutomaticArguments& args) {
 
 void AddAutomaticCommand(CLI::App& app) {
   auto args = std::make_shared<AutomaticArguments>();
-  CLI::App* command =
-      app.add_subcommand("automatic", "colour photographs without help, score against the truth");
-  command->add_option("--photos", args->photos_folder, "folder of colour photographs")->required();
+  CLI::App* command = app.add_subcommand(
+      "automatic", "Colour photographs automatically and score them against the truth");
+  command->add_option("--photos", args->photos_folder, "Folder of colour photographs")->required();
   command->add_option(
-      "--weights", args->weights_file, "of `pretrain`, or DDColor's; else embedded");
-  command->add_option("--out", args->out_folder, "grey, coloured and true side by side, as PNG");
-  command->add_option("--temperature", args->temperature, "of the colour distribution, else stored")
+      "--weights", args->weights_file, "Weights of `pretrain` or DDColor; default: embedded");
+  command->add_option(
+      "--out", args->out_folder, "Folder for PNGs of grey, coloured and true side by side");
+  command
+      ->add_option("--temperature",
+                   args->temperature,
+                   "Temperature of the colour distribution; default: stored in the weights")
       ->check(CLI::Range(0.05, 2.0));
-  command->add_option("--count", args->count, "photographs, evenly thinned out; 0: all");
-  command->add_option("--side", args->max_side_px, "px")->check(CLI::Range(16, 8192));
-  command->add_option("--threads", args->threads)->check(CLI::Range(1, 256));
+  command->add_option(
+      "--count", args->count, "Maximum number of photographs, evenly spaced; 0: all");
+  command->add_option("--side", args->max_side_px, "Longer side of the pictures, px")
+      ->check(CLI::Range(16, 8192));
+  command->add_option("--threads", args->threads, "Number of threads")->check(CLI::Range(1, 256));
   command->callback([args] { RunAutomatic(*args); });
 }
 

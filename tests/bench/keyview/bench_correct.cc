@@ -127,14 +127,18 @@ void Run(const Arguments& args) {
 void AddCorrectCommand(CLI::App& app) {
   auto args = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand(
-      "correct", "strokes in the true colours on a coloured scene: its training views' error");
-  command->add_option("--scene", args->scene_folder, "folder of photos in colour")->required();
-  command->add_option("--run", args->run_folder, "what `pipeline` has left")->required();
-  command->add_option("--out", args->out_folder, "where artifacts go")->required();
-  command->add_option("--strokes", args->strokes);
-  command->add_option("--radius", args->radius, "of the strokes, of the photo's longer side");
-  command->add_flag("--true-colors", args->true_colors, "paint them, not their mean");
-  command->add_option("--threads", args->threads);
+      "correct", "Measure the error of a coloured scene after strokes in its true colours");
+  command
+      ->add_option("--scene", args->scene_folder, "Folder of colour photos, with or without poses")
+      ->required();
+  command->add_option("--run", args->run_folder, "Output folder of a `pipeline` run")->required();
+  command->add_option("--out", args->out_folder, "Folder for artifacts")->required();
+  command->add_option("--strokes", args->strokes, "Number of strokes");
+  command->add_option(
+      "--radius", args->radius, "Radius of the strokes, relative to the photo's longer side");
+  command->add_flag(
+      "--true-colors", args->true_colors, "Paint the true colours instead of their mean");
+  command->add_option("--threads", args->threads, "Number of threads");
   command->callback([args] { Run(*args); });
 }
 

@@ -191,12 +191,15 @@ void Run(const Arguments& args) {
 
 void AddFloorCommand(CLI::App& app) {
   auto args = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand(
-      "floor", "true colours carried into held-out views: the error that remains, and why");
-  command->add_option("--scene", args->scene_folder, "folder of photos in colour")->required();
-  command->add_option("--run", args->run_folder, "what `pipeline` has left")->required();
-  command->add_option("--side", args->side_px, "px");
-  command->add_option("--threads", args->threads);
+  CLI::App* command = app.add_subcommand("floor",
+                                         "Measure the error that remains with the true colours of "
+                                         "all training views carried into held-out views");
+  command
+      ->add_option("--scene", args->scene_folder, "Folder of colour photos, with or without poses")
+      ->required();
+  command->add_option("--run", args->run_folder, "Output folder of a `pipeline` run")->required();
+  command->add_option("--side", args->side_px, "Longer side of the pictures, px");
+  command->add_option("--threads", args->threads, "Number of threads");
   command->callback([args] { Run(*args); });
 }
 

@@ -259,20 +259,24 @@ Json RunQuality(const HintsArguments& args) {
 
 void AddHintsCommand(CLI::App& app) {
   auto args = std::make_shared<HintsArguments>();
-  CLI::App* command = app.add_subcommand("hints", "colour hints: residual against seconds, error");
-  command->add_option("photos", args->photos, "picture files, or 'procedural'")->required();
-  command->add_option("--megapixels", args->megapixels, "sizes to enlarge or reduce to");
-  command->add_option("--points", args->points, "hints of the timed runs");
-  command->add_option("--noise", args->noise, "deviation of the noise added to L");
-  command->add_option("--eigen-up-to", args->eigen_up_to_megapixels, "largest size for Eigen");
-  command->add_option("--eigen-seconds", args->eigen_seconds, "when Eigen is stopped");
-  command->add_option("--tolerance", args->options.tolerance, "relative residual to reach");
-  command->add_option("--sigma", args->options.sigma, "of the edge weights, L units");
-  command->add_option("--threads", args->threads, "0: what the machine has");
-  command->add_flag("--quality", args->quality, "colour error by number of hints instead");
-  command->add_option("--counts", args->counts, "numbers of hints, with --quality");
-  command->add_option("--pictures", args->pictures_folder, "PNGs go here, with --quality");
-  command->add_option("--json", args->json_file, "result file; standard output without");
+  CLI::App* command =
+      app.add_subcommand("hints", "Measure residual against seconds, or error, of colour hints");
+  command->add_option("photos", args->photos, "Picture files, or 'procedural'")->required();
+  command->add_option("--megapixels", args->megapixels, "Sizes to resample to");
+  command->add_option("--points", args->points, "Number of hints of the timed runs");
+  command->add_option("--noise", args->noise, "Standard deviation of noise added to L");
+  command->add_option("--eigen-up-to",
+                      args->eigen_up_to_megapixels,
+                      "Maximum size for the comparison with Eigen, megapixels");
+  command->add_option("--eigen-seconds", args->eigen_seconds, "Time limit of Eigen, s");
+  command->add_option("--tolerance", args->options.tolerance, "Relative residual to reach");
+  command->add_option("--sigma", args->options.sigma, "Sigma of the edge weights, L units");
+  command->add_option("--threads", args->threads, "Number of threads; 0: one per core");
+  command->add_flag("--quality", args->quality, "Measure the error by number of hints instead");
+  command->add_option("--counts", args->counts, "Numbers of hints, with --quality");
+  command->add_option("--pictures", args->pictures_folder, "Folder for PNGs, with --quality");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] {
     WriteResult(args->quality ? RunQuality(*args) : RunSizes(*args), args->json_file);
   });

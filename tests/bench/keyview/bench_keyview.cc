@@ -236,15 +236,19 @@ void RunKeyView(const KeyViewArguments& args) {
 void AddKeyViewCommand(CLI::App& app) {
   auto args = std::make_shared<KeyViewArguments>();
   CLI::App* command = app.add_subcommand(
-      "keyview", "choice of the key view: strategies, seconds, colour error of every choice");
-  command->add_option("--scene", args->folders, "scene or folder of colour photos")->required();
-  command->add_flag("--as-one", args->as_one, "all folders' photos are one scene without poses");
-  command->add_option("--side", args->side_px, "of the pictures that are coloured, px");
-  command->add_option("--tests", args->tests, "views that are coloured and scored; 0: none");
-  command->add_option("--keys", args->keys, "choices to compare with, spread over the views");
-  command->add_option("--threads", args->threads);
-  command->add_option("--sheets", args->sheets, "folder for the contact sheets");
-  command->add_option("--json", args->json_file);
+      "keyview", "Compare the strategies of key view selection by time and error");
+  command->add_option("--scene", args->folders, "Scene or folder of colour photos; may be repeated")
+      ->required();
+  command->add_flag(
+      "--as-one", args->as_one, "Treat the photos of all folders as one scene without poses");
+  command->add_option("--side", args->side_px, "Longer side of the coloured pictures, px");
+  command->add_option("--tests", args->tests, "Number of views to colour and score; 0: none");
+  command->add_option(
+      "--keys", args->keys, "Number of other key views to compare with, evenly spread");
+  command->add_option("--threads", args->threads, "Number of threads");
+  command->add_option("--sheets", args->sheets, "Folder for contact sheets");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] { RunKeyView(*args); });
 }
 

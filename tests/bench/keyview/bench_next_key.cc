@@ -191,16 +191,19 @@ void Run(const Arguments& args) {
 
 void AddNextKeyCommand(CLI::App& app) {
   auto args = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand(
-      "next-key",
-      "second key views: the training views' error with each, against what is expected");
-  command->add_option("--scene", args->scene_folder, "folder of photos in colour")->required();
-  command->add_option("--run", args->run_folder, "what `pipeline` has left")->required();
-  command->add_option("--out", args->out_folder, "where artifacts go")->required();
-  command->add_option("--candidates", args->candidates);
-  command->add_option("--side", args->side_px, "px");
-  command->add_option("--iterations", args->iterations, "of personalization");
-  command->add_option("--threads", args->threads);
+  CLI::App* command =
+      app.add_subcommand("next-key", "Compare measured and expected errors of second key views");
+  command
+      ->add_option("--scene", args->scene_folder, "Folder of colour photos, with or without poses")
+      ->required();
+  command->add_option("--run", args->run_folder, "Output folder of a `pipeline` run")->required();
+  command->add_option("--out", args->out_folder, "Folder for artifacts")->required();
+  command->add_option("--candidates", args->candidates, "Number of candidates");
+  command->add_option("--side", args->side_px, "Longer side of the working pictures, px");
+  command->add_option("--iterations",
+                      args->iterations,
+                      "Iterations of personalization; 0: feature neighbours only");
+  command->add_option("--threads", args->threads, "Number of threads");
   command->callback([args] { Run(*args); });
 }
 

@@ -1,4 +1,4 @@
-// color3d-bench reference: error of key views coloured from reference pictures.
+// color3d-bench reference: error of a key view coloured from reference pictures.
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
@@ -58,15 +58,19 @@ void RunReference(const ReferenceArguments& args) {
 
 void AddReferenceCommand(CLI::App& app) {
   auto args = std::make_shared<ReferenceArguments>();
-  CLI::App* command = app.add_subcommand("reference", "a picture coloured from other pictures");
-  command->add_option("key", args->key, "coloured photo whose colours are to be found")->required();
-  command->add_option("references", args->references, "other coloured pictures")->required();
-  command->add_option("--max-side", args->max_side_px, "longer side of the key picture, px");
-  command->add_option("--match-weight", args->options.match_weight, "see ReferenceOptions");
-  command->add_option("--match-side", args->options.match_side_px, "see ReferenceOptions");
-  command->add_option("--threads", args->threads, "0: what the machine has");
-  command->add_option("--picture", args->picture_file, "PNG of the result");
-  command->add_option("--json", args->json_file, "result file; standard output without");
+  CLI::App* command =
+      app.add_subcommand("reference", "Colour a picture from reference pictures and score it");
+  command->add_option("key", args->key, "Colour photo to be coloured from its L")->required();
+  command->add_option("references", args->references, "Reference pictures in colour")->required();
+  command->add_option("--max-side", args->max_side_px, "Longer side of the coloured picture, px");
+  command->add_option(
+      "--match-weight", args->options.match_weight, "Weight of a match (ReferenceOptions)");
+  command->add_option(
+      "--match-side", args->options.match_side_px, "Longer side at which pictures are matched, px");
+  command->add_option("--threads", args->threads, "Number of threads; 0: one per core");
+  command->add_option("--picture", args->picture_file, "PNG file for the result");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] { RunReference(*args); });
 }
 

@@ -1,5 +1,5 @@
-// color3d-load-bench: what the server answers a second, and how soon, with a long history in its
-// store, watchers, and a worker that is busy. Prints JSON.
+// color3d-load-bench: calls per second and latency of a server with a long history in its store,
+// watchers, and a busy worker. Prints JSON.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -31,12 +31,12 @@ struct LoadOptions {
   int watchers = 300;
   int threads = 16;
   double seconds = 10.0;
-  double rate = 0.0;  // calls of GetJob a second, together; 0: as many as can be
+  double rate = 0.0;  // calls of GetJob per second, in total; 0: unlimited
 };
 
 std::string PastJob(int64_t i) { return fmt::format("jobs/{:016x}", i); }
 
-// Finished jobs, each with a result, an attempt and an event.
+// Adds finished jobs, each with a result, an attempt and an event.
 void WriteHistory(const std::filesystem::path& data_folder, int64_t jobs) {
   const DataPaths paths(data_folder);
   PrepareDataFolder(paths);
@@ -103,7 +103,7 @@ nlohmann::ordered_json Run(const LoadOptions& options) {
   ServerProcess server(scratch.path(), {"--lease-seconds", "60", "--heartbeat-seconds", "1"});
   TestClient& client = server.client();
   const std::string scene = client.MakeScene().name();
-  // Runs, and is watched, all the while.
+  // A job that runs and is watched during the measurement.
   const std::string busy = client.Create(ScriptedSpec(scene, "steps=100000,ms=20")).name();
 
   std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
@@ -174,13 +174,14 @@ nlohmann::ordered_json Run(const LoadOptions& options) {
 
 int Main(int argc, char** argv) {
   LoadOptions options;
-  CLI::App app("Load on a color3d server with a long history.");
+  CLI::App app("Measure the load that a color3d server with a long history answers.");
   app.add_option("--jobs", options.jobs, "Finished jobs in the store")->capture_default_str();
-  app.add_option("--watchers", options.watchers)->capture_default_str();
-  app.add_option("--threads", options.threads, "Callers of GetJob")->capture_default_str();
-  app.add_option("--rate", options.rate, "Calls of GetJob a second; 0: as many as can be")
+  app.add_option("--watchers", options.watchers, "Watchers of a running job")
       ->capture_default_str();
-  app.add_option("--seconds", options.seconds)->capture_default_str();
+  app.add_option("--threads", options.threads, "Threads that call GetJob")->capture_default_str();
+  app.add_option("--rate", options.rate, "Calls of GetJob per second; 0: unlimited")
+      ->capture_default_str();
+  app.add_option("--seconds", options.seconds, "Duration, s")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   std::cout << Run(options).dump(1) << "\n";
   return 0;

@@ -10,10 +10,10 @@
 namespace color3d {
 namespace {
 
-constexpr double kEigenvalueFloor = 0.02;  // as core/matching/whitening.cc
+constexpr double kEigenvalueFloor = 0.02;  // as in core/matching/whitening.cc
 constexpr double kVarianceFloor = 1e-8;
-constexpr double kRankFloor = 1e-4;     // of the largest eigenvalue: directions that n samples lack
-constexpr double kUniformShare = 1e-3;  // of a copied colour: one that `first` lacks costs log 1000
+constexpr double kRankFloor = 1e-4;     // of the largest eigenvalue, for rank-deficient samples
+constexpr double kUniformShare = 1e-3;  // bounds the loss of colours missing in `first` to log 1000
 
 // As in core/matching/whitening.cc.
 double ShareOfTap(const WhiteningOptions& options, int stride_px) {
@@ -55,9 +55,8 @@ torch::Tensor CellMiddles(int64_t rows, int64_t columns) {
                       1);
 }
 
-// Projected features [h w, D] of a map [1,C,h,w] as features of cells, `rows` of them from top to
-// bottom. Between a coarse tap's cells they are interpolated, which may as well be done after the
-// projection: D is a tenth of C.
+// Resamples projected features [h w, D] of a map [1,C,h,w] to `rows` rows of cells. Interpolation
+// follows the projection because D is a tenth of C.
 torch::Tensor ToCells(const torch::Tensor& projected, const torch::Tensor& map, int64_t rows) {
   if (map.size(2) == rows) return projected;
   const int64_t columns = map.size(3) * rows / map.size(2);

@@ -39,7 +39,7 @@ struct CopyView {
 
 struct CopyLosses {
   torch::Tensor copy;      // cross entropy of the copied colours, nats
-  torch::Tensor contrast;  // cross entropy of the cells looked at with the true ones, nats; 0 where
+  torch::Tensor contrast;  // cross entropy of the attended cells with the true ones, nats; 0 if
                            // no true place is known
 };
 

@@ -28,7 +28,7 @@ CopyView RandomView() {
   return view;
 }
 
-// Every cell lies where it is.
+// Matches of a view with itself.
 torch::Tensor SamePlaces() {
   const int64_t cells = kSide / kCellPx;
   const torch::Tensor at = (torch::arange(cells, torch::kFloat32) + 0.5) * kCellPx;
@@ -64,7 +64,7 @@ TEST(CopyLossTest, SameViewHasLowerLossThanAnother) {
   other.colors = view.colors;
   const torch::Tensor weights = torch::ones({3});
   CopyLossOptions options;
-  options.match_sigma_px = 1.0;  // the very cell
+  options.match_sigma_px = 1.0;  // the cell itself
   Random random(1);
   const CopyLosses same = CopyColors(TwoTaps(), view, view, SamePlaces(), weights, options, random);
   const CopyLosses wrong =

@@ -7,7 +7,7 @@ namespace color3d {
 namespace {
 
 constexpr double kMinSidePx = 8.0;
-constexpr double kMaxStepPx = 1.4;  // of the photo between samples, so that nothing is skipped
+constexpr double kMaxStepPx = 1.4;  // maximum distance of samples in the photo
 
 }  // namespace
 
@@ -28,7 +28,7 @@ CropWindow RandomWindow(const BytePhoto& photo, const WindowOptions& options, Ra
   double height = std::clamp<double>(std::sqrt(area / aspect), kMinSidePx, photo.height);
   const double turn = options.max_turn * random.NextUniform(-1.0, 1.0);
   const double c = std::cos(turn), s = std::sin(turn);
-  // Made smaller until the turned window fits.
+  // Shrinks until the rotated window fits.
   const auto box = [&] {
     return std::array<double, 2>{width * c + height * std::abs(s),
                                  width * std::abs(s) + height * c};

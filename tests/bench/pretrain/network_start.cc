@@ -19,7 +19,7 @@ constexpr double kLeastShare = 1e-6;
 const WeightArray& Find(const WeightMap& weights, const std::string& name) {
   const auto found = weights.find(name);
   if (found == weights.end()) {
-    throw InvalidArgument("the weights to start from lack {}", name);
+    throw InvalidArgument("the initial weights lack {}", name);
   }
   return found->second;
 }
@@ -51,7 +51,7 @@ std::unique_ptr<ConvNext> NewEncoder(const ConvNextConfig& config, uint64_t seed
 std::vector<ColorHistogram::Bin> BinsOf(const WeightMap& weights, const ColorHistogram& histogram) {
   const WeightArray& array = Find(weights, "color_bins");
   if (array.shape.size() != 2 || array.shape[0] < 1 || array.shape[1] != 2) {
-    throw InvalidArgument("color_bins of the weights to start from are no list of (a, b)");
+    throw InvalidArgument("color_bins of the initial weights is not a list of (a, b)");
   }
   const std::vector<ColorHistogram::Bin> counted = histogram.Bins(0.0);
   std::vector<ColorHistogram::Bin> bins;
@@ -74,12 +74,12 @@ void CopyWeights(const WeightMap& weights, const NamedTensors& tensors) {
     if (!name.starts_with("encoder.") && !name.starts_with("color_head.")) continue;
     const WeightArray& array = Find(weights, name);
     if (array.shape != tensor.sizes().vec()) {
-      throw InvalidArgument("{} of the weights to start from has another shape", name);
+      throw InvalidArgument("{} of the initial weights has another shape", name);
     }
     const torch::Tensor plain = torch::empty(array.shape);
     std::memcpy(plain.data_ptr<float>(), array.values.data(), array.values.size() * sizeof(float));
     if (!torch::isfinite(plain).all().item<bool>()) {
-      throw InvalidArgument("{} of the weights to start from is not finite", name);
+      throw InvalidArgument("{} of the initial weights is not finite", name);
     }
     torch::Tensor target = tensor;
     target.copy_(plain);

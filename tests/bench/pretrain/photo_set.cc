@@ -13,14 +13,14 @@ namespace color3d {
 namespace {
 
 constexpr WindowOptions kAlone;  // for single crops
-// For pairs: colours are copied from the first.
+// For pairs, whose colours are copied from the first crop.
 constexpr WindowOptions kFirst = {.min_area = 0.3, .max_turn = 0.15};
 constexpr WindowOptions kSecond = {.min_area = 0.15, .max_aspect = 1.6, .max_turn = 0.25};
 constexpr double kMirroredPairs = 0.15;
 constexpr int64_t kMaxFramesApart = 20;
 constexpr int kCellPx = 4;
 
-// Degrades a modern photo to a scan of a film: tone curve, softness, grain.
+// Degrades a digital photo to a scan of film: tone curve, blur, grain.
 void Degrade(Image& luminance, Random& random) {
   const double gamma = std::exp(random.NextUniform(-0.3, 0.3));
   const double gain = random.NextUniform(0.85, 1.05);

@@ -70,7 +70,7 @@ TEST_F(PhotoSetTest, MatchesOfPairShowSamePlace) {
     mirrored += to_the_right(pair.first.srgb) != to_the_right(pair.second.srgb) ? 1 : 0;
   }
   EXPECT_GT(known, 1000);
-  EXPECT_LT(mirrored, 10);  // the world is not: one of seven
+  EXPECT_LT(mirrored, 10);  // mirror images are one of seven
 }
 
 TEST_F(PhotoSetTest, PairsFramesOfClips) {
@@ -94,7 +94,7 @@ TEST_F(PhotoSetTest, PairsFramesOfClips) {
     }
     unknown += known ? 0 : 1;
   }
-  // Three of four pairs are the clip's, two of three of those of unlike frames.
+  // Three of four pairs are from the clip, and two of three of these from different frames.
   EXPECT_GT(across, 20);
   EXPECT_LT(unknown, 70);
 }

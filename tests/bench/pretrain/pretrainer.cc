@@ -64,7 +64,7 @@ Pretrainer::Pretrainer(const PretrainOptions& options,
       random_(options.seed, 1),
       encoder_(NewEncoder(ConvNextConfig(), options.seed)),
       started_(start != nullptr) {
-  // Moments and soft targets run into denormal numbers, which made a step four times as slow.
+  // Denormal numbers in moments and soft targets make a step four times as slow.
   at::globalContext().setFlushDenormal(true);
   ColorHistogram histogram;
   Random counting(options.seed, 2);
@@ -189,7 +189,7 @@ void Pretrainer::Distill(const std::vector<torch::Tensor>& taps,
                   (teacher_deviation_[i].view({1, -1, 1, 1}) + 1e-3 * teacher_deviation_[i].mean()))
                      .clamp(-4.0, 4.0);
     }
-    // The teacher pads nothing: its cell i lies on the corner between our cells i and i + 1.
+    // The teacher does not pad: its cell i lies on the corner between our cells i and i + 1.
     const torch::Tensor aligned = torch::avg_pool2d(students[i], {2, 2}, {1, 1});
     const torch::Tensor predicted = torch::conv2d(aligned, matches[i]);
     const int64_t rows = std::min(predicted.size(2), standard.size(2));

@@ -1,7 +1,6 @@
 // Pre-training of the embedded encoder and its colour head: automatic colourization as
-// classification (Zhang, Isola & Efros 2016), beside distillation of a teacher's features into the
-// taps and a loss that makes the taps good at copying colours (copy_loss.h). Torch in the
-// interface. Not thread-safe.
+// classification (Zhang, Isola & Efros 2016), distillation of a teacher's features into the taps,
+// and a loss of copied colours (copy_loss.h). Torch in the interface. Not thread-safe.
 #pragma once
 
 #include <torch/types.h>
@@ -69,7 +68,7 @@ class Pretrainer {
 
   // Saves and restores the whole state. A resumed run has the same result.
   std::string Checkpoint(const std::string& notes_json) const;
-  // Returns the notes. Throws Error{kInvalidArgument} when the bytes are damaged or of another
+  // Returns the notes. Throws Error{kInvalidArgument} if the bytes are damaged or of another
   // network.
   std::string Restore(std::string_view bytes);
 
@@ -80,7 +79,7 @@ class Pretrainer {
  private:
   // Everything that a checkpoint holds besides numbers; storage is shared.
   NamedTensors State() const;
-  // A batch; of pairs, the first views and then the second ones.
+  // A batch. In batches of pairs the first views precede the second ones.
   struct Batch {
     std::vector<TrainingCrop> crops;
     std::vector<Image> matches;  // empty without pairs
@@ -88,7 +87,7 @@ class Pretrainer {
   Batch NextBatch(double progress);
   PretrainLosses Losses(const Batch& batch, torch::Tensor& total);
   torch::Tensor Stack(const std::vector<TrainingCrop>& crops, Image TrainingCrop::*member) const;
-  // Shares of the bins for the mean colour of each cell, which is one of the head's too:
+  // Shares of the bins for the mean colour of each cell, the same cells as those of the head:
   // [B, cells, K].
   torch::Tensor SoftBins(const torch::Tensor& ab) const;
   torch::Tensor ColorLoss(const torch::Tensor& logits, const torch::Tensor& colors) const;

@@ -21,7 +21,7 @@ class PretrainerTest : public testing::Test {
               testing::UnitTest::GetInstance()->current_test_info()->name();
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
-    // Blue above, green below, at several tones.
+    // Blue above green, in several tones.
     for (int i = 0; i < 3; ++i) {
       Image photo(80, 64, 3);
       for (int y = 0; y < 64; ++y) {

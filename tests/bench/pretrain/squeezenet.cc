@@ -17,7 +17,8 @@ class WireReader {
  public:
   explicit WireReader(std::string_view bytes) : bytes_(bytes) {}
 
-  // The next field; false at the end. Numbers are in `number`, everything else in `payload`.
+  // Reads the next field; returns false at the end. Numbers are in `number`, other fields in
+  // `payload`.
   bool Next() {
     if (position_ >= bytes_.size()) return false;
     const uint64_t key = Varint();
@@ -36,7 +37,7 @@ class WireReader {
         payload = Take(4);
         break;
       default:
-        throw InvalidArgument("the teacher is no ONNX model");
+        throw InvalidArgument("the teacher is not an ONNX model");
     }
     return true;
   }
@@ -53,10 +54,10 @@ class WireReader {
       value |= static_cast<uint64_t>(byte & 127u) << shift;
       if (byte < 128) return value;
     }
-    throw InvalidArgument("the teacher is no ONNX model, or cut short");
+    throw InvalidArgument("the teacher is not an ONNX model, or truncated");
   }
   std::string_view Take(uint64_t size) {
-    if (size > bytes_.size() - position_) throw InvalidArgument("the teacher is cut short");
+    if (size > bytes_.size() - position_) throw InvalidArgument("the teacher file is truncated");
     const std::string_view part = bytes_.substr(position_, size);
     position_ += size;
     return part;
@@ -101,7 +102,7 @@ SqueezeNet::SqueezeNet(const std::filesystem::path& onnx_file) {
     }
   }
   if (!weights_.contains("conv10_w_0")) {
-    throw InvalidArgument("{} holds no SqueezeNet 1.1 (no conv10_w_0)", onnx_file.string());
+    throw InvalidArgument("{} is not SqueezeNet 1.1: it has no conv10_w_0", onnx_file.string());
   }
 }
 

@@ -14,7 +14,7 @@ namespace color3d {
 class SqueezeNet {
  public:
   // Reads the initialisers (float16 or float32) of the file; ignores its graph. Throws
-  // Error{kInvalidArgument} if one is missing or the file is no ONNX model.
+  // Error{kInvalidArgument} if one is missing or the file is not an ONNX model.
   explicit SqueezeNet(const std::filesystem::path& onnx_file);
 
   void MoveTo(torch::Device device);
@@ -28,8 +28,8 @@ class SqueezeNet {
   };
   // `srgb` [B,3,H,W] in 0..1, at least 32 px.
   Features Run(const torch::Tensor& srgb) const;
-  // Feature maps at strides 2, 4, 8, 16 with H / stride cells (H, W multiples of 16): borders are
-  // padded on alternating sides, so that no cell is off its place by more than 2.5 px.
+  // Feature maps at strides 2, 4, 8, 16 with H / stride cells (H, W multiples of 16). Borders are
+  // padded on alternating sides, so that cells are displaced by at most 2.5 px.
   std::vector<torch::Tensor> AlignedTaps(const torch::Tensor& srgb) const;
 
  private:

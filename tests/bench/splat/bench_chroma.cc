@@ -1,5 +1,5 @@
-// color3d-bench chroma: the chroma solvers on one geometry and the true chroma of the training
-// views, error against seconds of solving.
+// color3d-bench chroma: error against seconds of the chroma solvers, on one geometry with the true
+// chroma of the training views.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -43,10 +43,10 @@ struct ChromaArguments {
   ChromaOptions chroma{.iterations = 600};
 };
 
-// Of all threads: what is left of a timing on a machine that others use too.
+// CPU time of all threads, which a busy machine disturbs less than wall time.
 double CpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-// Keeps the curves of the solver itself, with the seconds of solving.
+// Records the curves of the solver over its own time.
 class SolverCurves : public NullObserver {
  public:
   explicit SolverCurves(std::function<double()> seconds) : seconds_(std::move(seconds)) {}
@@ -103,7 +103,7 @@ class ChromaBench {
         if (name == "adam-preset") options.iterations = args_.preset_iterations;
         if (!adam && name != "closed" && name != "cg") {
           throw InvalidArgument("--runs: \"" + name +
-                                "\" is none of closed, cg, adam-preset, adam");
+                                "\" is not one of closed, cg, adam-preset, adam");
         }
         result["runs"].push_back(RunOne(name, options));
       }
@@ -238,28 +238,43 @@ void RunChromaBench(const ChromaArguments& args) {
 void AddChromaCommand(CLI::App& app) {
   auto args = std::make_shared<ChromaArguments>();
   CLI::App* command = app.add_subcommand(
-      "chroma", "the chroma solvers on one geometry: errors against seconds of solving");
-  command->add_option("--scene", args->scene_folder)->required();
-  command->add_option("--max-side", args->max_side_px, "px");
-  command->add_option("--threads", args->threads);
-  command->add_option("--max-gaussians", args->geometry.max_gaussians);
-  command->add_option("--geometry-iterations", args->geometry.iterations);
+      "chroma", "Measure error against seconds of the chroma solvers on one geometry");
+  command
+      ->add_option("--scene", args->scene_folder, "Folder of colour photos, with or without poses")
+      ->required();
+  command->add_option("--max-side", args->max_side_px, "Longer side of the working pictures, px");
+  command->add_option("--threads", args->threads, "Number of threads");
   command->add_option(
-      "--geometry", args->geometry_file, "native file: read when it exists, else written");
-  command->add_option("--runs", args->runs, "any of closed,cg,adam-preset,adam");
-  command->add_option("--degrees", args->degrees, "chroma SH degrees, 0 and 1")->delimiter(',');
-  command->add_option("--adam-iterations", args->adam_iterations, "of run adam");
-  command->add_option("--preset-iterations", args->preset_iterations, "of run adam-preset");
-  command->add_option("--iterations", args->chroma.iterations, "of run cg, at most");
-  command->add_option("--sweeps", args->chroma.sweeps);
-  command->add_option("--rounds", args->chroma.rounds);
-  command->add_option("--steps", args->chroma.steps_per_round);
-  command->add_option("--residual-tolerance", args->chroma.residual_tolerance);
-  command->add_option("--objective-tolerance", args->chroma.objective_tolerance);
-  command->add_option("--tikhonov", args->chroma.tikhonov);
-  command->add_option("--tikhonov-rest", args->chroma.tikhonov_rest);
-  command->add_option("--memory-budget-mib", args->memory_budget_mib);
-  command->add_option("--json", args->json_file, "default: standard output");
+      "--max-gaussians", args->geometry.max_gaussians, "Maximum number of Gaussians");
+  command->add_option("--geometry-iterations",
+                      args->geometry.iterations,
+                      "Training iterations of the luminance Gaussians");
+  command->add_option(
+      "--geometry", args->geometry_file, "Geometry file; read if it exists, else written");
+  command->add_option("--runs", args->runs, "Solvers: any of closed,cg,adam-preset,adam");
+  command->add_option("--degrees", args->degrees, "Degrees of the chroma harmonics: 0, 1")
+      ->delimiter(',');
+  command->add_option("--adam-iterations", args->adam_iterations, "Iterations of adam");
+  command->add_option("--preset-iterations", args->preset_iterations, "Iterations of adam-preset");
+  command->add_option(
+      "--iterations", args->chroma.iterations, "Maximum number of iterations of cg");
+  command->add_option("--sweeps", args->chroma.sweeps, "Sweeps over ordered subsets");
+  command->add_option("--rounds", args->chroma.rounds, "Maximum number of rounds of reweighting");
+  command->add_option("--steps",
+                      args->chroma.steps_per_round,
+                      "Maximum number of conjugate gradient steps per round");
+  command->add_option("--residual-tolerance",
+                      args->chroma.residual_tolerance,
+                      "Relative residual at which a round ends");
+  command->add_option("--objective-tolerance",
+                      args->chroma.objective_tolerance,
+                      "Relative improvement at which the solver ends");
+  command->add_option("--tikhonov", args->chroma.tikhonov, "Pull towards the start, in pixels");
+  command->add_option("--tikhonov-rest", args->chroma.tikhonov_rest, "The same above degree 0");
+  command->add_option(
+      "--memory-budget-mib", args->memory_budget_mib, "Memory for blending weights, MiB");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] { RunChromaBench(*args); });
 }
 

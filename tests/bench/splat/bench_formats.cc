@@ -30,7 +30,7 @@ struct FileView {
   Pose cam_from_file;
 };
 
-// The scene's cameras in the frame of its files.
+// Cameras of the scene in the coordinates of its files.
 std::vector<FileView> ViewsOf(const Scene& scene, int max_side_px) {
   const ExportFrame frame = ExportFrameOf(scene);
   std::vector<FileView> views;
@@ -101,16 +101,17 @@ void RunFormats(const FormatArguments& args) {
 
 void AddFormatsCommand(CLI::App& app) {
   auto args = std::make_shared<FormatArguments>();
-  CLI::App* command = app.add_subcommand(
-      "formats",
-      "files for viewers: bytes, seconds, and what their renders lose against the PLY's");
-  command->add_option("--ply", args->ply_file, "a scene's scene.ply")->required();
-  command->add_option("--scene", args->scene_file, "its scene.json: whose views are rendered")
+  CLI::App* command =
+      app.add_subcommand("formats", "Measure size, time and quality of the files for viewers");
+  command->add_option("--ply", args->ply_file, "scene.ply of a scene")->required();
+  command
+      ->add_option("--scene", args->scene_file, "scene.json of the scene, whose views are rendered")
       ->required();
   command->add_option(
-      "--other", args->others, "further PLY files to compare: what other tools made of ours");
-  command->add_option("--out", args->folder, "where the files go; default: nowhere");
-  command->add_option("--json", args->json_file, "default: standard output");
+      "--other", args->others, "Additional PLY files to compare, converted by other tools");
+  command->add_option("--out", args->folder, "Folder for the files; default: none");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] { RunFormats(*args); });
 }
 

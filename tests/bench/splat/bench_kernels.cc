@@ -12,7 +12,7 @@ namespace {
 
 using Step = void (SyntheticIteration::*)();
 
-// Runs one iteration for the state that the step needs, then measures the step alone.
+// Runs one iteration to set up the state of the step, then measures the step alone.
 void MeasureStep(benchmark::State& state, Step step) {
   SyntheticLoad load;
   load.gaussians = static_cast<int>(state.range(0));
@@ -36,15 +36,15 @@ void MeasurePenalties(benchmark::State& state) {
   for (auto _ : state) AddPenaltyGradients(p, 0.01f, 0.01f, pool, gradient);
 }
 
-// Moving Gaussians to a moment, and the adjoint.
+// Moves Gaussians to a time, and computes the adjoint.
 void MeasureMotion(benchmark::State& state) {
   constexpr float kMoment = 0.3f;
   ThreadPool pool(1);
   const ParameterBlock moving(kColorRow + 1 + kMotionRows, state.range(0));
   ParameterBlock at(kColorRow + 1, state.range(0)), gradient;
   for (auto _ : state) {
-    ApplyMotion(moving, kColorRow + 1, kMoment, 0, pool, at);
-    ApplyMotionBackward(moving, kColorRow + 1, kMoment, 0, at, at, pool, gradient);
+    ApplyMotion({moving, kColorRow + 1, kMoment, 0}, pool, at);
+    ApplyMotionBackward({moving, kColorRow + 1, kMoment, 0}, at, at, pool, gradient);
   }
 }
 

@@ -1,4 +1,4 @@
-// color3d-bench rasterize: how the cost of a training iteration grows, on synthetic loads.
+// color3d-bench rasterize: growth of the cost of a training iteration on synthetic loads.
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -88,8 +88,8 @@ Json Measure(const SyntheticLoad& load, int threads, int repeats) {
   return result;
 }
 
-// ms ~ Gaussians^p * covered^q, where covered is the pixels that one Gaussian covers on average: p
-// and q by least squares of the logarithms. Linear in the product: both 1 or less.
+// Fits ms ~ Gaussians^p * covered^q by least squares of the logarithms, where covered is the mean
+// number of pixels that a Gaussian covers. At most linear growth: p and q are 1 or less.
 struct Exponents {
   double gaussians = 0.0;
   double covered = 0.0;
@@ -117,7 +117,7 @@ Exponents FitExponents(const std::vector<Json>& results) {
   return {(at * bb - bt * ab) / det, (bt * aa - at * ab) / det};
 }
 
-// Bytes that training holds per Gaussian, and per (Gaussian, tile) pair of the picture in work.
+// Bytes of training per Gaussian, and per (Gaussian, tile) pair of the current picture.
 Json MemoryPerGaussian(int channels) {
   const int row_bytes = 4 * (kColorRow + 16 * channels);
   const int statistics_bytes = 3 * 4;
@@ -233,13 +233,18 @@ void RunRasterize(const RasterizeArguments& args) {
 
 void AddRasterizeCommand(CLI::App& app) {
   auto args = std::make_shared<RasterizeArguments>();
-  CLI::App* command = app.add_subcommand(
-      "rasterize", "cost of an iteration's parts against Gaussians, picture size and threads");
-  command->add_flag("--quick", args->quick, "only up to 100 000 Gaussians and 512 px");
-  command->add_option("--repeats", args->repeats, "iterations of each load; the median counts")
+  CLI::App* command = app.add_subcommand("rasterize",
+                                         "Measure the parts of a training iteration against number "
+                                         "of Gaussians, picture size and threads");
+  command->add_flag("--quick", args->quick, "Only up to 100,000 Gaussians and 512 px");
+  command
+      ->add_option(
+          "--repeats", args->repeats, "Number of iterations per load, of which the median counts")
       ->check(CLI::Range(1, 1000));
   command->add_option(
-      "--json", args->json_file, "default: standard output; with it a table is printed");
+      "--json",
+      args->json_file,
+      "File for the result (JSON), which also prints a table; default: standard output");
   command->callback([args] { RunRasterize(*args); });
 }
 

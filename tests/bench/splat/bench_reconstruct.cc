@@ -1,5 +1,5 @@
-// color3d-bench reconstruct: geometry alone, on true colours or on luminance; quality of held-out
-// views against seconds of training, and where the seconds go.
+// color3d-bench reconstruct: trains geometry on true colours or luminance. Measures quality of
+// held-out views against seconds of training, and seconds by part.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -36,12 +36,12 @@ struct ReconstructArguments {
   int threads = 2;
   TrainingColors colors = TrainingColors::kSrgb;
   std::string imported_file;  // scene.json of an earlier import
-  std::string geometry_file;  // gets the model
-  std::string moving_folder;  // what moves on its own in each view, as an import leaves it
-  int score_side_px = 500;    // beside the size trained on
+  std::string geometry_file;  // output
+  std::string moving_folder;  // moving regions of each view, as written by import
+  int score_side_px = 500;    // beside the size of training
   std::string set_aside;      // "K/N"
-  bool capped = false;        // as the service caps
-  double dense = 0.0;         // share of the Gaussians to begin with
+  bool capped = false;        // as in the service
+  double dense = 0.0;         // share of the initial Gaussians
   DensePointsOptions dense_points;
   GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
 };
@@ -63,7 +63,7 @@ void UsePreset(const std::string& name, ReconstructArguments& args) {
   }
 }
 
-// "name=value", for measuring other schedules than the defaults.
+// Sets "name=value" of a schedule other than the default.
 void Apply(const std::string& setting, GeometryTuning& tuning) {
   const size_t equals = setting.find('=');
   const std::string name = setting.substr(0, equals);
@@ -91,7 +91,7 @@ GeometryOptions OptionsFrom(const ReconstructArguments& args) {
   return options;
 }
 
-// The truth on the left, what was drawn on the right.
+// The truth on the left, the render on the right.
 Image SideBySide(const Image& left, const Image& right) {
   Image both(left.width + right.width, left.height, left.channels);
   for (int c = 0; c < both.channels; ++c) {
@@ -104,7 +104,7 @@ Image SideBySide(const Image& left, const Image& right) {
   return both;
 }
 
-// 3 channels of sRGB, or L' 0..1 as grey of that lightness.
+// 3 channels of sRGB, or L' in 0..1 as grey.
 Image Truth(const ViewImages& images, int view, TrainingColors colors) {
   if (colors == TrainingColors::kSrgb) return images.Srgb(view);
   Image luminance = *images.Luminance(view);
@@ -151,8 +151,8 @@ Scene SceneOf(const ReconstructArguments& args, const RunControl& run) {
   return ImportScene(args.scene_folder, scratch.path(), import_options, run).scene;
 }
 
-// "K/N": every N-th training view from the K-th on is held out in place of the scene's own
-// held-out views, which nobody sees then. Constants are chosen on such views.
+// "K/N": holds out every N-th training view from the K-th on, in place of the scene's own held-out
+// views, which are then unused. For the choice of constants.
 void SetAside(const std::string& fold, Scene& scene) {
   int k = 0, n = 0;
   if (std::sscanf(fold.c_str(), "%d/%d", &k, &n) != 2 || k < 0 || k >= n) {
@@ -184,8 +184,8 @@ std::vector<Camera> TrainingCameras(const Scene& scene) {
   return cameras;
 }
 
-// Mean over pictures drawn at the size trained on, after both were reduced to `side_px`: presets of
-// different sizes are comparable so.
+// Mean over renders at the size of training, after render and truth were reduced to `side_px`, so
+// that presets of different sizes are comparable.
 class ReducedScore {
  public:
   explicit ReducedScore(int side_px) : side_px_(side_px) {}
@@ -210,7 +210,7 @@ class ReducedScore {
   double sum_ssim_ = 0.0;
 };
 
-// What the import saw of each view to stand still; empty where no folder is given.
+// Background of each view according to import; empty without a folder.
 PictureSource StillRegionsOf(const std::string& folder,
                              const Scene& scene,
                              const ViewImages& images) {
@@ -222,7 +222,7 @@ PictureSource StillRegionsOf(const std::string& folder,
   };
 }
 
-// dB of what moves and of what stands still, over all pictures.
+// PSNR of foreground and background over all pictures, dB.
 class ScoreByMotion {
  public:
   void Add(const Image& truth, const Image& drawn, const Image& still) {
@@ -317,59 +317,74 @@ void RunReconstruct(ReconstructArguments args) {
 void AddReconstructCommand(CLI::App& app) {
   auto args = std::make_shared<ReconstructArguments>();
   CLI::App* command = app.add_subcommand(
-      "reconstruct", "geometry of a posed scene: quality of every eighth view against seconds");
-  command->add_option("--scene", args->scene_folder)->required();
-  command->add_option("--max-side", args->max_side_px, "px");
+      "reconstruct", "Measure quality of held-out views against seconds of training geometry");
+  command->add_option("--scene", args->scene_folder, "Scene folder with poses")->required();
+  command->add_option("--max-side", args->max_side_px, "Longer side of the working pictures, px");
   command
       ->add_option_function<std::string>(
           "--preset",
           [args](const std::string& name) { UsePreset(name, *args); },
-          "fast, best or paper; options that follow it override its values")
+          "Preset: fast, best or paper; later options override its values")
       ->check(CLI::IsMember({"fast", "best", "paper"}))
       ->trigger_on_parse();
-  command->add_option("--threads", args->threads);
+  command->add_option("--threads", args->threads, "Number of threads");
   command->add_option("--imported", args->imported_file, "scene.json of an earlier import");
   command->add_option("--moving",
                       args->moving_folder,
-                      "what moves on its own, as the import of a film with poses leaves it");
-  command->add_option("--geometry", args->geometry_file, "gets the model");
+                      "Folder of moving regions, as written by the import of a film with poses");
+  command->add_option("--geometry", args->geometry_file, "File for the model");
   command->add_option(
-      "--score-side", args->score_side_px, "px; scores at this size, too, of reduced pictures");
+      "--score-side", args->score_side_px, "Also score pictures reduced to this longer side, px");
   command->add_option("--hold-out-training",
                       args->set_aside,
-                      "K/N: scores every N-th training view, from the K-th on, and trains on the "
-                      "others; the scene's held-out views are left out");
-  command->add_option("--dense", args->dense, "share of the Gaussians that plane sweeps give");
-  command->add_option("--depth-side", args->dense_points.depth_side_px, "px, of the plane sweeps");
-  command->add_option("--depth-tolerance", args->dense_points.tolerance, "relative");
-  command->add_option("--depth-agreeing", args->dense_points.agreeing);
-  command->add_option("--depth-sources", args->dense_points.depth_sources);
-  command->add_option("--depth-planes", args->dense_points.sweep.planes);
+                      "K/N: score every N-th training view from the K-th on, train on the others, "
+                      "and ignore the scene's held-out views");
+  command->add_option("--dense", args->dense, "Share of the initial Gaussians from plane sweeps");
+  command->add_option(
+      "--depth-side", args->dense_points.depth_side_px, "Longer side of the plane sweeps, px");
+  command->add_option("--depth-tolerance",
+                      args->dense_points.tolerance,
+                      "Maximum relative difference of agreeing depths");
+  command->add_option(
+      "--depth-agreeing", args->dense_points.agreeing, "Number of neighbours that must agree");
+  command->add_option(
+      "--depth-sources", args->dense_points.depth_sources, "Number of neighbours per plane sweep");
+  command->add_option("--depth-planes", args->dense_points.sweep.planes, "Number of planes");
   command->add_flag(
-      "--cap", args->capped, "Gaussians and iterations by the photos, as the service");
+      "--cap", args->capped, "Limit Gaussians and iterations by the photos, as the service does");
   command->add_flag_callback(
       "--still",
       [args] { args->geometry.motion = GeometryOptions::Motion::kStill; },
-      "nothing is taken to move");
-  command->add_option("--colours", args->colors, "truth (RGB, the default) or luminance")
+      "Treat the scene as static");
+  command
+      ->add_option("--colors,--colours",
+                   args->colors,
+                   "Colours to train on: truth (RGB, the default) or luminance")
       ->transform(CLI::Transformer(std::map<std::string, TrainingColors>{
           {"truth", TrainingColors::kSrgb}, {"luminance", TrainingColors::kLuminance}}));
-  CLI::Option* iterations = command->add_option("--iterations", args->geometry.iterations);
+  CLI::Option* iterations =
+      command->add_option("--iterations", args->geometry.iterations, "Number of iterations");
   command
       ->add_option("--seconds",
                    args->geometry.time_limit_seconds,
-                   "of training; the schedule is planned to fit")
+                   "Duration of training, s; the schedule is fitted to it")
       ->check(CLI::Range(0.0, 86'400.0));
-  command->add_option("--max-gaussians", args->geometry.max_gaussians);
-  command->add_option("--sh-degree", args->geometry.sh_degree);
-  command->add_option("--densify-gradient", args->geometry.densify_gradient, "NDC units");
-  command->add_option("--edge-weight", args->geometry.edge_weight);
-  command->add_option("--ssim-weight", args->geometry.ssim_weight);
-  command->add_option("--seed", args->geometry.seed);
-  command->add_option("--set", args->settings, "name=value of the schedule (GeometryTuning)");
   command->add_option(
-      "--pictures", args->pictures_folder, "held-out and training views: truth, drawn");
-  command->add_option("--json", args->json_file, "default: standard output");
+      "--max-gaussians", args->geometry.max_gaussians, "Maximum number of Gaussians");
+  command->add_option("--sh-degree", args->geometry.sh_degree, "Degree of the harmonics");
+  command->add_option("--densify-gradient",
+                      args->geometry.densify_gradient,
+                      "Gradient from which Gaussians are densified, NDC units");
+  command->add_option("--edge-weight", args->geometry.edge_weight, "Weight of the edge loss");
+  command->add_option("--ssim-weight", args->geometry.ssim_weight, "Weight of SSIM");
+  command->add_option("--seed", args->geometry.seed, "Seed");
+  command->add_option(
+      "--set", args->settings, "NAME=VALUE of the schedule (GeometryTuning); may be repeated");
+  command->add_option("--pictures",
+                      args->pictures_folder,
+                      "Folder for pictures of held-out and training views: truth and render");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args, iterations] {
     if (args->geometry.time_limit_seconds > 0.0 && iterations->count() == 0) {
       args->geometry.iterations = 100'000;  // the most: time alone drives the schedule

@@ -1,5 +1,5 @@
-// `splat-views`: how a splat becomes a scene. What is lost in grey, and whether the chosen views
-// are like those that it was made from.
+// color3d-bench splat-views: loss of a splat in grey, and similarity of the chosen views to those
+// that the splat was trained on.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <chrono>
@@ -57,7 +57,7 @@ Image Sheet(const std::vector<Image>& pictures) {
   return sheet;
 }
 
-// Of renders with equal luminance, so of chroma alone; the mean over pixels.
+// Mean difference over the pixels of renders with equal luminance, i.e. of chroma alone.
 double MeanDifference(const Image& truth, const Image& chroma) {
   Image lab = LabFromSrgb(truth);
   const Image other = LabFromSrgb(chroma);
@@ -70,7 +70,7 @@ double MeanDifference(const Image& truth, const Image& chroma) {
   return sum / static_cast<double>(lab.PlaneSize());
 }
 
-// The splat's own colours are the truth; `colored`: what came back for its grey twin.
+// The colours of the splat are the truth; `colored`: the result for its grey copy.
 nlohmann::ordered_json CompareColors(const ViewerGaussians& truth,
                                      const ViewerGaussians& colored,
                                      const SplatScene& splat,
@@ -92,13 +92,13 @@ nlohmann::ordered_json CompareColors(const ViewerGaussians& truth,
   return {{"delta_e00_chroma", error / count}, {"delta_e00_chroma_gray", gray_error / count}};
 }
 
-// Against the cameras of the photos that the splat was trained on.
+// Compares with the cameras of the photos that the splat was trained on.
 nlohmann::ordered_json CompareWithCapture(const SplatScene& splat,
                                           const Scene& capture,
                                           ThreadPool& pool) {
   const Scene& scene = splat.scene;
   SeenGaussians seen(splat.geometry, scene.views.at(0).camera, pool);
-  // Upright cameras have level right axes, however they are pitched.
+  // Upright cameras have level right axes at any pitch.
   Eigen::Matrix3d rights = Eigen::Matrix3d::Zero(), chosen_rights = Eigen::Matrix3d::Zero();
   double captured = 0.0, chosen = 0.0;
   std::vector<Eigen::Vector3d> forward;
@@ -191,15 +191,18 @@ void RunSplatViews(const SplatViewArguments& args) {
 void AddSplatViewsCommand(CLI::App& app) {
   auto args = std::make_shared<SplatViewArguments>();
   CLI::App* command = app.add_subcommand(
-      "splat-views", "a splat as a scene: the views that are chosen, and what is lost in grey");
-  command->add_option("--splat", args->splat_file, "PLY, SOG or SPZ")->required();
-  command->add_option("--scene", args->scene_file, "scene.json of the photos it was made from");
+      "splat-views", "Measure the views chosen for a splat, and its loss in grey");
+  command->add_option("--splat", args->splat_file, "Splat file (PLY, SOG or SPZ)")->required();
   command->add_option(
-      "--colored", args->colored_file, "what `color3d colorize` made of the splat's grey twin");
-  command->add_option("--views", args->options.views)->capture_default_str();
-  command->add_option("--side", args->options.side_px)->capture_default_str();
-  command->add_option("--out", args->folder, "where the views go; default: nowhere");
-  command->add_option("--json", args->json_file, "default: standard output");
+      "--scene", args->scene_file, "scene.json of the photos that the splat was trained on");
+  command->add_option(
+      "--colored", args->colored_file, "Result of `color3d colorize` for the splat's grey copy");
+  command->add_option("--views", args->options.views, "Number of views")->capture_default_str();
+  command->add_option("--side", args->options.side_px, "Longer side of the views, px")
+      ->capture_default_str();
+  command->add_option("--out", args->folder, "Folder for the views; default: none");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] { RunSplatViews(*args); });
 }
 

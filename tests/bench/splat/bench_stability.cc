@@ -1,4 +1,4 @@
-// color3d-bench stability: stiff and extreme cases of the splat engine against float64, and
+// color3d-bench stability: stiff and extreme cases of the splat engine, compared with float64, and
 // of the colorizer.
 #include <cmath>
 #include <cstdio>
@@ -106,11 +106,12 @@ void RunStability(const StabilityArguments& args) {
 void AddStabilityCommand(CLI::App& app) {
   auto args = std::make_shared<StabilityArguments>();
   CLI::App* command = app.add_subcommand(
-      "stability", "stiff and extreme cases of the splat engine and the colorizer");
-  command->add_option("--only", args->only, "cases whose \"group, name\" contains this");
-  command->add_flag("--fast", args->fast, "without the slow cases");
-  command->add_option("--threads", args->threads);
-  command->add_option("--json", args->json_file);
+      "stability", "Run stiff and extreme cases of the splat engine and the colorizer");
+  command->add_option("--only", args->only, "Only cases whose \"group, name\" contains this");
+  command->add_flag("--fast", args->fast, "Skip slow cases");
+  command->add_option("--threads", args->threads, "Number of threads");
+  command->add_option(
+      "--json", args->json_file, "File for the result (JSON); default: standard output");
   command->callback([args] { RunStability(*args); });
 }
 

@@ -60,7 +60,7 @@ SyntheticIteration::SyntheticIteration(const SyntheticLoad& load, int threads)
   parameters_ = RandomGaussians(load, camera_);
   moments_ = {ParameterBlock(parameters_.rows(), load.gaussians),
               ParameterBlock(parameters_.rows(), load.gaussians)};
-  learning_rates_.assign(parameters_.rows(), 1e-7f);  // the load stays what it is
+  learning_rates_.assign(parameters_.rows(), 1e-7f);  // keeps the load constant
   statistics_.Reset(load.gaussians);
   for (int c = 0; c < load.channels; ++c) {
     for (int y = 0; y < load.height_px; ++y) {
@@ -73,14 +73,14 @@ SyntheticIteration::SyntheticIteration(const SyntheticLoad& load, int threads)
 }
 
 void SyntheticIteration::Project() {
-  ProjectSplats(parameters_, color_, false, camera_, pool_, splats_);
+  ProjectSplats({parameters_, color_, camera_}, false, pool_, splats_);
 }
 void SyntheticIteration::Bin() {
   binner_.Bin(splats_, camera_.width, camera_.height, pool_, lists_);
 }
 void SyntheticIteration::Forward() {
   RasterizeForward(
-      splats_, lists_, kBlack, pool_, picture_, &transmittance_, nullptr, block_masks_);
+      splats_, lists_, kBlack, pool_, {picture_, &transmittance_, nullptr}, block_masks_);
 }
 void SyntheticIteration::Loss() {
   loss_.Evaluate(picture_, target_, nullptr, LossWeights(), pool_, d_picture_);
@@ -89,16 +89,12 @@ void SyntheticIteration::Backward() {
   RasterizeBackward(splats_, lists_, block_masks_, picture_, d_picture_, pool_, pair_gradient_);
 }
 void SyntheticIteration::ProjectBackward() {
-  ProjectSplatsBackward(parameters_,
-                        color_,
-                        camera_,
+  ProjectSplatsBackward({parameters_, color_, camera_},
                         splats_,
                         pair_gradient_,
                         lists_.first_pair,
-                        GradientScope::kAll,
                         pool_,
-                        gradient_,
-                        &statistics_);
+                        {GradientScope::kAll, gradient_, &statistics_});
 }
 void SyntheticIteration::Adam() {
   AdamStep(gradient_, learning_rates_, ++step_, pool_, parameters_, moments_);

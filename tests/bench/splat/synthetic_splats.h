@@ -1,5 +1,5 @@
-// A deterministic random scene and the steps of one training iteration on it, for measuring the
-// numeric kernels one by one.
+// A deterministic random scene and the steps of one training iteration on it, to measure the
+// numeric kernels separately.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ struct SyntheticLoad {
   int channels = 1;  // 1 or 3, each with degree 3 harmonics
 };
 
-// Gaussians fill the picture evenly; their size shrinks as they become more, so that each pixel is
-// covered by some tens of them, but not below a pixel.
+// Gaussians fill the picture evenly. Their size decreases with their number, down to a pixel, so
+// that some tens of them cover each pixel.
 class SyntheticIteration {
  public:
   SyntheticIteration(const SyntheticLoad& load, int threads);
@@ -36,8 +36,8 @@ class SyntheticIteration {
 
   int64_t VisibleGaussians() const;
   int64_t Pairs() const { return static_cast<int64_t>(lists_.pair_count()); }
-  // Pixels of the 4x4 blocks that a Gaussian reaches before the tile is opaque, over all Gaussians.
-  // Draws the picture again.
+  // Number of pixels of the 4x4 blocks that Gaussians reach before the tile is opaque, summed over
+  // all Gaussians. Renders the picture again.
   int64_t CoveredPixels();
 
  private:

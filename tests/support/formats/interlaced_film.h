@@ -1,4 +1,4 @@
-// Films of two fields a frame, as video cameras and broadcasters made them, by FFmpeg's libraries.
+// Interlaced films (two fields per frame), encoded by FFmpeg's libraries.
 #pragma once
 
 #include <filesystem>
@@ -6,11 +6,10 @@
 
 namespace color3d {
 
-// Grey in 0..1 at a column of all lines of a field; 0: the even lines, which come first; 1: the
-// odd.
+// Grey in 0..1 of a column in all lines of a field. Field 0: even lines, shown first; 1: odd lines.
 using FieldGray = std::function<double(int frame, int field, int x)>;
 
-// MPEG-2 at 25 frames a second; the ending of `file` selects the container. Throws
+// Writes MPEG-2 at 25 frames per second; the ending of `file` selects the container. Throws
 // std::runtime_error.
 void WriteInterlacedFilm(
     const std::filesystem::path& file, int width, int height, int frames, const FieldGray& gray);

@@ -31,7 +31,7 @@ Image ToSrgb(const AVFrame& frame) {
                                          nullptr,
                                          nullptr);
   Require(converter != nullptr, "no conversion");
-  // What the file says of its colours is what counts.
+  // The tags of the file determine its colours.
   const int* matrix =
       sws_getCoefficients(frame.colorspace == AVCOL_SPC_BT709 ? SWS_CS_ITU709 : SWS_CS_ITU601);
   sws_setColorspaceDetails(converter,

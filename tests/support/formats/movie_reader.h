@@ -1,4 +1,4 @@
-// Frames of a movie as a player shows them: decoded and converted by FFmpeg's libraries.
+// Frames of a movie as shown by a player, decoded and converted by FFmpeg's libraries.
 #pragma once
 
 #include <filesystem>
@@ -16,13 +16,13 @@ struct ReadMovie {
   int height = 0;
   double seconds = 0.0;
   double frames_per_second = 0.0;
-  bool index_first = false;   // a browser can begin before it has all of the file
+  bool index_first = false;   // a browser can start before the download ends
   bool tagged_bt709 = false;  // primaries, transfer and matrix, limited range
   std::vector<double> times;  // of the frames, seconds
   std::vector<Image> frames;  // sRGB in 0..1, 3 channels
 };
 
-// Throws std::runtime_error when it cannot be decoded.
+// Throws std::runtime_error if the movie cannot be decoded.
 ReadMovie DecodeMovie(const std::filesystem::path& file);
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// Files as NumPy's np.save writes them.
+// Writer of NumPy files (np.save).
 #pragma once
 
 #include <cstring>

@@ -87,7 +87,7 @@ void Receive(AVCodecContext* codec, std::vector<Coded>* coded) {
   av_packet_free(&packet);
 }
 
-// B pictures move behind the one before them; a picture "as before" takes their place.
+// Each B picture moves into the packet before it, and leaves a "not coded" picture in its place.
 void Pack(std::vector<Coded>* coded) {
   for (size_t i = 1; i < coded->size(); ++i) {
     Coded& picture = (*coded)[i];
@@ -116,7 +116,7 @@ class Bits {
   void Align() {
     while (used_ % 8 != 0) Put(0, 1);
   }
-  // As a unit of the stream, behind its start code.
+  // A NAL unit with its start code.
   std::string Unit(int header) {
     Put(1, 1);
     Align();
@@ -161,7 +161,7 @@ std::string Parameters() {
   return sequence.Unit(0x67) + picture.Unit(0x68);
 }
 
-// A field of macroblocks that are not compressed (I_PCM).
+// A field of uncompressed macroblocks (I_PCM).
 std::string Field(int number, int place, bool is_bottom) {
   const bool is_key = place == 0 && !is_bottom;
   Bits field;

@@ -46,7 +46,7 @@ class TiffWriter {
     Put(&file_, 0, 4, big_);
   }
 
-  // Where its directory lies, and where its entry for the next one's place does.
+  // Offsets of the directory, and of its link to the next directory.
   std::pair<uint32_t, size_t> Write(const TiffPageToWrite& page) {
     std::vector<uint32_t> below;
     for (const TiffPageToWrite& sub : page.sub_directories) below.push_back(Write(sub).first);
@@ -298,7 +298,7 @@ std::string WithJpegProfile(const std::string& jpeg,
                             size_t part_bytes) {
   const size_t count = (profile.size() + part_bytes - 1) / part_bytes;
   std::string file = jpeg;
-  for (size_t i = count; i > 0; --i) {  // each goes to the front
+  for (size_t i = count; i > 0; --i) {  // each is inserted at the front
     std::string body("ICC_PROFILE\0", 12);
     body += static_cast<char>(i);
     body += static_cast<char>(count);
@@ -328,7 +328,7 @@ std::string DisplayP3Profile() {
 std::string GrayGammaProfile(double gamma) { return GrayProfile(cmsBuildGamma(nullptr, gamma)); }
 
 std::string DotGainProfile(double percent) {
-  // Ink on paper: what is printed as dots of 50 % covers more. The gain is a parabola.
+  // Dot gain: printed dots cover more than their nominal area. The gain is a parabola.
   std::vector<float> table(256);
   for (size_t i = 0; i < table.size(); ++i) {
     const double ink = 1.0 - static_cast<double>(i) / 255.0;

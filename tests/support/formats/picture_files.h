@@ -1,5 +1,5 @@
-// Pictures as other programs save them, for tests: formats that we only read, several pages, colour
-// profiles. Pure functions.
+// Pictures in formats that the product only reads, with several pages or colour profiles. Pure
+// functions.
 #pragma once
 
 #include <cstdint>
@@ -26,10 +26,10 @@ std::string TiffFile(const std::vector<TiffPageToWrite>& pages, bool big_endian 
 // 24-bit, rows from bottom to top as usual; with `profile` a BITMAPV5HEADER.
 std::string BmpFile(const Image& srgb, const std::string& profile = "");
 std::string WebpFile(const Image& srgb, const std::string& profile = "");
-// Empty where libheif or its encoder is missing.
+// Empty if libheif or its encoder is missing.
 std::string HeicFile(const Image& srgb, const std::string& profile = "", int bits = 8);
 
-// A chunk behind a PNG's header; a segment behind a JPEG's first.
+// Inserts a chunk after a PNG's header; a segment after a JPEG's first segment.
 std::string WithPngChunk(const std::string& png, const std::string& type, const std::string& body);
 std::string WithJpegSegment(const std::string& jpeg, int marker, const std::string& body);
 std::string WithPngProfile(const std::string& png, const std::string& profile);
@@ -43,9 +43,9 @@ std::string AdobeRgbProfile();
 std::string ProPhotoProfile();
 std::string DisplayP3Profile();
 std::string GrayGammaProfile(double gamma);
-std::string DotGainProfile(double percent);  // of dots of 50 %
+std::string DotGainProfile(double percent);  // gain of dots of 50 %
 std::string CmykProfile();
-// The image in the space of `profile`, 1 or 3 channels.
+// Converts the image, 1 or 3 channels, to the space of `profile`.
 Image ConvertToProfile(const Image& srgb, const std::string& profile);
 
 }  // namespace color3d

@@ -94,7 +94,7 @@ void AddSound(const std::filesystem::path& film,
   pictures->codecpar->codec_tag = 0;
   pictures->time_base = from->streams[0]->time_base;
   const AVCodec* encoder = avcodec_find_encoder_by_name(sound.encoder.c_str());
-  Require(encoder != nullptr, "no such encoder");
+  Require(encoder != nullptr, "the encoder is missing");
   AVCodecContext* codec = avcodec_alloc_context3(encoder);
   codec->sample_rate = sound.sample_rate;
   codec->sample_fmt = encoder->sample_fmts[0];

@@ -1,4 +1,4 @@
-// Films with sound, made and heard by FFmpeg's libraries.
+// Films with sound, written and read by FFmpeg's libraries.
 #pragma once
 
 #include <filesystem>
@@ -17,20 +17,20 @@ struct GivenSound {
   std::function<double(double)> level;  // -1..1 at a time (s, as begin_s)
 };
 
-// The pictures of `film` as they are, with sound; the ending of `out` selects the container.
-// Throws std::runtime_error.
+// Copies the pictures of `film` and adds sound; the ending of `out` selects the container. Throws
+// std::runtime_error.
 void AddSound(const std::filesystem::path& film,
               const GivenSound& sound,
               const std::filesystem::path& out);
 
 struct HeardSound {
-  std::string codec;  // empty: there is none
+  std::string codec;  // empty: no sound
   int sample_rate = 0;
   int channels = 0;
-  std::vector<float> samples;  // of the first channel; sample 0 is heard with the first picture
+  std::vector<float> samples;  // of the first channel; sample 0 belongs to the first picture
 };
 
-// As a player hears it. Throws std::runtime_error.
+// Sound as played. Throws std::runtime_error.
 HeardSound HearFilm(const std::filesystem::path& film);
 
 }  // namespace color3d

@@ -54,7 +54,7 @@ Head ReadHead(Bytes& bytes) {
   head.width = static_cast<int>(bytes.Number(1));
   head.count = bytes.Number(4);
   head.packed = bytes.Number(4);
-  Require(head.attribute < 5 && head.kind < 3, "no such stream");
+  Require(head.attribute < 5 && head.kind < 3, "unknown stream");
   return head;
 }
 
@@ -130,7 +130,7 @@ Splat4dFile ReadSplat4d(std::string_view bytes) {
   for (const uint32_t r : ReadStream(1, 4 * n, still)) {
     frame.rotation.push_back(static_cast<int>(r) - 128);
   }
-  Require(still.empty(), "more than the static section has");
+  Require(still.empty(), "bytes after the static section");
 
   Splat4dFile file;
   file.frames_per_second = header["fps"];
@@ -146,7 +146,7 @@ Splat4dFile ReadSplat4d(std::string_view bytes) {
     for (const Head& head : heads) {
       (head.kind == 0 ? keys : deltas)[head.attribute] = ReadSymbols(head, group);
     }
-    Require(group.empty(), "more than a group has");
+    Require(group.empty(), "bytes after a group");
     const int first = span["f0"], last = span["f1"];
     Require(first == static_cast<int>(file.frames.size()), "frames that leave a gap");
     for (int f = first; f <= last; ++f) {
@@ -171,7 +171,7 @@ Splat4dFile ReadSplat4d(std::string_view bytes) {
       file.frames.push_back(frame);
     }
   }
-  Require(next == bytes.size(), "bytes that belong to nothing");
+  Require(next == bytes.size(), "bytes after the last section");
   Require(file.frames.size() == header["t"], "another number of frames");
   return file;
 }

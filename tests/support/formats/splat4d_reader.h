@@ -1,4 +1,4 @@
-// A reader of .splat4d for tests, written after the format's own decoder.
+// Reader of .splat4d for tests, modelled on the decoder of the format's authors.
 #pragma once
 
 #include <cstdint>
@@ -24,8 +24,7 @@ struct Splat4dFile {
   std::vector<Splat4dFrame> frames;
 };
 
-// Throws std::runtime_error where the file is not as its format says, or has bytes that belong to
-// nothing.
+// Throws std::runtime_error if the file violates its format or has unused bytes.
 Splat4dFile ReadSplat4d(std::string_view bytes);
 
 }  // namespace color3d

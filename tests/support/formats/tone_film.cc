@@ -23,7 +23,7 @@ void Require(bool ok, const char* what) {
   if (!ok) throw std::runtime_error(std::string("film of tones: ") + what);
 }
 
-// The tones in the stream's format, as FFmpeg's libraries convert them.
+// The tones in the stream's format, converted by FFmpeg's libraries.
 AVFrame* Picture(const ToneStream& stream, AVPixelFormat format) {
   AVFrame* rgb = av_frame_alloc();
   AVFrame* frame = av_frame_alloc();
@@ -82,7 +82,7 @@ AVCodecContext* OpenEncoder(const ToneStream& stream, const AVOutputFormat& cont
   const auto number = [](const std::string& name, int (*from_name)(const char*), int unknown) {
     if (name.empty()) return unknown;
     const int value = from_name(name.c_str());
-    Require(value >= 0, "no such name");
+    Require(value >= 0, "unknown name");
     return value;
   };
   codec->color_range = static_cast<AVColorRange>(

@@ -18,13 +18,12 @@ struct ToneStream {
   std::string transfer = {};   // "smpte2084", "arib-std-b67"
   std::string primaries = {};  // "bt2020"
   bool is_default = false;
-  // Coded grey in 0..1 at a share of the width; of ranges that are limited, between their black and
-  // white.
+  // Coded grey in 0..1 at a share of the width; in limited ranges, between black and white.
   std::function<double(double)> tone = [](double x) { return x; };
 };
 
-// Three equal frames at 25 a second; the ending of `file` selects the container. False where
-// FFmpeg's libraries here have no such encoder. Throws std::runtime_error.
+// Writes three equal frames at 25 per second; the ending of `file` selects the container. Returns
+// false if FFmpeg's libraries lack the encoder. Throws std::runtime_error.
 bool WriteToneFilm(const std::filesystem::path& file, const std::vector<ToneStream>& streams);
 
 }  // namespace color3d

@@ -165,7 +165,7 @@ Image RenderForViewers(const ViewerGaussians& g,
   }
   constexpr float kBlack[3] = {0.0f, 0.0f, 0.0f};
   SplatPipeline pipeline;
-  pipeline.Forward(p, color, MakeRasterCamera(camera, cam_from_file), kBlack, false, pool);
+  pipeline.Forward({p, color, MakeRasterCamera(camera, cam_from_file)}, kBlack, false, pool);
   Image image(camera.width, camera.height, 3);
   for (int c = 0; c < 3; ++c) {
     for (int y = 0; y < camera.height; ++y) {

@@ -1,6 +1,5 @@
-// Readers of the files that the export writes for viewers, for tests. PLY,
-// SOG and SPZ are the product's own (splat_file.h), the rest is here: each takes whole files and
-// throws std::runtime_error where one is not as its format says.
+// Readers of exported files, for tests, of the formats other than PLY, SOG and SPZ (splat_file.h).
+// Each takes a whole file and throws std::runtime_error if it violates its format.
 #pragma once
 
 #include <map>
@@ -15,12 +14,12 @@
 
 namespace color3d {
 
-// Without its node's turn.
+// Without the rotation of its node.
 ViewerGaussians ReadGlb(std::string_view bytes);
-// The files of an archive without compression, checked against their checksums.
+// Files of an uncompressed archive, with verified checksums.
 std::map<std::string, std::string> ReadStoredZip(std::string_view bytes);
 
-// Which Gaussian of `file` each of `original` became: the nearest by position.
+// For each Gaussian of `original`, the index of the one in `file` nearest by position.
 std::vector<size_t> PartnersIn(const ViewerGaussians& file, const ViewerGaussians& original);
 
 // The picture of the reference 3DGS renderer over black: 3 channels, 0..1.

@@ -1,6 +1,5 @@
-// A ConvNeXt that has learned nothing: random features that resemble a scattering transform (Bruna
-// & Mallat 2013). Start of pre-training, and its baseline. Deterministic: our own
-// generator, no torch.
+// A random ConvNeXt with features similar to a scattering transform (Bruna & Mallat 2013). Start
+// and baseline of pre-training. Deterministic: own generator, no torch.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,4 @@
-// A small encoder and a key view of two textures in two colours: what the colorizer's parts are
-// tested on, in milliseconds.
+// A small encoder, and a key view of two textures in two colours, for fast tests of the colorizer.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -29,7 +28,7 @@ class SmallColorizerTest : public testing::Test {
  protected:
   SmallColorizerTest()
       : encoder_(SmallEncoder(), RandomFeatureWeights(SmallEncoder(), 1), "small") {
-    SetTorchThreads(1);  // also of the first call
+    SetTorchThreads(1);  // before the first call
     Image& luminance = pictures_[0].luminance;
     Image& ab = pictures_[0].ab;
     for (int y = 0; y < 64; ++y) {

@@ -1,5 +1,5 @@
-// Weight files in the layouts of published networks, filled with seeded random numbers of plausible
-// size: for tests, and as a stand-in where published weights cannot be had. Pure functions.
+// Weight files in the layouts of published networks with seeded random numbers of plausible size,
+// as a stand-in for published weights. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ struct SyntheticDdcolor {
   int layers = 9;
   int feed_forward = 2048;
 
-  // Of the size of the golden files: quick enough for unit tests.
+  // Small sizes of the golden files, for unit tests.
   static SyntheticDdcolor Mini();
 };
 

@@ -1,5 +1,5 @@
-// Writes the file kinds that core/weights reads, well formed or broken on purpose, for tests, fuzz
-// corpora and benchmarks.
+// Writers of the formats that core/weights reads, well formed or broken, for tests, fuzz corpora
+// and benchmarks.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace color3d {
 struct ZipItem {
   std::string name;
   std::string content;
-  uint16_t method = 0;  // 0 stored; anything else only says so
+  uint16_t method = 0;  // 0: stored; other values only change the header
 };
 struct ZipLayout {
   uint64_t alignment = 64;  // of the content, as PyTorch writes it
@@ -32,14 +32,14 @@ class PickleWriter {
   PickleWriter& Text(std::string_view text);
   PickleWriter& Int(int64_t value);
   PickleWriter& IntTuple(const std::vector<int64_t>& values);
-  // A whole call of _rebuild_tensor_v2 on the storage `key` of `count` elements.
+  // A call of _rebuild_tensor_v2 on the storage `key` of `count` elements.
   PickleWriter& Tensor(const std::string& storage_type,
                        const std::string& key,
                        int64_t count,
                        int64_t offset,
                        const std::vector<int64_t>& shape,
                        const std::vector<int64_t>& strides);
-  // With STOP.
+  // The pickle, with STOP.
   std::string Finish() const { return bytes_ + "."; }
 
  private:

@@ -1,5 +1,5 @@
-// Small chroma fits for tests: random Gaussians before a few cameras, random or constant targets,
-// and the fit itself in one call.
+// Small chroma fits for tests: random Gaussians in front of a few cameras, with random or constant
+// targets.
 #pragma once
 
 #include <cstdint>
@@ -13,13 +13,13 @@ inline constexpr int kWidth = 37, kHeight = 26;
 // Looks along z from (-shift, 0.1 shift, 0).
 PosedCamera CameraAt(int view, double shift, int width = kWidth, int height = kHeight);
 
-// In the cameras' view, 2 to 5 in front of them.
+// Visible to the cameras, 2 to 5 units in front of them.
 GaussianModel RandomGaussians(int count, uint64_t seed);
 
 // Random chroma and weights at every pixel.
 ChromaProblem RandomProblem(int views, uint64_t seed);
 
-// The same chroma everywhere.
+// Constant chroma.
 ChromaProblem ConstantProblem(int views, float a, float b, int width, int height);
 
 // FitChroma without checkpoints and observers.

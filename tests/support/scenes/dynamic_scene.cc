@@ -22,7 +22,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kStepSeconds = 0.125;  // exact in binary and in decimals
-constexpr double kFar = 1e9;            // m; the room is closed: every ray meets it nearer
+constexpr double kFar = 1e9;            // m; beyond the closed room
 
 int TimesOf(const DynamicSceneOptions& options) {
   if (options.times > 0) return options.times;
@@ -61,7 +61,7 @@ DynamicScene::DynamicScene(const DynamicSceneOptions& options)
 }
 
 void DynamicScene::AddViews() {
-  const double piece = 2.0 / options_.cameras;  // of the arc, per camera
+  const double piece = 2.0 / options_.cameras;  // part of the arc of each camera
   for (int c = 0; c < options_.cameras; ++c) {
     const double still = options_.cameras > 1 ? 2.0 * c / (options_.cameras - 1) - 1.0 : 0.0;
     for (int t = 0; t < times_; ++t) {
@@ -242,7 +242,7 @@ Image DynamicScene::RenderMovers(int view_index) const {
 void WriteDynamicScene(const fs::path& folder, const DynamicScene& made) {
   for (size_t i = 0; i < made.scene().views.size(); ++i) {
     const fs::path file = folder / made.scene().views[i].image_file;
-    std::error_code error;  // writing says it
+    std::error_code error;  // ignored: writing reports it
     fs::create_directories(file.parent_path(), error);
     WriteFileAtomic(file, EncodePng8(made.RenderSrgb(static_cast<int>(i))));
   }

@@ -37,7 +37,7 @@ double Median(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// Colour differences of pairs of pixels that show the same, and of those beside mirrored ones.
+// Colour differences of pairs of pixels of the same point, and of pixels at mirrored positions.
 struct Differences {
   std::vector<double> same, other;
   void Add(const Image& a, const Eigen::Vector2d& pa, const Image& b, const Eigen::Vector2d& pb) {
@@ -46,9 +46,9 @@ struct Differences {
   }
 };
 
-class EveryCase : public testing::TestWithParam<DynamicCase> {};
+class DynamicCasesTest : public testing::TestWithParam<DynamicCase> {};
 
-TEST_P(EveryCase, BackgroundPointsKeepTheirColor) {
+TEST_P(DynamicCasesTest, BackgroundPointsKeepTheirColor) {
   const DynamicScene made(Small(GetParam()));
   const Scene& scene = made.scene();
   ASSERT_EQ(scene.points.size(), 200u);
@@ -75,7 +75,7 @@ TEST_P(EveryCase, BackgroundPointsKeepTheirColor) {
   EXPECT_GT(Median(differences.other), 3.0 * Median(differences.same));
 }
 
-TEST_P(EveryCase, PointsLieOnTheBackground) {
+TEST_P(DynamicCasesTest, PointsLieOnTheBackground) {
   const DynamicScene made(Small(GetParam()));
   for (const SparsePoint& point : made.scene().points) {
     std::set<int> cameras;
@@ -95,7 +95,7 @@ TEST_P(EveryCase, PointsLieOnTheBackground) {
   }
 }
 
-TEST_P(EveryCase, MovingPointsKeepTheirColor) {
+TEST_P(DynamicCasesTest, MovingPointsKeepTheirColor) {
   const DynamicScene made(Small(GetParam()));
   Differences differences;
   double farthest = 0.0;
@@ -132,9 +132,9 @@ TEST_P(EveryCase, MovingPointsKeepTheirColor) {
   }
 }
 
-// Cameras stand still: a pixel that shows no mover has one colour for ever, one that does mostly
-// another than without.
-TEST_P(EveryCase, MasksHoldAllChanges) {
+// With static cameras, a pixel without mover never changes, and one with a mover mostly differs
+// from the room.
+TEST_P(DynamicCasesTest, MasksHoldAllChanges) {
   const DynamicScene made(Small(GetParam()));
   double share = 0.0;
   int unlike = 0, masked = 0;
@@ -173,7 +173,7 @@ TEST_P(EveryCase, MasksHoldAllChanges) {
   }
 }
 
-TEST_P(EveryCase, MasksAndDepthAgreeWithThePicture) {
+TEST_P(DynamicCasesTest, MasksAndDepthAgreeWithThePicture) {
   DynamicSceneOptions options = Small(GetParam());
   options.supersampling = 3;  // the middle sample is the pixel's centre
   const DynamicScene made(options);
@@ -195,11 +195,11 @@ TEST_P(EveryCase, MasksAndDepthAgreeWithThePicture) {
 }
 
 INSTANTIATE_TEST_SUITE_P(DynamicScene,
-                         EveryCase,
+                         DynamicCasesTest,
                          testing::ValuesIn(DynamicCases()),
                          [](const auto& info) { return DynamicCaseName(info.param); });
 
-// How much of the middle camera's picture moves at each time.
+// Share of moving pixels in the middle camera at each time.
 std::vector<double> MovingShares(DynamicCase which) {
   const DynamicScene made(Small(which));
   std::vector<double> shares;

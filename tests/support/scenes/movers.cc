@@ -21,7 +21,7 @@ const std::pair<DynamicCase, const char*> kNames[] = {{DynamicCase::kTurning, "t
                                                       {DynamicCase::kStill, "still"},
                                                       {DynamicCase::kDeforming, "deforming"}};
 
-// Large patterns: a mover is some twenty pixels wide.
+// Large patterns, since a mover is some twenty pixels wide.
 Material Paint(Pattern pattern, const Vector3d& color, const Vector3d& second, double size_m) {
   return {pattern, color, second, size_m, 0.4, 0.25};
 }
@@ -73,7 +73,7 @@ std::string DynamicCaseName(DynamicCase which) {
   for (const auto& [each, name] : kNames) {
     if (each == which) return name;
   }
-  throw InvalidArgument("case {} of a moving scene does not exist", static_cast<int>(which));
+  throw InvalidArgument("there is no dynamic scene case {}", static_cast<int>(which));
 }
 
 DynamicCase DynamicCaseFromName(std::string_view name) {
@@ -83,7 +83,7 @@ DynamicCase DynamicCaseFromName(std::string_view name) {
     known.emplace_back(each);
   }
   throw InvalidArgument(
-      "there is no moving scene \"{}\"; there are {}", name, fmt::join(known, ", "));
+      "there is no dynamic scene case \"{}\"; choose from {}", name, fmt::join(known, ", "));
 }
 
 bool IsMoving(DynamicCase which) {
@@ -126,7 +126,7 @@ Vector3d PaintedColor(const Solid& mover,
                       double footprint_m,
                       uint32_t seed) {
   const Vector3d kFromLamp(-0.48, -0.80, -0.36);
-  // The direction of a waving sheet's surface is no property of its points.
+  // The normal of a waving sheet changes at its points.
   const double facing =
       mover.shape == Shape::kSheet ? 0.5 : kFromLamp.dot(mover.ToLocal(hit.normal));
   return mover.AlbedoAt(hit.normal, position, footprint_m, seed) * (0.62 + 0.25 * facing);

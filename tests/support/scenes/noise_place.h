@@ -1,4 +1,4 @@
-// Pictures of places that can be told apart by local features.
+// Pictures of places that local features distinguish.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +9,8 @@
 
 namespace color3d {
 
-// Picture of the place `seed` from `from` px (at most 36) to the right: smooth noise,
-// 0.2 to 0.8, 1 channel.
+// Picture of the place `seed`, shifted by `from` px (at most 36): smooth noise, 0.2 to 0.8, 1
+// channel.
 inline Image NoisePlace(uint64_t seed, int width, int height, int from) {
   constexpr int kGrainPx = 4;
   Random random(seed);

@@ -1,5 +1,5 @@
-// A made-up scene with everything known: a textured room seen by cameras on an arc, with exact
-// poses, true colours, depth and sparse points with visibility. For tests and for the demo.
+// Synthetic scene with exact ground truth: a textured room seen by cameras on an arc, with poses,
+// true colours, depth and sparse points with visibility. For tests and the demo.
 #pragma once
 
 #include <cstdint>
@@ -16,18 +16,18 @@ struct ProceduralSceneOptions {
   int views = 12;     // 1..1000
   int width = 320;    // px, 16..8192
   int height = 240;   // px, 16..8192
-  uint64_t seed = 1;  // moves furniture a little, changes all texture
-  // Monochrome photos with the colour photos' L*; the colour ones go to truth/.
+  uint64_t seed = 1;  // moves furniture slightly, changes all textures
+  // Monochrome photos with the L* of the colour photos, which go to truth/.
   bool gray = false;
   bool jpeg = false;  // .jpg (quality 95) instead of .png
   Poses poses = Poses::kColmap;
   int supersampling = 3;     // samples per pixel along each axis, 1..8
-  int sparse_points = 3000;  // 0..1000000; each is seen by three views (or all, if fewer)
+  int sparse_points = 3000;  // 0..1000000; each is observed by three views (or all, if fewer)
   int threads = 0;           // 0: all
   void Validate() const;     // throws Error{kInvalidArgument}
 };
 
-// Immutable, thread-safe. Same options, same scene, on any number of threads.
+// Immutable, thread-safe. Equal options give equal scenes on any number of threads.
 class ProceduralScene {
  public:
   explicit ProceduralScene(const ProceduralSceneOptions& options);
@@ -50,8 +50,7 @@ class ProceduralScene {
   Scene scene_;
 };
 
-// Writes images/view000.png (or .jpg) and so on, with sparse/0 (COLMAP text) or transforms.json
-// beside them.
+// Writes images/view000.png (or .jpg) and so on, and sparse/0 (COLMAP text) or transforms.json.
 void WriteProceduralScene(const std::filesystem::path& folder,
                           const ProceduralSceneOptions& options);
 

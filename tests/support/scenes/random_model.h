@@ -1,4 +1,4 @@
-// A model of random numbers for tests of files and exports.
+// A random model for tests of files and exports.
 #pragma once
 
 #include "core/base/random.h"

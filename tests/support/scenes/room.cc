@@ -163,7 +163,7 @@ bool Room::IsLit(const Vector3d& position, const Vector3d& lamp) const {
   return true;
 }
 
-// Less light reaches the edges of the room.
+// Less light near the edges of the room.
 double Room::CornerShade(const Vector3d& position) const {
   const Vector3d gaps = objects_[0].half - position.cwiseAbs();
   double shade = 1.0;
@@ -173,7 +173,7 @@ double Room::CornerShade(const Vector3d& position) const {
   return shade;
 }
 
-// Less light reaches what stands close to something else (ambient occlusion in two steps).
+// Less light near other objects (ambient occlusion in two steps).
 double Room::ContactShade(const Hit& hit, const Vector3d& position) const {
   double shade = 1.0;
   for (const double reach : {0.07, 0.22}) {

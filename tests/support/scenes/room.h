@@ -1,5 +1,5 @@
-// A furnished room made of boxes and ellipsoids, lit by one area lamp: where a ray ends and how
-// bright it is. World: metres, x right, y down, z into the room. Immutable, thread-safe.
+// Ray caster of a furnished room of boxes and ellipsoids, lit by one area lamp. World: metres, x
+// right, y down, z into the room. Immutable, thread-safe.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,14 +12,14 @@ namespace color3d {
 
 class Room {
  public:
-  // The seed moves the furniture a little and changes all noise.
+  // The seed moves the furniture slightly and changes all noise.
   explicit Room(uint64_t seed);
 
   // Nearest surface in front of `origin`, which lies inside the room.
   Hit Trace(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
-  // Linear RGB, 0..1, of a surface point, the same from every side (no gloss). `lamp_u`, `lamp_v`
-  // in 0..1 pick the point of the lamp; averaging over them gives soft shadows.
+  // Linear RGB, 0..1, of a surface point, equal from all directions (no gloss). `lamp_u`, `lamp_v`
+  // in 0..1 select the point of the lamp; averaging over them gives soft shadows.
   Eigen::Vector3d Radiance(const Hit& hit,
                            const Eigen::Vector3d& position,
                            double footprint_m,

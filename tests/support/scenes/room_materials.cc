@@ -108,7 +108,7 @@ double FractalNoise(
     const Eigen::Vector3d& p, double coarsest_m, double footprint_m, int octaves, uint32_t seed) {
   double sum = 0.0, weight_sum = 0.0, weight = 1.0, wavelength = coarsest_m;
   for (int i = 0; i < octaves; ++i, wavelength *= 0.5, weight *= 0.7) {
-    // An octave fades out between two footprints and one: finer detail would alias.
+    // An octave fades out between two footprints and one, to avoid aliasing.
     const double keep = std::clamp(wavelength / std::max(footprint_m, 1e-9) - 1.0, 0.0, 1.0);
     weight_sum += weight;
     sum += weight * (keep > 0.0 ? Mix(0.5, ValueNoise(p / wavelength, seed + i), keep) : 0.5);

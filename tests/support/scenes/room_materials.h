@@ -1,6 +1,6 @@
-// Materials of the procedural room: two-colour patterns with fractal brightness
-// on top, so that every material has a luminance texture of its own at several scales and colour
-// can be learned from grey. Pure functions.
+// Materials of the procedural room: two-colour patterns with fractal brightness, so that every
+// material has a luminance texture at several scales and its colour can be learnt from grey. Pure
+// functions.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +19,7 @@ struct Material {
   double noise_m = 1.0;                                    // its coarsest wavelength
 };
 
-// Linear RGB from the sRGB values, 0..1, that one would pick by eye.
+// Linear RGB from sRGB values in 0..1.
 Eigen::Vector3d Srgb(double r, double g, double b);
 
 // Value noise summed over `octaves` from `coarsest_m` down, 0..1 around one half. Detail finer than

@@ -59,7 +59,7 @@ RoomSample SampleRoom(const Room& room, const View& view, int x, int y, const Pi
   const Vector3d center = view.cam_from_world.Center();
   const Vector3d direction = RayDirection(view, x + sample.x(), y + sample.y());
   const Hit hit = room.Trace(center, direction);
-  // The lamp's samples in another order than the pixel's, so that they are not correlated.
+  // Samples of the lamp in another order than those of the pixel, to decorrelate them.
   const PixelSample lamp{sample.index * (sample.side + 1) % (sample.side * sample.side),
                          sample.side};
   const Vector3d color = room.Radiance(hit,

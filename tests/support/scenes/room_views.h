@@ -9,18 +9,18 @@
 
 namespace color3d {
 
-// A camera on an arc in front of the table: `t` from -1, left, to 1, right; carried by hand, so
-// that its height and distance vary smoothly on the way. Without names.
+// Hand-held camera on an arc in front of the table, `t` from -1 (left) to 1 (right). Its height and
+// distance vary smoothly. Without names.
 View ArcView(double t, int width, int height);
 
-// Direction through a pixel position in the world's axes, of length 1 along the camera's z: a
-// distance in its lengths is a depth.
+// World direction through a pixel position, of length 1 along the camera's z, so that distances in
+// its units are depths.
 Eigen::Vector3d RayDirection(const View& view, double x_px, double y_px);
 
-// Where the picture shows the point, px, if nothing hides it; nothing when it lies outside.
+// Projection of the point, px, ignoring occlusion; nullopt if outside the picture.
 std::optional<Eigen::Vector2d> PixelOf(const View& view, const Eigen::Vector3d& point);
 
-// True when the view's picture contains the point and the room does not hide it.
+// Returns true if the point is inside the picture and the room does not occlude it.
 bool Sees(const Room& room, const View& view, const Eigen::Vector3d& point);
 
 // One of the side x side samples of a pixel.
@@ -42,7 +42,7 @@ struct RoomSample {
 
 RoomSample SampleRoom(const Room& room, const View& view, int x, int y, const PixelSample& sample);
 
-// Linear RGB as sRGB 0..1 into a picture of 3 channels.
+// Stores linear RGB as sRGB 0..1 in a picture of 3 channels.
 void SetPixel(const Eigen::Vector3d& linear, int y, int x, Image* picture);
 
 }  // namespace color3d

@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-// The shortest text that reads back as the same double, in every locale.
+// Shortest text that reads back as the same double, in every locale.
 std::string Text(double value) {
   char buffer[32];
   const auto [end, error] = std::to_chars(buffer, buffer + sizeof(buffer), value);
@@ -46,7 +46,7 @@ std::string CameraLine(int id, const Camera& c, const Distortion& d) {
   return line + "\n";
 }
 
-// Numbers 1, 2, ... for the different cameras, in order of the views.
+// Numbers 1, 2, ... of the distinct cameras, in order of the views.
 std::vector<int> NumberCameras(const Scene& scene, std::string* lines) {
   std::map<std::string, int> numbers;
   std::vector<int> camera_of_view;
@@ -59,7 +59,7 @@ std::vector<int> NumberCameras(const Scene& scene, std::string* lines) {
   return camera_of_view;
 }
 
-// Where the photo shows the point; we keep no measured positions.
+// Projection of the point, since no measured positions are kept.
 Eigen::Vector2d ObservedPixel(const View& view, const Eigen::Vector3d& world) {
   const Eigen::Vector3d p = view.cam_from_world.Apply(world);
   if (p.z() <= 0.0) return {view.captured_camera.cx, view.captured_camera.cy};
@@ -95,7 +95,7 @@ void WriteColmapText(const Scene& scene, const fs::path& model_folder) {
   for (size_t i = 0; i < scene.views.size(); ++i) {
     const Pose& pose = scene.views[i].cam_from_world;
     const Eigen::Quaterniond& q = pose.rotation;
-    // s x_cam = R (s x + offset) + t with s x + offset the coordinates that we write.
+    // s x_cam = R (s x + offset) + t, where s x + offset are the written coordinates.
     const Eigen::Vector3d t =
         scene.world_from_scene_scale * pose.translation - q * scene.world_offset;
     std::string line = std::to_string(i + 1);

@@ -73,8 +73,7 @@ bool Solid::IntersectEllipsoid(const Vector3d& o, const Vector3d& d, Hit* hit) c
   return true;
 }
 
-// The first change of side within the box around the sheet: steps much shorter than a wave, then
-// halved.
+// First crossing within the box around the sheet: steps much shorter than a wave, then bisection.
 bool Solid::IntersectSheet(
     const Vector3d& o, const Vector3d& d, double t_in, double t_out, Hit* hit) const {
   constexpr int kSteps = 32, kHalvings = 45;
@@ -106,7 +105,7 @@ bool Solid::Intersect(const Vector3d& origin, const Vector3d& direction, Hit* hi
   double t_out = std::numeric_limits<double>::infinity();
   int axis_in = 0, axis_out = 0;
   for (int k = 0; k < 3; ++k) {
-    const double inverse = 1.0 / d[k];  // an infinity is right here
+    const double inverse = 1.0 / d[k];  // may be infinite
     double t0 = (-half[k] - o[k]) * inverse, t1 = (half[k] - o[k]) * inverse;
     if (t0 > t1) std::swap(t0, t1);
     if (t0 > t_in) t_in = t0, axis_in = k;

@@ -1,5 +1,5 @@
-// The one kind of body that made-up scenes consist of: a box, an ellipsoid, a waving sheet or the
-// room around all of them, with what rays meet of it and how it is painted. A plain value.
+// A body of synthetic scenes: a box, an ellipsoid, a waving sheet or the surrounding room, with ray
+// intersection and material. A plain value.
 #pragma once
 
 #include <Eigen/Core>
@@ -39,21 +39,21 @@ struct Solid {
         const Material& material);
   void SetYaw(double degrees);
 
-  // A direction, from the world's axes to its own and back.
+  // Rotates a direction from world axes to own axes, and back.
   Eigen::Vector3d ToLocal(const Eigen::Vector3d& v) const;
   Eigen::Vector3d ToWorld(const Eigen::Vector3d& v) const;
-  // A point of its surface, from where it is to where it is in the material, which neither moves
-  // nor waves, and back.
+  // Maps a surface point to coordinates of the material, which neither moves nor waves, and back.
   Eigen::Vector3d OnMaterial(const Eigen::Vector3d& world) const;
   Eigen::Vector3d InWorld(const Eigen::Vector3d& on_material) const;
 
-  // A quick test that the ray passes by.
+  // Fast test: true if the ray misses the solid.
   bool Misses(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
-  // The first point ahead; false, and `hit` as it was, where there is none. Sets no object.
+  // First intersection ahead. Returns false and leaves `hit` if there is none. Does not set the
+  // object.
   bool Intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, Hit* hit) const;
-  // About the distance to the surface, m; negative inside. Not of a sheet.
+  // Approximate distance to the surface, m; negative inside. Not for sheets.
   double Clearance(const Eigen::Vector3d& position) const;
-  // Albedo, linear RGB in 0..1, of a point of its surface.
+  // Albedo of a surface point, linear RGB in 0..1.
   Eigen::Vector3d AlbedoAt(const Eigen::Vector3d& normal,
                            const Eigen::Vector3d& position,
                            double footprint_m,

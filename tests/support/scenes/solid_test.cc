@@ -39,7 +39,7 @@ TEST(Solid, RaysHitASheetFromBothSides) {
   EXPECT_GT(met, 500);
 }
 
-// The normal of the surface that rays meet, by differences.
+// Normal of the intersected surface, by finite differences.
 TEST(Solid, NormalsArePerpendicular) {
   for (const auto shape : {Solid::Shape::kBox, Solid::Shape::kEllipsoid, Solid::Shape::kSheet}) {
     const Solid solid = Make(shape);

@@ -1,4 +1,4 @@
-// Splat files of other programs, for tests.
+// Splat files as of other programs, for tests.
 #pragma once
 
 #include <cmath>
@@ -11,8 +11,8 @@
 
 namespace color3d {
 
-// A ball with a bright spot on a wide ground below it (y points down), one unit in radius, every
-// Gaussian flat on its surface. `color`: how far red and blue stand apart, 0: grey.
+// A ball of radius 1 with a bright spot, above a wide ground (y points down), with flat Gaussians
+// on the surfaces. `color`: difference of red and blue; 0: grey.
 inline ViewerGaussians BallOnGround(int count, float color = 0.0f, int sh_degree = 0) {
   Random random(5);
   ViewerGaussians g;
@@ -32,7 +32,7 @@ inline ViewerGaussians BallOnGround(int count, float color = 0.0f, int sh_degree
     for (const double s : {0.09, 0.09, 0.004}) {
       g.log_scale.push_back(static_cast<float>(std::log(s)));
     }
-    // The turn that takes z to the normal.
+    // Rotation that maps z to the normal.
     const double w = 1.0 + normal[2];
     const double q[4] = {w, -normal[1], normal[0], 0.0};
     const double size = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
@@ -48,7 +48,7 @@ inline ViewerGaussians BallOnGround(int count, float color = 0.0f, int sh_degree
   return g;
 }
 
-// As 3D Gaussian splatting writes it.
+// Writes PLY as 3D Gaussian splatting does.
 inline std::string SplatPly(const ViewerGaussians& g) {
   const int coefficients = ShCoefficients(g.sh_degree);
   std::string bytes =

@@ -1,5 +1,5 @@
-// A small posed scene for tests: coloured walls of a room corner, seen by cameras on an arc, with
-// the exact picture of every view from a ray caster. No files.
+// Small posed scene for tests: coloured walls of a room corner, seen by cameras on an arc, with
+// ray-cast pictures. No files.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// JPEGs with EXIF data of a camera, for tests.
+// JPEGs with EXIF data, for tests.
 #pragma once
 
 #include <cstdint>
@@ -7,7 +7,7 @@
 
 namespace color3d {
 
-// One entry of the camera's settings.
+// An entry of the EXIF directory.
 struct ExifTag {
   uint32_t number;
   uint32_t type;  // 3 SHORT, 4 LONG, 5 RATIONAL
@@ -19,7 +19,8 @@ inline void Put(std::string* out, uint32_t value, int bytes) {
   for (int i = 0; i < bytes; ++i) out->push_back(static_cast<char>(value >> (8 * i)));
 }
 
-// A little-endian EXIF block: a first directory that only names the photo directory, and that.
+// A little-endian EXIF block: a first directory with only the offset of the photo directory, and
+// that.
 inline std::string ExifBlock(const std::vector<ExifTag>& tags) {
   std::string block("II*\0", 4);
   Put(&block, 8, 4);
@@ -39,7 +40,7 @@ inline std::string ExifBlock(const std::vector<ExifTag>& tags) {
   return block + rationals;
 }
 
-// A JPEG with the block in its APP1, right after SOI.
+// A JPEG with the block in APP1, directly after SOI.
 inline std::string WithExif(const std::string& jpeg, const std::vector<ExifTag>& tags) {
   const std::string body = std::string("Exif\0\0", 6) + ExifBlock(tags);
   const size_t length = body.size() + 2;

@@ -1,4 +1,4 @@
-// Small made-up scenes for the tests of this folder.
+// Small synthetic scenes for tests.
 #pragma once
 
 #include <cmath>
@@ -17,7 +17,7 @@
 
 namespace color3d {
 
-// The message of the Error that `work` throws; empty when it throws none.
+// Message of the Error that `work` throws; empty if it throws none.
 inline std::string Refusal(const std::function<void()>& work) {
   try {
     work();
@@ -40,7 +40,7 @@ inline Image GradientPhoto(int width, int height, int channels) {
   return image;
 }
 
-// `count` cameras on an arc around the origin, 48 x 32 px, and 50 points that all of them see.
+// `count` cameras of 48 x 32 px on an arc around the origin, and 50 points that all observe.
 inline Scene ArcScene(int count, const Distortion& distortion = {}) {
   Scene scene;
   for (int i = 0; i < count; ++i) {

@@ -1,5 +1,5 @@
-// A corner of a textured room whose picture is known from everywhere, and a board that moves in it
-// on its own: films and photos for structure-from-motion.
+// Ray caster of a textured room corner with a moving board: films and photos for
+// structure-from-motion.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 
 namespace color3d {
 
-// Noise of many scales on a plane, 0..1: something for SIFT to hold on to.
+// Noise of many scales on a plane, 0..1, with features for SIFT.
 inline float CornerTexture(double u, double v, uint32_t plane) {
   const auto lattice = [plane](int64_t x, int64_t y, int octave) {
     uint64_t h = static_cast<uint64_t>(x) * 0x9E3779B97F4A7C15ULL ^
@@ -39,7 +39,7 @@ inline float CornerTexture(double u, double v, uint32_t plane) {
   return static_cast<float>(std::clamp(1.4 * sum - 0.25, 0.0, 1.0));
 }
 
-// Upright, facing the camera, in the plane z = center.z, with a texture that goes along.
+// Upright, facing the camera, in the plane z = center.z, with a texture that moves along.
 struct MovingBoard {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double half_width = 0.25, half_height = 0.4;
@@ -47,10 +47,10 @@ struct MovingBoard {
 
 struct CornerRay {
   float value = 0.0f;  // 0..1
-  bool moves = false;  // it meets the board
+  bool moves = false;  // hits the board
 };
 
-// The surface that a ray meets: floor y = 1, wall z = 2, wall x = -1.5, and the board before them.
+// Surface hit by a ray: floor y = 1, wall z = 2, wall x = -1.5, or the board in front of them.
 inline CornerRay TraceCorner(const Eigen::Vector3d& origin,
                              const Eigen::Vector3d& direction,
                              const std::optional<MovingBoard>& board = {}) {
@@ -94,7 +94,7 @@ inline Image RenderCorner(const Camera& camera,
   return image;
 }
 
-// 1 channel: 1 where the board is, else 0.
+// 1 channel: 1 on the board, else 0.
 inline Image MaskOfBoard(const Camera& camera, const Pose& pose, const MovingBoard& board) {
   Image image(camera.width, camera.height, 1);
   const Eigen::Vector3d origin = pose.Center();

@@ -1,4 +1,4 @@
-// A film for tests. Pure function.
+// A panning film for tests. Pure function.
 #pragma once
 
 #include <cmath>
@@ -7,8 +7,8 @@
 
 namespace color3d {
 
-// Frame `frame` of a pan along a textured wall whose colour changes from left to right and from top
-// to bottom, one pixel a frame. Lab.
+// Frame `frame` of a pan along a textured wall, one pixel per frame. Its colour changes from left
+// to right and from top to bottom. Lab.
 inline Image WallPan(int width, int height, int frame) {
   Image lab(width, height, 3);
   for (int y = 0; y < height; ++y) {

@@ -1,5 +1,4 @@
-// A server that breaks connections on purpose, and the fixture of the client library's tests
-// against it.
+// Server that breaks connections on purpose, with the fixture of tests of the client library.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -22,7 +21,7 @@ inline std::string Digits(const std::string& resource) {
   return resource.substr(resource.find("blobs/"));
 }
 
-// "Try again in a second."
+// Status that asks to retry in a second.
 inline grpc::Status TurnedAway() {
   google::rpc::Status details;
   details.set_code(grpc::StatusCode::RESOURCE_EXHAUSTED);
@@ -40,11 +39,11 @@ class BreakingBlobs final : public bs::ByteStream::Service, public v1::BlobServi
  public:
   std::map<std::string, std::string> blobs;
   std::map<std::string, std::string> uploads;
-  int drops = 0;  // streams that still are to be dropped
+  int drops = 0;  // number of streams still to be dropped
   size_t limit = 0;
   int writes = 0;
-  bool corrupt = false;  // the first byte is another; seen by who sends a blob whole
-  int turned_away = 0;   // streams that still are to be refused for now
+  bool corrupt = false;  // changes the first byte of blobs
+  int turned_away = 0;   // number of streams still to be refused for now
 
   grpc::Status FindMissingBlobs(grpc::ServerContext*,
                                 const v1::FindMissingBlobsRequest* request,
@@ -95,7 +94,7 @@ class BreakingBlobs final : public bs::ByteStream::Service, public v1::BlobServi
                     grpc::ServerWriter<bs::ReadResponse>* writer) override {
     if (turned_away-- > 0) return TurnedAway();
     const auto found = blobs.find(request->resource_name());
-    if (found == blobs.end()) return {grpc::StatusCode::NOT_FOUND, "no such blob"};
+    if (found == blobs.end()) return {grpc::StatusCode::NOT_FOUND, "unknown blob"};
     std::string bytes = found->second.substr(static_cast<size_t>(request->read_offset()));
     if (request->read_limit() > 0)
       bytes.resize(std::min<size_t>(bytes.size(), request->read_limit()));
@@ -116,7 +115,7 @@ class BreakingBlobs final : public bs::ByteStream::Service, public v1::BlobServi
   }
 };
 
-// Streams scripted one after the other: revisions to send, then a status.
+// Scripted streams, in order: revisions to send, then a status.
 class BreakingJobs final : public v1::JobService::Service {
  public:
   struct Stream {

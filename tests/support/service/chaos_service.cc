@@ -18,7 +18,7 @@ namespace {
 constexpr int kWorkers = 3;
 constexpr int kFrozenMs = 1300;  // leases last for 1000
 
-// A worker with a job; any when all are idle; 0 when there is none.
+// Returns a worker with a job, else any worker, else 0.
 pid_t ChooseVictim(ServerProcess& server, Random& random) {
   std::vector<pid_t> busy, all;
   const v1::ServerInfo info = server.Info();
@@ -62,7 +62,7 @@ void ChaosService::Restart(int signal) {
   server_->Signal(signal);
   const int status = server_->Wait();
   if (signal == SIGTERM && status != 0) {
-    problems_.push_back(fmt::format("told to end, the server ended with {}", status));
+    problems_.push_back(fmt::format("the server exited with {} after SIGTERM", status));
   }
   Start();
 }
@@ -95,7 +95,7 @@ void ChaosService::Disturb(Random& random, const std::vector<Fault>& kinds) {
     ++faults_[fault == Fault::kServerKilled ? "server killed" : "server restarted"];
   } else {
     const pid_t victim = ChooseVictim(*server_, random);
-    if (victim == 0) return;  // all are about to be started
+    if (victim == 0) return;  // all are starting
     if (fault == Fault::kWorkerKilled) {
       ::kill(victim, SIGKILL);
       ++faults_["worker killed"];
@@ -134,7 +134,7 @@ void ChaosService::CheckLeases() {
 
 int64_t ChaosService::Count(const char* sql) const {
   SqliteDatabase db(folder_ / "data" / "jobs.db", SqliteAccess::kRead);
-  SqliteStatement select(db.handle(), sql);
+  SqliteStatement select(db, sql);
   return select.Step() ? select.Int(0) : -1;
 }
 
@@ -144,7 +144,7 @@ std::vector<std::string> ChaosService::EndAndAudit() {
   };
   server_->Signal(SIGTERM);
   require_none(server_->Wait(), "exit status of the server");
-  require_none(RepeatedEffects(effects_.string() + ".saved"), "effects that are there twice");
+  require_none(RepeatedEffects(effects_.string() + ".saved"), "effects that occur twice");
   require_none(Count("select count(*) from job where end_ms=0"), "jobs that have not ended");
   require_none(Count("select count(*) from job_attempt where end_ms=0"), "attempts without an end");
   require_none(Count("select count(*) - count(distinct job_id) from job_attempt where "

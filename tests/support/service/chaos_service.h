@@ -1,5 +1,5 @@
-// A service with scripted workers that is disturbed as services are in their lives, and what must
-// hold of it all the while and in the end. Not thread-safe.
+// A service with scripted workers under faults, and the invariants that must hold meanwhile and in
+// the end. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@
 
 namespace color3d::testing {
 
-// The number in an environment variable; `otherwise` without it.
+// Value of an environment variable; `otherwise` if it is not set.
 int64_t FromEnvironment(const char* name, int64_t otherwise);
 // COLOR3D_CHAOS_SEED, or the time; printed.
 uint64_t ChaosSeed();
@@ -29,7 +29,7 @@ enum class Fault {
 
 class ChaosService {
  public:
-  // Starts a server on `folder`/data, for whose jobs an attempt lost is no reason to fail.
+  // Starts a server on `folder`/data, whose jobs never fail for lost attempts.
   explicit ChaosService(const std::filesystem::path& folder, std::vector<std::string> flags = {});
   ~ChaosService();
   ChaosService(const ChaosService&) = delete;
@@ -38,15 +38,15 @@ class ChaosService {
   ServerProcess& server() { return *server_; }
   TestClient& client() { return server_->client(); }
 
-  // Has one fault of those in `kinds`, which come in shuffled rounds; a worker that has a job is
-  // preferred. Notes what is wrong with the store's leases afterwards.
+  // Injects one fault of `kinds`, in shuffled rounds, preferably into a worker with a job. Then
+  // records problems with the leases in the store.
   void Disturb(Random& random, const std::vector<Fault>& kinds = AllFaults());
   static std::vector<Fault> AllFaults();
   int faults() const;
 
-  // Ends the server and checks its data folder. Returns the faults, a line each.
+  // Ends the server and checks its data folder. Returns the problems, one per line.
   std::vector<std::string> EndAndAudit();
-  // Steps that were begun by more than one attempt: without one, nothing was ever taken over.
+  // Number of steps that more than one attempt began; 0: no job was taken over.
   int RepeatedSteps() const;
   int64_t Count(const char* sql) const;
   // "20 x worker killed, ..."
@@ -65,7 +65,7 @@ class ChaosService {
   std::vector<std::string> problems_;
 };
 
-// Results of a finished job and its children, without the processes that ran it.
+// Results of a finished job and its children, without process ids.
 std::string ResultOf(TestClient& client, const std::string& job);
 
 }  // namespace color3d::testing

@@ -120,7 +120,7 @@ void CuttingProxy::Accept() {
   }
 }
 
-// Returns when the connection is over.
+// Returns when the connection has ended.
 void CuttingProxy::Carry(int client, int server, const Fate& fate) {
   const auto due = steady_clock::now() + milliseconds(fate.after_ms);
   std::vector<char> piece(kPieceBytes);

@@ -1,8 +1,8 @@
-// A TCP proxy that treats connections as bad networks do. Each connection has a fate, drawn from
-// the seed, that comes over it after some time or some bytes:
-//   cut           both sides see it end
-//   slow          every piece comes late, and then it is cut
-//   half open     one direction swallows all bytes, while nobody is told
+// TCP proxy that simulates a bad network. Each connection has a fate, drawn from the seed, that
+// strikes after some time or bytes:
+//   cut           both sides see the end
+//   slow          every piece is delayed, then the connection is cut
+//   half open     all bytes of one direction are lost without notice
 #pragma once
 
 #include <atomic>
@@ -28,9 +28,9 @@ class CuttingProxy {
 
   // 127.0.0.1:PORT
   const std::string& address() const { return address_; }
-  // Where connections lead from now on: HOST:PORT; until then they are refused.
+  // Sets the target of new connections, HOST:PORT; until then they are refused.
   void SetTarget(const std::string& address);
-  // How often each has come over a connection.
+  // Number of connections with each fate.
   std::map<std::string, int> Fates();
 
  private:
@@ -38,8 +38,8 @@ class CuttingProxy {
     std::string name;
     int64_t after_bytes = 0;
     int after_ms = 0;
-    int delay_ms = 0;    // of each piece
-    int swallowed = -1;  // half open: 0 what the client sends, 1 what the server sends
+    int delay_ms = 0;    // delay of each piece
+    int swallowed = -1;  // half open: lost direction, 0 from the client, 1 from the server
   };
 
   void Accept();
@@ -53,7 +53,7 @@ class CuttingProxy {
   std::mutex mutex_;
   int target_port_ = 0;
   Random random_;
-  std::map<std::string, int> fates_;  // that have come over a connection
+  std::map<std::string, int> fates_;  // number of connections with each fate
   std::vector<std::thread> carriers_;
   std::thread acceptor_;
 };

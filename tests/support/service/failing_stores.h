@@ -1,4 +1,4 @@
-// Stores of which one call fails, before or after it has had its effect.
+// Stores with one failing call, before or after its effect.
 #pragma once
 
 #include <atomic>
@@ -16,10 +16,10 @@
 
 namespace color3d::testing {
 
-// Counts the calls of the stores that it is given to, and makes one of them fail. Thread-safe.
+// Counts the calls of its stores and makes one of them fail. Thread-safe.
 class Faults {
  public:
-  // `target`: the call that fails, counted from 1; 0: none.
+  // `target`: number of the failing call, from 1; 0: none.
   Faults(int target, bool after, ErrorCode code) : target_(target), after_(after), code_(code) {}
 
   template <class Body>
@@ -41,7 +41,7 @@ class Faults {
     }
   }
   int calls() const { return calls_.load(); }
-  // Empty: none has failed.
+  // Empty: no call has failed.
   std::string failed() const {
     std::lock_guard lock(mutex_);
     return failed_;
@@ -63,7 +63,7 @@ class Faults {
   std::set<std::string> seen_;
 };
 
-// Calls of a worker.
+// Calls by workers.
 class FailingStore : public SqliteJobStore {
  public:
   FailingStore(const std::filesystem::path& file, const Clocks& clocks, Faults& faults)
@@ -133,7 +133,7 @@ class FailingStore : public SqliteJobStore {
   Faults& faults_;
 };
 
-// Calls of workers and uploads.
+// Calls by workers and uploads.
 class FailingBlobs : public FileBlobStore {
  public:
   FailingBlobs(const std::filesystem::path& folder, Faults& faults)

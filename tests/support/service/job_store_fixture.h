@@ -1,4 +1,4 @@
-// Fixture of the job store tests: a store in a scratch folder, a clock that the test moves, and one
+// Fixture of the job store tests: a store in a scratch folder, a clock set by the test, and one
 // active scene.
 #pragma once
 
@@ -95,13 +95,13 @@ class JobStoreTest : public ::testing::Test {
     for (const JobRecord& child : store_->ListChildren(root.name)) {
       if (child.kind == kind) return child;
     }
-    ADD_FAILURE() << "no child " << kind;
+    ADD_FAILURE() << "no child job " << kind;
     return {};
   }
 
   ScratchFolder scratch_;
-  std::atomic<int64_t> now_{1'000'000};   // leases and pauses go by it
-  std::atomic<int64_t> wall_{1'000'000};  // what people read
+  std::atomic<int64_t> now_{1'000'000};   // of leases and pauses
+  std::atomic<int64_t> wall_{1'000'000};  // of recorded times
   std::string boot_id_ = "boot 1";
   std::unique_ptr<SqliteJobStore> store_;
 };

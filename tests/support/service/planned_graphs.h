@@ -1,4 +1,4 @@
-// Jobs to plan for tests, and the graphs that the planner returned.
+// Jobs to plan in tests, and the planned graphs.
 #pragma once
 
 #include <gtest/gtest.h>

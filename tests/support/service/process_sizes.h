@@ -16,7 +16,7 @@ struct ProcessSizes {
   double resident_mib = 0.0, peak_mib = 0.0, descriptors = 0.0, threads = 0.0;
 };
 
-// Of all `pids` together; those that have ended count as nothing.
+// Sum over `pids`; ended processes count as 0.
 inline ProcessSizes SizesOf(const std::vector<pid_t>& pids) {
   ProcessSizes sum;
   for (const pid_t pid : pids) {

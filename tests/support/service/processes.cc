@@ -25,7 +25,7 @@ std::string Slurp(const fs::path& path) {
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
 }
 
-// Only async-signal-safe calls: we are between fork and exec.
+// Only async-signal-safe calls between fork and exec.
 [[noreturn]] void ExecChild(char* const* argv, int out, int err, pid_t parent) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -63,7 +63,7 @@ Process::Process(std::vector<std::string> arguments, const fs::path& log_folder)
   if (pid_ == 0) ExecChild(argv.data(), out, err, parent);
   close(out);
   close(err);
-  if (pid_ < 0) throw Error(ErrorCode::kResourceExhausted, "no more processes can be started");
+  if (pid_ < 0) throw Error(ErrorCode::kResourceExhausted, "cannot start a process");
   setpgid(pid_, pid_);  // both sides do it, so that neither has to wait for the other
 }
 
@@ -95,7 +95,7 @@ std::optional<int> Process::Wait(milliseconds limit) {
 
 void Process::Kill() {
   if (exit_code_) return;
-  // Descendants may have groups of their own, so they are looked up before their parent is gone.
+  // Descendants may have their own groups, so they are listed before their parent ends.
   std::vector<pid_t> family = Descendants(pid_);
   kill(-pid_, SIGKILL);
   for (pid_t pid : family) kill(pid, SIGKILL);

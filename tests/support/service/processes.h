@@ -1,5 +1,5 @@
-// Real processes for tests: started in a group of their own, watched with a time limit, and never
-// left behind, whatever the test does. Not thread-safe.
+// Processes for tests: started in their own group, with a time limit, and always killed at the end
+// of the test. Not thread-safe.
 #pragma once
 
 #include <sys/types.h>
@@ -14,7 +14,7 @@
 namespace color3d {
 
 struct ProcessResult {
-  int exit_code = -1;  // 128 + signal when killed, -1 when it had to be killed for its time limit
+  int exit_code = -1;  // 128 + signal if killed, -1 if it exceeded its time limit
   bool timed_out = false;
   double seconds = 0.0;
   std::string out;
@@ -34,7 +34,7 @@ class Process {
   pid_t pid() const { return pid_; }
   bool IsRunning();
   void Signal(int signal);
-  // nullopt when it still runs after `limit`; the exit code otherwise.
+  // Returns the exit code, or nullopt if it still runs after `limit`.
   std::optional<int> Wait(std::chrono::milliseconds limit);
   void Kill();
   std::string Out() const;
@@ -47,16 +47,16 @@ class Process {
   std::filesystem::path err_path_;
 };
 
-// Runs to the end, or kills it after `limit`.
+// Runs a program to its end, or kills it after `limit`.
 ProcessResult RunProcess(const std::vector<std::string>& arguments,
                          const std::filesystem::path& log_folder,
                          std::chrono::seconds limit);
 
-// All living processes that descend from `pid`, it not included.
+// All living descendants of `pid`.
 std::vector<pid_t> Descendants(pid_t pid);
 bool IsAlive(pid_t pid);
 
-// Polls until `condition` holds; false when `limit` has passed.
+// Polls until `condition` holds; returns false after `limit`.
 bool WaitUntil(const std::function<bool()>& condition,
                std::chrono::milliseconds limit,
                std::chrono::milliseconds step = std::chrono::milliseconds(50));

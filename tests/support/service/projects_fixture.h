@@ -1,6 +1,7 @@
-// Fixture of tests with several projects on one server: two whose tokens may submit, and an admin.
+// Fixture of tests with several projects on one server: two projects with submitters, and an admin.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <string>
 
@@ -25,6 +26,7 @@ class ProjectsTest : public RpcTest {
     options.limits.project_max_streams = 2;
     options.job_logs = scratch_.path();
     options.inference.target = "unix:" + (scratch_.path() / "nobody").string();
+    options.drain = [this] { asked_to_drain_ = true; };
     guarded_ = std::make_unique<RpcServer>(options, store_, blobs_, uploads_, SystemClock());
     attic_ = Open(attic);
     cellar_ = Open(cellar);
@@ -54,6 +56,7 @@ class ProjectsTest : public RpcTest {
     return request;
   }
 
+  std::atomic<bool> asked_to_drain_{false};
   std::unique_ptr<RpcServer> guarded_;
   std::unique_ptr<TestClient> attic_, cellar_, admin_;
 };

@@ -1,5 +1,5 @@
-// Fixture of the RPC tests: all services over a real port, with a worker played by the test through
-// the job store.
+// Fixture of the RPC tests: all services over a real port. The test acts as worker through the job
+// store.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -37,7 +37,7 @@ class RpcTest : public ::testing::Test {
     client_ = std::make_unique<TestClient>(server_->address());
   }
 
-  // Runs all queued jobs; returns how many.
+  // Runs all queued jobs; returns their number.
   int Work() {
     int done = 0;
     while (const auto job = store_.Claim("test-worker", 60'000)) {

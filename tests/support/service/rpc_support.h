@@ -1,4 +1,4 @@
-// A client of all services for tests, with the steps that most tests need.
+// A client of all services for tests, with common steps.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -31,7 +31,7 @@ struct TestClient {
   std::unique_ptr<v1::ServerService::Stub> server;
   std::unique_ptr<v1::AdminService::Stub> admin;
 
-  // All throw std::runtime_error with the status when an RPC fails.
+  // All functions throw std::runtime_error with the status if an RPC fails.
   v1::Digest Upload(const std::string& content);
   std::string Download(const v1::Digest& digest);
   // An active scene with two photographs.
@@ -46,12 +46,12 @@ struct TestClient {
 v1::Digest DigestOf(const std::string& content);
 // A grey PNG of 1 x 1 pixels.
 std::string TinyPng();
-// ErrorInfo.reason of a status; empty when there is none.
+// ErrorInfo.reason of a status; empty if there is none.
 std::string ReasonOfStatus(const grpc::Status& status);
 google::rpc::BadRequest BadRequestOf(const grpc::Status& status);
 bool HasRetryInfo(const grpc::Status& status);
 
-// A select_key_view job that the test worker runs by this script.
+// A select_key_view job with a script for the test worker.
 v1::JobSpec ScriptedSpec(const std::string& scene, const std::string& script, int seed = 1);
 
 }  // namespace color3d::testing

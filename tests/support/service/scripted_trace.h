@@ -1,5 +1,5 @@
-// What scripted jobs leave behind (scripted_worker.cc): which steps were done by which processes,
-// and effects that may be there once only.
+// Traces of scripted jobs (scripted_worker.cc): steps with their processes, and effects that must
+// occur only once.
 #pragma once
 
 #include <filesystem>
@@ -12,7 +12,7 @@
 
 namespace color3d::testing {
 
-// Steps of a trace ("step pid" lines) in order, and the processes that did them.
+// Steps of a trace ("step pid" lines) in order, and their processes.
 struct Trace {
   std::vector<int> steps;
   std::set<int> processes;
@@ -30,7 +30,7 @@ inline Trace ParseTrace(const std::string& text) {
   return trace;
 }
 
-// The same text without the processes: equal work leaves equal text, whoever did it.
+// The trace without processes: equal work gives equal text.
 inline std::string WithoutProcesses(const std::string& text) {
   std::string plain;
   std::stringstream lines(text);
@@ -47,7 +47,7 @@ inline std::vector<int> Range(int count) {
   return range;
 }
 
-// (job, step) lines that are there more than once.
+// (job, step) lines that occur more than once.
 inline int RepeatedEffects(const std::filesystem::path& log) {
   std::map<std::string, int> counts;
   std::ifstream stream(log);

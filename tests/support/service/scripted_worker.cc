@@ -1,9 +1,9 @@
 // color3d-test-worker: the worker loop with scripted stages instead of the method library. Every
-// kind leaves the artifacts that its successors ask for. A select_key_view job with
-// STRATEGY_MANUAL takes its script from `view`: words separated by commas.
+// kind writes the artifacts that its successors read. A select_key_view job with STRATEGY_MANUAL
+// takes its script from `view`: words separated by commas.
 //   steps=N  ms=N       N steps of the given milliseconds, a checkpoint after each
-//   crash, throw, oom, unavailable_once, hang (deaf to cancellation), freeze_writing (stops itself,
-//   once, while it holds the store's write lock)
+//   crash, throw, oom, unavailable_once, hang (ignores cancellation), freeze_writing (stops itself
+//   once while it holds the store's write lock)
 #include <signal.h>
 #include <unistd.h>
 
@@ -53,7 +53,7 @@ Script ParseScript(const std::string& text) {
   return script;
 }
 
-// Artifacts that other stages need of this one; a folder gets two files.
+// Artifacts of this stage that other stages read; a folder gets two files.
 std::vector<std::string> ArtifactsOf(const std::string& kind) {
   const Stage& stage = StageOf(kind);
   if (stage.leaves.empty()) return {};
@@ -62,8 +62,9 @@ std::vector<std::string> ArtifactsOf(const std::string& kind) {
   return {name + "a.png", name + "b.png"};
 }
 
-// Tests count effects in shared files: a line in "<prefix>.begun" when a step begins, which repeats
-// whenever an attempt is lost, and one in "<prefix>.saved" after the fenced write, which must not.
+// Tests count effects in shared files: a line in "<prefix>.begun" at the start of a step, which
+// repeats after a lost attempt, and one in "<prefix>.saved" after the fenced write, which must not
+// repeat.
 void LogEffect(const char* file, const std::string& job, int step) {
   const char* prefix = std::getenv("COLOR3D_TEST_EFFECTS");
   if (prefix == nullptr) return;
@@ -113,8 +114,8 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   for (const FileDigest& digest : SpecBlobs(run.spec)) ReadFile(blobs.Fetch(digest.sha256));
   const Script script = ParseScript(run.spec.select_key_view().view());
   Misbehave(script, run, checkpoints);
-  // The state is one line for each step: which process did it. Each Save is fenced, so whatever is
-  // killed in between, the published trace holds every step once.
+  // The state has a line for each step with its process. Each Save is fenced, so the published
+  // trace has every step once, whatever is killed in between.
   std::string trace = checkpoints.Load().value_or("");
   int step = static_cast<int>(std::count(trace.begin(), trace.end(), '\n'));
   for (; step < script.steps; ++step) {
@@ -133,7 +134,7 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   output.files = ArtifactsOf(kind);
   for (const std::string& name : output.files) {
     std::filesystem::create_directories((run.output_folder / name).parent_path());
-    // No two scenes have equal colorizers.
+    // Colorizers of different scenes differ.
     const std::string own = kind == kind::kPersonalize ? run.job_name : "";
     WriteFileAtomic(run.output_folder / name, kind + " " + name + own + "\n" + trace);
   }
@@ -141,8 +142,8 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   return output;
 }
 
-// Answers "<what colours it> <the picture>", in place of a PNG. A picture may hold one of the words
-//   crash, hang (for good), slow (200 ms), damaged, big (1 MiB of answer)
+// Answers "<colorizer> <picture>" in place of a PNG. A picture may contain one of the words
+//   crash, hang (forever), slow (200 ms), damaged, big (answer of 1 MiB)
 class ScriptedEngine : public LiveEngine {
  public:
   void WarmUp() override {}

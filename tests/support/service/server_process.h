@@ -25,7 +25,7 @@ inline void SleepMs(int ms) { std::this_thread::sleep_for(std::chrono::milliseco
 // One `color3d-server serve` on a data folder.
 class ServerProcess {
  public:
-  // `max_descriptors`: what it may have open at all; 0: as this process.
+  // `max_descriptors`: limit of open descriptors; 0: that of this process.
   ServerProcess(const std::filesystem::path& folder,
                 std::vector<std::string> extra,
                 int workers = 1,
@@ -40,7 +40,7 @@ class ServerProcess {
                                           folder / "data",
                                           "--workers",
                                           std::to_string(workers)};
-    // Defaults.
+    // Default flags.
     const std::vector<std::pair<const char*, const char*>> defaults = {
         {"--listen", "127.0.0.1:0"},
         {"--worker-program", COLOR3D_TEST_WORKER},
@@ -85,7 +85,7 @@ class ServerProcess {
     return ::waitid(P_PID, static_cast<id_t>(pid_), &ended, WEXITED | WNOHANG | WNOWAIT) == 0 &&
            ended.si_pid == pid_;
   }
-  // Exit status, or 128 + signal.
+  // Returns the exit status, or 128 + signal.
   int Wait() {
     int status = 0;
     ::waitpid(pid_, &status, 0);
@@ -98,7 +98,7 @@ class ServerProcess {
     client_->server->GetServerInfo(&context, {}, &info);
     return info;
   }
-  // Those for jobs; or the inference worker, if it runs.
+  // Process ids of the workers for jobs; or of the inference worker, if it runs.
   std::vector<pid_t> Workers(bool inference = false) {
     std::vector<pid_t> pids;
     const v1::ServerInfo info = Info();

@@ -1,4 +1,4 @@
-// Fixture of the storage tests: stores of blobs and uploads in a scratch folder.
+// Fixture of the storage tests: blob and upload stores in a scratch folder.
 #pragma once
 
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-// Certificates for tests, made when they are asked for.
+// Certificates for tests, created on demand.
 #pragma once
 
 #include <openssl/evp.h>
@@ -16,7 +16,7 @@ struct CertificateFiles {
 
 class TestAuthority {
  public:
-  // Its own certificate is left at certificate().
+  // Writes its own certificate to certificate().
   TestAuthority(const std::filesystem::path& folder, const std::string& name);
 
   const std::filesystem::path& certificate() const { return file_; }

@@ -1,5 +1,5 @@
-// A small painted scene whose key view is coloured, and a generator of pictures that answers as
-// told: for the stages generate_augmentations and personalize.
+// A small scene with a coloured key view, and a scripted generator of pictures, for the stages
+// generate_augmentations and personalize.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -91,7 +91,7 @@ class AugmentationStageTest : public ::testing::Test {
     WriteFileAtomic(path, bytes);
     inputs_[name] = path;
   }
-  // A wall of Gaussians at depth 4, larger than all views see.
+  // A wall of Gaussians at depth 4 that fills all views.
   void AddGeometry() {
     GaussianModel model;
     for (int y = -30; y <= 30; ++y) {

@@ -1,4 +1,4 @@
-// A tiny scene with all that the later stages read: photos, a model, chroma of every view.
+// A tiny scene with all inputs of the later stages: photos, a model, chroma of every view.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,8 @@ namespace color3d {
 
 class EvaluatedSceneTest : public StageTest {
  protected:
-  // Three views of a grey ramp, a model, and one chroma for all views but p2, which is redder.
+  // Three views of a grey ramp, a model, and constant chroma for all views except p2, which is
+  // redder.
   void SetUp() override {
     scene_ = RampScene(scratch_.path(), 48, 32);
     AddInput(artifact::kScene, SceneToJson(scene_));
@@ -28,7 +29,7 @@ class EvaluatedSceneTest : public StageTest {
       AddInput(ViewArtifact(artifact::kViewsAb, view, ".png"), EncodeAbPng(ab));
     }
   }
-  // The photo's own L with chroma (5, 5).
+  // The photo's L with chroma (5, 5).
   TruthFile TruthOf(const std::string& name) {
     const Image l = LuminanceFromSrgb(ReadImage(scratch_.path() / name));
     const auto file = scratch_.path() / ("true_" + name);

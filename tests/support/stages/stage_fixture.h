@@ -23,7 +23,7 @@ class Warnings : public NullObserver {
   std::string text;
 };
 
-// Keeps every state that it is given, and dies at one.
+// Records all states, and throws at one of them.
 class DyingCheckpoints : public CheckpointStore {
  public:
   std::optional<std::string> Load() override {
@@ -58,7 +58,7 @@ class StageTest : public ::testing::Test {
     WriteFileAtomic(path, bytes);
     inputs_[name] = path;
   }
-  // Runs a stage and adds its artifacts to the inputs, below `folder`. Returns the names.
+  // Runs a stage, adds its artifacts below `folder` to the inputs, and returns their names.
   template <class Stage>
   std::vector<std::string> RunForInputs(const Stage& stage, const std::string& folder = "") {
     StageContext context = MakeContext();
@@ -85,10 +85,10 @@ class StageTest : public ::testing::Test {
   std::map<std::string, std::filesystem::path> models_;
   RemoteColorizerFactory remote_;
   int added_key_views_ = 0;
-  int added_ = 0;  // inputs, those that were replaced too
+  int added_ = 0;  // number of added inputs, with replaced ones
 };
 
-// Three photos of a ramp, with made-up poses, as an imported scene.
+// Three photos of a ramp with synthetic poses, as an imported scene.
 inline Scene RampScene(const std::filesystem::path& folder, int width, int height) {
   Scene scene;
   for (int i = 0; i < 3; ++i) {
@@ -111,8 +111,8 @@ inline Scene RampScene(const std::filesystem::path& folder, int width, int heigh
   return scene;
 }
 
-// A dark wall, and before it a bright ball that goes from x = -0.4 at begin_s to x = 0.4 at end_s,
-// at the depth kBallDepth.
+// A dark wall, and in front of it a bright ball that moves from x = -0.4 at begin_s to x = 0.4 at
+// end_s, at depth kBallDepth.
 inline constexpr float kBallDepth = 1.5f;
 inline GaussianModel BallBeforeWall(double begin_s, double end_s) {
   GaussianModel model;

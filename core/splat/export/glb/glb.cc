@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/splat/export/little_endian.h"
+#include "core/base/little_endian.h"
 #include "core/splat/model/spherical_harmonics.h"
 
 namespace color3d {

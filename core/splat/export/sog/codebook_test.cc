@@ -33,7 +33,7 @@ TEST(CodebookTest, KeepsFewValuesAndApproximatesMany) {
       EXPECT_LE(std::abs(v - got), std::abs(v - level) + 1e-6);
     if (testing::Test::HasFailure()) return;
   }
-  // The best that 256 levels of a normal distribution can do is sqrt(3) pi / 2 / 256^2.
+  // The minimum error of 256 levels for a normal distribution is sqrt(3) pi / 2 / 256^2.
   EXPECT_LT(squares / values.size(), 1.15 * std::sqrt(3.0) * M_PI / 2.0 / 65536.0);
 }
 

@@ -7,7 +7,7 @@
 namespace color3d {
 namespace {
 
-constexpr int kEffort = 4;  // 0..9; more hardly shrinks what is close to noise
+constexpr int kEffort = 4;  // 0..9; more hardly shrinks data close to noise
 
 class Picture {
  public:

@@ -8,27 +8,23 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/splat/export/bytes.h"
 #include "core/splat/export/morton.h"
 #include "core/splat/export/sog/codebook.h"
 #include "core/splat/export/sog/lossless_webp.h"
-#include "core/splat/export/sog/zip.h"
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/zip/zip.h"
 
 namespace color3d {
 namespace {
 
-constexpr int kPaletteColumns = 64;  // of the picture of centroids
-constexpr int kGaussiansPerPaletteRow =
-    8;  // what a palette of more rows costs, it hardly wins back
+constexpr int kPaletteColumns = 64;         // of the picture of centroids
+constexpr int kGaussiansPerPaletteRow = 8;  // at least: more rows cost about what they save
 constexpr int kMaxPalette = 65536;
 // Fewer levels than 256 make smaller pictures with hardly visible loss, except for scales.
 constexpr int kColorLevels = 128;
 constexpr int kHarmonicLevels = 64;
 constexpr int kLargestIsW = 252;  // the fourth byte of a rotation: which component is left out
-
-uint8_t Byte(float unit) {
-  return static_cast<uint8_t>(std::lround(255.0f * std::clamp(unit, 0.0f, 1.0f)));
-}
 
 // Six digits in JSON, more than the precision of a codebook's levels.
 std::vector<double> ShortNumbers(const Codebook& codebook) {
@@ -49,7 +45,7 @@ std::array<uint8_t, 4> PackRotation(const float* q) {
   std::array<uint8_t, 4> packed;
   int next = 0;
   for (int k = 0; k < 4; ++k) {
-    if (k != largest) packed[next++] = Byte(0.5f + factor * q[k]);
+    if (k != largest) packed[next++] = Byte(255.0f * (0.5f + factor * q[k]));
   }
   packed[3] = static_cast<uint8_t>(kLargestIsW + largest);
   return packed;
@@ -138,7 +134,7 @@ class SogWriter {
     meta_["sh0"] = {{"codebook", ShortNumbers(codebook)}, {"files", {"sh0.webp"}}};
     AddTexture("sh0.webp", [&](size_t i, uint8_t* out) {
       for (int c = 0; c < 3; ++c) out[c] = codebook.Nearest(Sh(i)[c]);
-      out[3] = Byte(1.0f / (1.0f + std::exp(-g_.opacity_logit[i])));
+      out[3] = Byte(255.0f * (1.0f / (1.0f + std::exp(-g_.opacity_logit[i]))));
     });
   }
 

@@ -9,7 +9,6 @@
 
 #include "core/base/error.h"
 #include "core/splat/export/export.h"
-#include "core/splat/export/sog/zip.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "tests/support/formats/viewer_files.h"
 #include "tests/support/scenes/random_model.h"
@@ -56,7 +55,7 @@ TEST(SogTest, RoundTripsWithinFormatPrecision) {
         lost += std::pow(g.sh[i * row + k] - file.sh[j * row + k], 2.0);
       }
     }
-    // Random harmonics are the worst that a palette can be given.
+    // Random harmonics are the worst case for a palette.
     if (degree > 0) {
       EXPECT_LT(lost, 0.6 * harmonics) << degree;
     }
@@ -115,14 +114,6 @@ TEST(SogTest, RejectsNonFiniteValues) {
   g = Gaussians(4, 1);
   g.sh[13] = std::nanf("");
   EXPECT_THROW(EncodeSog(g, pool), Error);
-}
-
-TEST(SogTest, ZipRoundTrips) {
-  const auto files = ReadStoredZip(StoredZip({{"a", "one"}, {"folder/b", std::string(300, '\0')}}));
-  ASSERT_EQ(files.size(), 2u);
-  EXPECT_EQ(files.at("a"), "one");
-  EXPECT_EQ(files.at("folder/b").size(), 300u);
-  EXPECT_TRUE(ReadStoredZip(StoredZip({})).empty());
 }
 
 }  // namespace

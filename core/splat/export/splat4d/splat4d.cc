@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/error.h"
+#include "core/base/little_endian.h"
 #include "core/splat/export/bytes.h"
-#include "core/splat/export/little_endian.h"
 #include "core/splat/export/morton.h"
 #include "core/splat/export/splat4d/held_track.h"
 #include "core/splat/export/splat4d/mover_frames.h"
@@ -19,8 +19,8 @@ namespace {
 constexpr char kMagic[] = "SP4D";
 constexpr int kVersion = 1;
 constexpr int kFramesOfGroup = 30;
-constexpr double kStillFramesPerSecond = 30.0;  // where the frames have no span
-constexpr double kPositionOfSize = 0.05;        // bound, of the median Gaussian's size
+constexpr double kStillFramesPerSecond = 30.0;  // for frames without a time span
+constexpr double kPositionOfSize = 0.05;        // bound, relative to the median Gaussian's size
 constexpr double kFarthestSteps = 1 << 29;
 constexpr double kScaleBound = 0.01;  // relative
 constexpr int kOpacityBound = 1;      // of 255
@@ -65,7 +65,7 @@ class Encoder {
   std::string File() {
     Survey();
     Order();
-    const std::string still = Stills();
+    const std::string still = StaticSection();
     std::vector<std::string> groups;
     for (int first = 0; first < frames_; first += kFramesOfGroup) {
       groups.push_back(Group(first, std::min(first + kFramesOfGroup, frames_)));
@@ -113,7 +113,7 @@ class Encoder {
                                             : ever_seen_[i - first_mover_] != 0;
       if (is_seen) order_.push_back(i);
     }
-    if (order_.empty()) throw InvalidArgument("no Gaussian of this scene can be seen");
+    if (order_.empty()) throw InvalidArgument("no Gaussian of this scene is visible");
     std::stable_sort(order_.begin(), order_.end(), [&](uint32_t x, uint32_t y) {
       return Changing(x) < Changing(y);
     });
@@ -128,7 +128,7 @@ class Encoder {
     return movers;
   }
 
-  Stream StillMask(Attribute attribute) const {
+  Stream StaticMask(Attribute attribute) const {
     Stream stream{attribute, kStatic, std::vector<uint32_t>((order_.size() + 7) / 8, 0)};
     for (size_t n = 0; n < order_.size(); ++n) {
       if ((Changing(order_[n]) >> attribute & 1u) == 0) stream.symbols[n / 8] |= 128u >> (n % 8);
@@ -160,11 +160,11 @@ class Encoder {
     return stream;
   }
 
-  std::string Stills() {
+  std::string StaticSection() {
     const double position_step = positions().quantizer().base_step;
     const int coefficients = ShCoefficients(g_.sh_degree);
     std::vector<Stream> streams;
-    for (int a = 0; a < kAttributes; ++a) streams.push_back(StillMask(static_cast<Attribute>(a)));
+    for (int a = 0; a < kAttributes; ++a) streams.push_back(StaticMask(static_cast<Attribute>(a)));
     streams.push_back(Differences(kPosition, [&](uint32_t i, int k) {
       if (i >= first_mover_) return positions().Base(i - first_mover_, k);
       return static_cast<int32_t>(std::lround(g_.position[3 * i + k] / position_step));
@@ -304,7 +304,7 @@ class Encoder {
     const size_t length = text_from(0).size() + kDigitsOfSpan * (groups.size() + 1);
     std::string file = kMagic;
     PutLittleEndian(kVersion, 2, &file);
-    PutLittleEndian(0, 2, &file);  // colours as they are
+    PutLittleEndian(0, 2, &file);  // colours are stored unchanged
     PutLittleEndian(length, 4, &file);
     std::string text = text_from(file.size() + length);
     text.resize(length, ' ');
@@ -330,7 +330,7 @@ std::string EncodeSplat4d(const GaussianModel& model,
                           ThreadPool& pool) {
   if (frames < 1 || frames > kMaxSplat4dFrames) {
     throw InvalidArgument(
-        "a .splat4d of {} frames was asked for; 1 to {} can be", frames, kMaxSplat4dFrames);
+        "a .splat4d of {} frames cannot be written; request 1 to {}", frames, kMaxSplat4dFrames);
   }
   if (model.size() == 0) throw InvalidArgument("there are no Gaussians");
   return Encoder(model, rgb, frame, frames, pool).File();

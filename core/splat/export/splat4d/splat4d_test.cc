@@ -38,7 +38,7 @@ GaussianModel MovingModel() {
   return model;
 }
 
-// By what does not change.
+// Nearest Gaussian by the attributes that do not change.
 size_t PartnerOf(const ViewerGaussians& g, size_t i, const Splat4dFrame& frame) {
   size_t nearest = 0;
   double least = HUGE_VAL;
@@ -117,7 +117,7 @@ TEST_F(Splat4dTest, StaticGaussiansAreStoredOnce) {
 
 TEST_F(Splat4dTest, OmitsGaussiansInvisibleInAllFrames) {
   GaussianModel model = MovingModel();
-  model.opacity_logit[0] = -20.0f;           // stands still
+  model.opacity_logit[0] = -20.0f;           // static
   model.opacity_logit[kCount - 1] = -20.0f;  // moves
   const Splat4dFile file = ReadSplat4d(Encode(model, 5));
   EXPECT_EQ(file.frames.front().opacity.size(), kCount - 2);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/splat/export/little_endian.h"
+#include "core/base/little_endian.h"
 #include "core/splat/export/zstd.h"
 
 namespace color3d {

@@ -1,18 +1,17 @@
 #include "core/splat/export/spz/spz.h"
 
-#include <zlib.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/base/little_endian.h"
 #include "core/splat/export/bytes.h"
-#include "core/splat/export/little_endian.h"
 #include "core/splat/export/morton.h"
 #include "core/splat/export/zstd.h"
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/zip/gzip.h"
 
 namespace color3d {
 namespace {
@@ -37,7 +36,7 @@ int FractionalBits(const std::vector<float>& position) {
   while (bits >= 0 && std::ldexp(farthest, bits) > kPositionLimit) --bits;
   if (bits < 0) {
     throw InvalidArgument(
-        "a coordinate of {} is beyond what SPZ can say; move the scene to the origin", farthest);
+        "a coordinate of {} is out of the range of SPZ; move the scene to the origin", farthest);
   }
   return bits;
 }
@@ -49,9 +48,9 @@ void CheckScales(const std::vector<float>& log_scale) {
   });
   if (2 * static_cast<size_t>(outside) <= log_scale.size()) return;
   throw InvalidArgument(
-      "most Gaussians are smaller than {:.1g} or larger than {:.0f} units, which SPZ cannot say; "
-      "ask "
-      "for another format",
+      "most Gaussians are smaller than {:.1g} or larger than {:.0f} units, out of the range of "
+      "SPZ; "
+      "export another format",
       std::exp(kLowestLogScale),
       std::exp(highest));
 }
@@ -135,7 +134,7 @@ std::string FirstThree(const ViewerGaussians& g) {
 // True for basis functions that change sign with the axes.
 std::array<float, kMaxShCoefficients> FlippedSigns() {
   double here[kMaxShCoefficients], there[kMaxShCoefficients];
-  EvaluateSh(kMaxShCoefficients, 0.36, 0.48, 0.8, here);  // where none is zero
+  EvaluateSh(kMaxShCoefficients, 0.36, 0.48, 0.8, here);  // a direction without zeros
   EvaluateSh(kMaxShCoefficients, 0.36, -0.48, -0.8, there);
   std::array<float, kMaxShCoefficients> signs;
   for (int k = 0; k < kMaxShCoefficients; ++k) signs[k] = here[k] * there[k] < 0.0 ? -1.0f : 1.0f;
@@ -158,26 +157,6 @@ std::string Harmonics(const ViewerGaussians& g) {
     }
   }
   return bytes;
-}
-
-std::string Gzip(const std::string& plain) {
-  z_stream stream = {};
-  constexpr int kWindowOfGzip = 15 + 16;
-  if (deflateInit2(
-          &stream, Z_DEFAULT_COMPRESSION, Z_DEFLATED, kWindowOfGzip, 8, Z_DEFAULT_STRATEGY) !=
-      Z_OK) {
-    throw Error(ErrorCode::kInternal, "zlib cannot be started");
-  }
-  std::string packed(deflateBound(&stream, plain.size()), '\0');
-  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(plain.data()));
-  stream.avail_in = static_cast<uInt>(plain.size());
-  stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-  stream.avail_out = static_cast<uInt>(packed.size());
-  const int code = deflate(&stream, Z_FINISH);
-  packed.resize(stream.total_out);
-  deflateEnd(&stream);
-  if (code != Z_STREAM_END) throw Error(ErrorCode::kInternal, "zlib ended with {}", code);
-  return packed;
 }
 
 // Spatial neighbours are similar and compress better together.
@@ -231,7 +210,7 @@ std::string EncodeSpz(const ViewerGaussians& gaussians, SpzVersion version, Thre
     return Gzip(file);
   }
   PutLittleEndian(streams.size(), 1, &file);
-  PutLittleEndian(kHeaderBytes, 4, &file);  // where the table of sizes begins
+  PutLittleEndian(kHeaderBytes, 4, &file);  // offset of the table of sizes
   file.resize(kHeaderBytes, '\0');
   std::vector<std::string> packed(streams.size());
   pool.ForEach(static_cast<int64_t>(streams.size()),

@@ -43,8 +43,7 @@ class AdditionalKeyFrameTest : public StageTest {
     RunCarryColor(options, context);
     std::vector<std::string> files;
     for (const View& view : scene_.views) {
-      files.push_back(
-          ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kCarried, view, ".png")));
+      files.push_back(ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kCarried, view)));
     }
     return files;
   }

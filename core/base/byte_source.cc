@@ -1,4 +1,4 @@
-#include "core/weights/byte_source.h"
+#include "core/base/byte_source.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -41,14 +41,14 @@ FileSource::Opened FileSource::Open(const std::filesystem::path& path) {
   const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) {
     throw Error(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kFailedPrecondition,
-                "cannot open the weight file {}: {}",
+                "cannot open {}: {}",
                 path.string(),
                 std::strerror(errno));
   }
   struct stat status {};
   if (fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {
     close(descriptor);
-    throw Error(ErrorCode::kNotFound, "the weight file {} is no regular file", path.string());
+    throw Error(ErrorCode::kNotFound, "{} is not a regular file", path.string());
   }
   return {descriptor, static_cast<uint64_t>(status.st_size)};
 }

@@ -1,6 +1,6 @@
-// Source of bytes for the weight readers: a file or memory. Files are not mapped, so that a file
-// that shrinks while it is read causes an error instead of a signal, and resident memory is bounded
-// by what the reader keeps. Immutable, thread-safe.
+// Source of bytes for readers of untrusted files: a file or memory. Files are not mapped, so that a
+// file that shrinks while it is read causes an error instead of a signal, and the resident memory
+// is what the reader keeps. Immutable, thread-safe.
 #pragma once
 
 #include <fmt/core.h>
@@ -47,7 +47,7 @@ class ByteSource {
 // The bytes must outlive the source. `name` starts the messages.
 class MemorySource : public ByteSource {
  public:
-  explicit MemorySource(std::string_view bytes, const std::string& name = "weight file");
+  explicit MemorySource(std::string_view bytes, const std::string& name = "the file");
 
  private:
   void DoRead(uint64_t offset, uint64_t count, char* out) const override;
