@@ -318,7 +318,7 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
   const char* whole = "The whole scene";
   command
       ->add_option(
-          "--saturation", options->saturation, "Factor on all colours, 0 to 4; 1: unchanged")
+          "--saturation", options->saturation, "Factor of the saturation, 0 to 4; 1: unchanged")
       ->group(whole);
   command
       ->add_option("--warmth",
@@ -333,7 +333,7 @@ void DeclareOptions(CLI::App* command, CorrectOptions* options) {
       "--undo", options->undo, "Number of corrections to remove, the last first; or all");
   command->add_option("--proposals",
                       options->proposals,
-                      "Number of places to propose for a stroke (default without a correction: 3)");
+                      "Number of places to propose for strokes; default without a correction: 3");
 }
 
 }  // namespace

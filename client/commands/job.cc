@@ -298,7 +298,7 @@ void AddJobCommands(CLI::App& app, Context& context) {
   AddNamed(job,
            context,
            "unpin",
-           "Let a job be deleted by age again",
+           "Allow a job to be deleted by age again",
            [](const auto& c, const auto& name) { return RunPin(c, name, false); });
   AddNamed(job, context, "kill", "Kill a job of any project at once (role admin)", RunKill);
   const auto follow = std::make_shared<bool>(false);

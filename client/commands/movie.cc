@@ -245,8 +245,9 @@ void AddMovieCommands(CLI::App& app, Context& context) {
                      "fixed camera of the key view); or a file of cameras (transforms.json; in "
                      "dynamic scenes with the `time` of each frame). Default: pictures of views "
                      "instead of a movie");
-  render->add_option(
-      "--views", rendering->views, "Names of the views to render, or to pass on the path original");
+  render->add_option("--views",
+                     rendering->views,
+                     "Names of the views to render, or that the path original passes");
   render->add_option("-o,--out", rendering->out, "FILE.mp4 or a folder")->capture_default_str();
   render->add_flag("--png", rendering->pictures, "Also write every frame as a picture");
   render->add_flag("!--no-video", rendering->video, "With --png: write no movie");

@@ -116,9 +116,10 @@ void AddPreviewCommand(CLI::App& app, Context& context) {
                                  "Colour a few photos from a coloured key view within seconds",
                                  [&context, options] { return Preview(context, *options); });
   preview->add_option("photos", options->target, "Folder of photos, or scenes/ID")->required();
-  preview->add_option("--key-color",
-                      options->key_color,
-                      "The coloured key view; default for scenes/ID: that of the scene");
+  preview->add_option(
+      "--key-color",
+      options->key_color,
+      "The coloured key view; default for scenes/ID: the accepted one, else the newest");
   preview->add_option(
       "--key",
       options->key,

@@ -97,20 +97,20 @@ std::vector<std::string> FindMasks(const fs::path& scene_folder,
   std::vector<std::string> unused;
   for (const std::string& file : files.all()) {
     if (!HasImageExtension(file)) {
-      throw InvalidArgument("{} is no picture; masks are PNG files called like their photos", file);
+      throw InvalidArgument("{} is no picture; masks are PNG files named like their photos", file);
     }
     if (!fitting.contains(file)) unused.push_back(file);
   }
   if (unused.empty()) return masks;
   if (unused.size() == files.all().size()) {
     throw InvalidArgument(
-        "{} is the mask of no photo; masks are called like their photos (a.png or a.jpg.png for "
+        "{} matches no photo; masks are named like their photos (a.png or a.jpg.png for "
         "a.jpg)",
         unused[0]);
   }
   if (warnings != nullptr) {
     warnings->push_back(fmt::format(
-        "{} of {} masks are of no photo and were left out: {}; masks are called like their photos "
+        "{} of {} masks match no photo and were left out: {}; masks are named like their photos "
         "(a.png or a.jpg.png for a.jpg)",
         unused.size(),
         files.all().size(),

@@ -82,7 +82,7 @@ TEST_F(PhotoMasksTest, NamesBadMasks) {
   Write("images/a.jpg", EncodeJpeg(Image(8, 6, 3, 0.5f)));
   const auto find = [&] { FindMasks(root(), {"images/a.jpg"}, {"images/unposed.jpg"}); };
   Write("masks/b.png", "");
-  EXPECT_THAT(ErrorOf(find), AllOf(HasSubstr("masks/b.png"), HasSubstr("of no photo")));
+  EXPECT_THAT(ErrorOf(find), AllOf(HasSubstr("masks/b.png"), HasSubstr("matches no photo")));
   fs::remove(root() / "masks/b.png");
   Write("masks/unposed.png", "");
   EXPECT_EQ(ErrorOf(find), "") << "photos without a pose may have masks";
@@ -108,7 +108,7 @@ TEST_F(PhotoMasksTest, LeavesOutMasksOfDeletedPhotosWithNote) {
   EXPECT_THAT(FindMasks(root(), {"images/a.jpg"}, {}, &warnings), ElementsAre("masks/A.PNG"));
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_THAT(warnings[0],
-              HasSubstr("1 of 2 masks are of no photo and were left out: masks/gone.jpg.png"));
+              HasSubstr("1 of 2 masks match no photo and were left out: masks/gone.jpg.png"));
 }
 
 TEST_F(PhotoMasksTest, ReducedPixelNeedsFullCoverage) {

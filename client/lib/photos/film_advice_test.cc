@@ -39,7 +39,7 @@ TEST_F(FilmAdviceTest, NamesFormatAndConversion) {
               AllOf(HasSubstr("a.gif is an animated picture (GIF)"), HasSubstr("ffmpeg -i ")));
   Write("scan_0086400.dpx");
   EXPECT_THAT(Complaint("scan_0086400.dpx"),
-              AllOf(HasSubstr("a picture (DPX)"),
+              AllOf(HasSubstr("a picture in an unsupported format (DPX)"),
                     HasSubstr("-start_number 0086400 -i "),
                     HasSubstr("scan_%07d.dpx")));
   Write("A001.R3D");
@@ -60,7 +60,8 @@ TEST_F(FilmAdviceTest, FolderNamesFirstFileOfKind) {
                                 "2 more are"),
                       HasSubstr("-start_number 9 -i "),
                       HasSubstr("scan%d.dpx")));
-    EXPECT_THAT(Complaint("", as_frames), HasSubstr("reel/scan9.dpx is a picture (DPX)"));
+    EXPECT_THAT(Complaint("", as_frames),
+                HasSubstr("reel/scan9.dpx is a picture in an unsupported format (DPX)"));
   }
   Write("clips/b.gif");
   EXPECT_THAT(Complaint("clips"), HasSubstr("clips/b.gif is an animated picture (GIF)"));

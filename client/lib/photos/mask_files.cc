@@ -77,7 +77,7 @@ void AddMasks(const fs::path& masks, PhotoFolder* folder) {
   }
   if (folder->mask_files.empty() && !unused.empty()) {
     throw InvalidArgument(
-        "--masks: {} is the mask of no photo; masks are PNG files called like their photos "
+        "--masks: {} matches no photo; masks are PNG files named like their photos "
         "(a.png or a.jpg.png for a.jpg)",
         unused[0]);
   }
@@ -88,7 +88,7 @@ void AddMasks(const fs::path& masks, PhotoFolder* folder) {
       fmt::format("{} of {} photos have masks", mask_of.size(), folder->photos.size()));
   if (!unused.empty()) {
     folder->notes.push_back(
-        fmt::format("{} of {} masks are of no photo and were left out (e.g. {}); masks are called "
+        fmt::format("{} of {} masks match no photo and were left out (e.g. {}); masks are named "
                     "like their photos (a.png or a.jpg.png for a.jpg)",
                     unused.size(),
                     unused.size() + mask_of.size(),

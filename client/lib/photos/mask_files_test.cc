@@ -65,7 +65,7 @@ TEST_F(MaskFilesTest, LeavesOutMasksOfDeletedPhotosWithNote) {
   AddMasks(masks(), &folder);
   ASSERT_EQ(folder.mask_files.size(), 1u);
   EXPECT_EQ(folder.mask_files[0].path, "masks/A.PNG");
-  EXPECT_THAT(folder.notes, ::testing::Contains(HasSubstr("1 of 2 masks are of no photo")));
+  EXPECT_THAT(folder.notes, ::testing::Contains(HasSubstr("1 of 2 masks match no photo")));
 }
 
 TEST_F(MaskFilesTest, NamesFilesThatAreNoMasks) {
@@ -73,14 +73,14 @@ TEST_F(MaskFilesTest, NamesFilesThatAreNoMasks) {
   fs::create_directories(masks());
   EXPECT_THAT(ErrorOf(), HasSubstr("no mask in it"));
   WriteMask("d.png");
-  EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("d.png"), HasSubstr("of no photo")));
+  EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("d.png"), HasSubstr("matches no photo")));
   fs::remove(masks() / "d.png");
   WriteMask("a.png", 16, 24);
   EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("16 x 24 px"), HasSubstr("24 x 16 px")));
   Write(masks() / "a.png", "no picture");
   EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("a.png"), HasSubstr("not an image")));
   Write(masks() / "a.png", EncodeJpeg(Image(24, 16, 1, 1.0f)));
-  EXPECT_THAT(ErrorOf(), HasSubstr("no PNG"));
+  EXPECT_THAT(ErrorOf(), HasSubstr("not a PNG"));
   WriteMask("a.png");
   WriteMask("a.jpg.png");
   EXPECT_THAT(ErrorOf(), AllOf(HasSubstr("two masks"), HasSubstr("a.jpg")));

@@ -46,17 +46,17 @@ TEST(HoldOutBlockTest, IsInMiddleWithAllCameras) {
   }
 }
 
-TEST(HoldOutBlockTest, IsRefusedIfTooFewMomentsRemain) {
+TEST(HoldOutBlockTest, IsRefusedIfTooFewTimesRemain) {
   EXPECT_EQ(Said(0.5, SceneOf(2, 8)), "");
   EXPECT_THAT(Said(0.05, SceneOf(2, 20)),
-              HasSubstr("0.05 of 20 moments, which is less than two of them; give 0.1 or more"));
+              HasSubstr("0.05 of 20 time steps, which is less than two of them; give 0.1 or more"));
   EXPECT_THAT(Said(0.5, SceneOf(2, 6)), HasSubstr("1 are left for training before the block"));
   Scene still = SceneOf(1, 20);
   for (View& view : still.views) view.moment.reset();
   EXPECT_THAT(Said(0.2, still), HasSubstr("these views have no times"));
   Scene scene = SceneOf(1, 20);  // all times after the block are held out already
   for (int t = 12; t < 19; ++t) scene.views[t].held_out = true;
-  EXPECT_THAT(Said(0.2, scene), HasSubstr("and 1 behind it"));
+  EXPECT_THAT(Said(0.2, scene), HasSubstr("and 1 after it"));
 }
 
 TEST(HeldOutKindsTest, DistinguishesCamerasTimesAndBlocks) {

@@ -73,7 +73,7 @@ TEST(Parallax, DetectsStaticOrRotatingCamera) {
   }
   EXPECT_LT(Look(still).median_shift, 0.004);
   EXPECT_GT(Look(turning).median_shift, 0.05);
-  EXPECT_THAT(Describe(Look(still)), testing::HasSubstr("190 of 190 pairs"));
+  EXPECT_THAT(Describe(Look(still)), testing::HasSubstr("190 of 190 overlapping pairs"));
 }
 
 TEST(Parallax, AcceptsMovingCamera) {
