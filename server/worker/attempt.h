@@ -35,7 +35,7 @@ struct AttemptContext {
 };
 
 // Requeues the job without counting the attempt. Does not throw.
-void GiveBack(WorkerStore& store, const JobRecord& job);
+void ReturnJob(WorkerStore& store, const JobRecord& job);
 
 // Does not throw: the outcome is stored or, if that fails, left to the end of the lease.
 // `shares_process`: other attempts run in this process; peak memory is then that of all of them.

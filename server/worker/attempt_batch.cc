@@ -23,7 +23,7 @@ void AttemptBatch::Start(const JobRecord& job) {
   } catch (const std::exception& e) {  // no more threads
     spdlog::error("{} cannot be run beside others: {}", AttemptTag(job), e.what());
     running_.pop_back();
-    GiveBack(context_.store, job);
+    ReturnJob(context_.store, job);
   }
 }
 
