@@ -168,7 +168,7 @@ TEST(Scene, ReadsJsonOfEarlierVersion) {
       R"("captured_camera":{"cx":4.0,"cy":3.0,"fx":9.0,"fy":9.0,"height":6,"width":8},)"
       R"("distortion":{"k":[0.1,0.0,0.0,0.0,0.0,0.0,0.0,0.0],"model":"brown"},)";
   const Scene scene = SceneFromJson(
-      R"({"format":"color3d-scene","points":[[0.0,0.5,2.0,0.25,[0,1]]],)"
+      R"({"format":"color3d.scene","points":[[0.0,0.5,2.0,0.25,[0,1]]],)"
       R"("relief":{"backdrop_depth":4.0,"foot":0.5,"horizon":0.3},"version":1,"views":[{)" +
       view +
       R"("held_out":false,"image_file":"images/0001.png","mask_file":"masks/0001.png",)"
