@@ -24,6 +24,7 @@ void AddReconstructCommand(CLI::App& app);
 void AddReferenceCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
 void AddPretrainCommand(CLI::App& app);
+void AddScoreCommand(CLI::App& app);
 void AddSplatViewsCommand(CLI::App& app);
 void AddStabilityCommand(CLI::App& app);
 void AddSuiteCommand(CLI::App& app);

@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   color3d::AddReconstructCommand(app);
   color3d::AddPosesCommand(app);
   color3d::AddPretrainCommand(app);
+  color3d::AddScoreCommand(app);
   color3d::AddSplatViewsCommand(app);
   color3d::AddStabilityCommand(app);
   color3d::AddSuiteCommand(app);

@@ -1,0 +1,157 @@
+#include "tests/bench/picture_scores.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/color/lab.h"
+#include "core/color/lab_planes.h"
+#include "core/image/codec.h"
+#include "core/image/probe/probe.h"
+#include "core/metrics/view_scores.h"
+
+namespace color3d {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr size_t kHoldOutEvery = 8;
+constexpr double kShapeTolerance = 0.02;
+constexpr int kBootstrapSamples = 2000;
+
+// Pictures directly in the folder, by stem.
+std::map<std::string, fs::path> PicturesByStem(const fs::path& folder) {
+  if (!fs::is_directory(folder)) {
+    throw Error(ErrorCode::kNotFound, "there is no folder {}", folder.string());
+  }
+  std::map<std::string, fs::path> found;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with('.') || !entry.is_regular_file() || !HasImageExtension(name)) continue;
+    const auto [other, is_new] = found.emplace(entry.path().stem().string(), entry.path());
+    if (!is_new) {
+      throw InvalidArgument("{} has {} and {}: give one picture a view",
+                            folder.string(),
+                            other->second.filename().string(),
+                            name);
+    }
+  }
+  if (found.empty()) {
+    throw InvalidArgument("{} has no pictures ({})", folder.string(), ReadableImageFormats());
+  }
+  return found;
+}
+
+std::vector<std::string> SelectViews(const std::map<std::string, fs::path>& photos,
+                                     const std::map<std::string, fs::path>& pictures,
+                                     ScoredViews views) {
+  std::vector<std::string> selected;
+  size_t index = 0;
+  for (const auto& [stem, photo] : photos) {
+    const bool is_held_out = index++ % kHoldOutEvery == 0;
+    if (views == ScoredViews::kAll || (views == ScoredViews::kHeldOut && is_held_out) ||
+        (views == ScoredViews::kPictures && pictures.contains(stem))) {
+      selected.push_back(stem);
+    }
+  }
+  return selected;
+}
+
+Image ReadColor(const fs::path& file) {
+  Image image = ReadImage(file);
+  if (image.channels == 3) return image;
+  Image color(image.width, image.height, 3);
+  for (int c = 0; c < 3; ++c) std::copy_n(image.Plane(0), image.PlaneSize(), color.Plane(c));
+  return color;
+}
+
+std::map<std::string, double> Score(const fs::path& photo, const fs::path& picture) {
+  const Image truth = ReadColor(photo);
+  if (IsGray(truth)) {
+    throw InvalidArgument(
+        "{} is grey, and grey photos cannot score colours; give the photos in "
+        "their true colours",
+        photo.string());
+  }
+  const Image given = ReadColor(picture);
+  const double shape = static_cast<double>(given.width) * truth.height /
+                       (static_cast<double>(given.height) * truth.width);
+  if (std::abs(shape - 1.0) > kShapeTolerance) {
+    throw InvalidArgument(
+        "{} has {} x {} px, but its photo {} has {} x {}: pictures may be smaller "
+        "than the photos, not of another shape",
+        picture.string(),
+        given.width,
+        given.height,
+        photo.filename().string(),
+        truth.width,
+        truth.height);
+  }
+  // Both are reduced before the picture is fitted to the truth, so that large photos cost nothing.
+  const Image small = FitWithin(truth, kScoreSidePx);
+  const Image lab = LabFromSrgb(Resize(given, small.width, small.height));
+  return ScoreView(small, lab, ChromaOfLab(lab));
+}
+
+}  // namespace
+
+std::vector<PictureScores> ScorePictures(const fs::path& truth,
+                                         const fs::path& pictures,
+                                         ScoredViews views,
+                                         ThreadPool& pool,
+                                         const CancellationToken& cancel) {
+  const auto photos = PicturesByStem(truth), given = PicturesByStem(pictures);
+  for (const auto& [stem, picture] : given) {
+    if (photos.contains(stem)) continue;
+    throw InvalidArgument(
+        "{} has no photo of its name in {}: are these the pictures of another "
+        "scene?",
+        picture.string(),
+        truth.string());
+  }
+  const std::vector<std::string> selected = SelectViews(photos, given, views);
+  std::string missing;
+  size_t count = 0;
+  for (const std::string& stem : selected) {
+    if (given.contains(stem)) continue;
+    if (count++ < 5) missing += (missing.empty() ? "" : ", ") + stem;
+  }
+  if (count > 0) {
+    throw InvalidArgument("{} has no picture of {} of the {} scored views: {}{}",
+                          pictures.string(),
+                          count,
+                          selected.size(),
+                          missing,
+                          count > 5 ? ", ..." : "");
+  }
+  std::vector<PictureScores> scores(selected.size());
+  pool.ForEach(static_cast<int64_t>(selected.size()), [&](int64_t i, int) {
+    cancel.ThrowIfCancelled();
+    const std::string& stem = selected[static_cast<size_t>(i)];
+    scores[static_cast<size_t>(i)] = {stem, Score(photos.at(stem), given.at(stem))};
+  });
+  return scores;
+}
+
+MeanWithInterval BootstrapMean(const std::vector<double>& values) {
+  const size_t count = values.size();
+  const auto mean_of = [count](auto&& value) {
+    double sum = 0.0;
+    for (size_t i = 0; i < count; ++i) sum += value(i);
+    return sum / static_cast<double>(count);
+  };
+  std::mt19937 random(1);
+  std::vector<double> means(kBootstrapSamples);
+  for (double& mean : means) {
+    mean = mean_of([&](size_t) { return values[random() % count]; });
+  }
+  std::sort(means.begin(), means.end());
+  return {mean_of([&](size_t i) { return values[i]; }),
+          means[static_cast<size_t>(0.025 * kBootstrapSamples)],
+          means[static_cast<size_t>(0.975 * kBootstrapSamples) - 1]};
+}
+
+}  // namespace color3d

@@ -1,0 +1,47 @@
+// Scores of any method's pictures against true colours: the score of the benchmark card
+// (tests/bench/BENCHMARK.md). Pure but for reading files, thread-safe.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/base/cancellation.h"
+#include "core/base/parallel.h"
+
+namespace color3d {
+
+// Views of a folder of photos that are scored, in the order of their names.
+enum class ScoredViews {
+  kPictures,  // those that the method has pictures of
+  kHeldOut,   // every eighth photo, starting with the first
+  kAll,
+};
+
+struct PictureScores {
+  std::string view;                      // stem of the file
+  std::map<std::string, double> scores;  // ScoreView (core/metrics/view_scores.h)
+};
+
+// Pairs the pictures with the photos of the same stem, and scores each at the size of ScoreView.
+// Throws Error{kInvalidArgument} that names the file if a scored view has no picture, a picture has
+// no photo or another shape than it (by more than 2 %), two files share a stem, or the photos are
+// grey.
+std::vector<PictureScores> ScorePictures(const std::filesystem::path& truth,
+                                         const std::filesystem::path& pictures,
+                                         ScoredViews views,
+                                         ThreadPool& pool,
+                                         const CancellationToken& cancel);
+
+// Mean over views with its 95 % confidence interval: percentile bootstrap over the views, 2,000
+// samples, seed 1. The interval of one value is that value.
+struct MeanWithInterval {
+  double mean = 0.0;
+  double low = 0.0;
+  double high = 0.0;
+};
+// Requires: there are values.
+MeanWithInterval BootstrapMean(const std::vector<double>& values);
+
+}  // namespace color3d
