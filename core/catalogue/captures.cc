@@ -12,6 +12,10 @@
 namespace color3d {
 namespace {
 
+constexpr char kHasPoses[] =
+    "the scene has poses, and is coloured for all times; leave the range out, or colour the film "
+    "without poses";
+
 // Stages without work for a kind.
 struct IdleStage {
   CaptureKind kind;
@@ -106,9 +110,6 @@ CaptureLayout DetectCapture(const std::vector<std::string>& files) {
 }
 
 const std::vector<CaptureKindInfo>& CaptureKinds() {
-  constexpr char kHasPoses[] =
-      "the scene has poses, and is coloured for all times; leave the range out, or colour the film "
-      "without poses";
   static const std::vector<CaptureKindInfo> kinds = {
       {CaptureKind::kStatic, "static", false, true, "the scene is no film; leave the range out"},
       {CaptureKind::kFilm, "film", false, false, ""},
