@@ -110,7 +110,7 @@ const std::vector<CaptureKindInfo>& CaptureKinds() {
       "the scene has poses, and is coloured for all times; leave the range out, or colour the film "
       "without poses";
   static const std::vector<CaptureKindInfo> kinds = {
-      {CaptureKind::kStatic, "static", false, true, "the scene is no film; leave the range out"},
+      {CaptureKind::kStatic, "static", false, true, "the scene is not a film; leave the range out"},
       {CaptureKind::kFilm, "film", false, false, ""},
       {CaptureKind::kDynamic, "dynamic", true, true, kHasPoses},
       {CaptureKind::kRelief, "relief", true, true, kHasPoses}};
