@@ -111,7 +111,7 @@ CaptureLayout DetectCapture(const std::vector<std::string>& files) {
 
 const std::vector<CaptureKindInfo>& CaptureKinds() {
   static const std::vector<CaptureKindInfo> kinds = {
-      {CaptureKind::kStatic, "static", false, true, "the scene is no film; leave the range out"},
+      {CaptureKind::kStatic, "static", false, true, "the scene is not a film; leave the range out"},
       {CaptureKind::kFilm, "film", false, false, ""},
       {CaptureKind::kDynamic, "dynamic", true, true, kHasPoses},
       {CaptureKind::kRelief, "relief", true, true, kHasPoses}};
