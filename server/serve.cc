@@ -361,7 +361,7 @@ void Serve(const ServeOptions& options) {
   spdlog::info("ended");
   if (!deaf.empty()) {
     throw Error(ErrorCode::kUnavailable,
-                "ended, because nobody was answered on {} any more ({}); start it again",
+                "ended, because {} no longer answered calls ({}); start it again",
                 server.address(),
                 deaf);
   }

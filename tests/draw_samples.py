@@ -16,7 +16,7 @@ import sys
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 SLASH_COMMENTS = (".h", ".cc", ".proto", ".mjs", ".js")
 HASH_COMMENTS = (".py", ".sh", ".cmake", "CMakeLists.txt")
-NO_PROSE = re.compile(r"^[\s/#*=-]*$|NOLINT|clang-format|^namespace( |$)|^#!|fmt: |^! ")
+NO_PROSE = re.compile(r"^[\s/#*=-]*$|NOLINT|clang-format|^namespace( |$)|fmt: |^! ")
 TEST = re.compile(r"^\s*TEST(?:_F|_P)?\(\s*(\w+),\s*(\w+)", re.MULTILINE)
 THROW = re.compile(
     r"\b(?:throw\s+[\w:]+|return\s+(?:\w+::)*(?:Error|ServiceError|InvalidArgument|Status))\s*\("
@@ -44,7 +44,7 @@ def comments(path, text):
     behind_code = re.compile(rf'^[^"\']*[^"\'\s:][^"\']*\s{marker} (.*)$')
     block, begin = [], 0
     for number, line in enumerate(text.split("\n") + [""], 1):
-        match = whole_line.match(line)
+        match = None if line.startswith("#!") else whole_line.match(line)
         if match:
             block, begin = block + [match.group(1)], begin or number
             continue

@@ -79,7 +79,7 @@ v1::Digest FindExample(Connection& connection, const std::string& scene, std::st
 ExitCode Preview(const Context& context, const PreviewOptions& options) {
   const bool stored = options.target.starts_with("scenes/") && !fs::is_directory(options.target);
   if (!stored && options.key_color.empty()) {
-    throw InvalidArgument("--key-color is missing: the coloured key view");
+    throw InvalidArgument("--key-color is missing; give the coloured key view");
   }
   std::vector<LivePicture> pictures;
   if (!stored) pictures = CollectPictures(context, {options.target}, options.out);

@@ -35,7 +35,8 @@ void ExtractRange(std::string* value, AdditionalKeyView* key) {
   if (range.find_first_not_of("0123456789.-") != std::string::npos) return;
   if (!ParseRange(range, key)) {
     throw InvalidArgument(
-        "--add-key-view {}: '{}' is no range of time; write seconds of the film, BEGIN-END, e.g. "
+        "--add-key-view {}: '{}' is not a range of time; write seconds of the film, BEGIN-END, "
+        "e.g. "
         "@10-14.5, or @10- for up to its end",
         key->view,
         "@" + range);

@@ -201,7 +201,7 @@ TEST_F(ColorizeOptionsTest, ReadsAdditionalKeyViewsWithRange) {
               HasSubstr("ends at 2 s, before it begins at 5"));
   for (const char* text : {"@10", "@-", "@", "@1-2-3", "@1.2.3-4"}) {
     EXPECT_THAT(Complaint({std::string("--add-key-view=a=auto") + text}),
-                HasSubstr("is no range of time; write seconds of the film, BEGIN-END"))
+                HasSubstr("is not a range of time; write seconds of the film, BEGIN-END"))
         << text;
   }
   EXPECT_THAT(Complaint({"--add-key-view=a=painted@2x.png"}), HasSubstr("painted@2x.png"));

@@ -12,6 +12,10 @@
 namespace color3d {
 namespace {
 
+constexpr char kHasPoses[] =
+    "the scene has poses, and is coloured for all times; leave the range out, or colour the film "
+    "without poses";
+
 // Stages without work for a kind.
 struct IdleStage {
   CaptureKind kind;
@@ -106,11 +110,8 @@ CaptureLayout DetectCapture(const std::vector<std::string>& files) {
 }
 
 const std::vector<CaptureKindInfo>& CaptureKinds() {
-  constexpr char kHasPoses[] =
-      "the scene has poses, and is coloured for all times; leave the range out, or colour the film "
-      "without poses";
   static const std::vector<CaptureKindInfo> kinds = {
-      {CaptureKind::kStatic, "static", false, true, "the scene is no film; leave the range out"},
+      {CaptureKind::kStatic, "static", false, true, "the scene is not a film; leave the range out"},
       {CaptureKind::kFilm, "film", false, false, ""},
       {CaptureKind::kDynamic, "dynamic", true, true, kHasPoses},
       {CaptureKind::kRelief, "relief", true, true, kHasPoses}};

@@ -29,7 +29,7 @@ std::tuple<size_t, size_t, std::string> Rank(const std::string& key) {
 const std::vector<Metric>& MetricCatalogue() {
   using enum Metric::Place;
   static const std::vector<Metric> catalogue = {
-      // Of held-out views: core/metrics/view_scores.h.
+      // Held-out views: core/metrics/view_scores.h.
       {"delta_e00_chroma", "colour error (CIEDE2000)", {}, kInHeadline | kInSummary | kByHeldOut},
       {"delta_e00_gray", "colour error if left grey", {}, kInHeadline | kInSummary},
       {"delta_e00", "CIEDE2000, luminance included"},
@@ -39,7 +39,7 @@ const std::vector<Metric>& MetricCatalogue() {
       {"ab_rmse", "RMSE of a and b"},
       {"colorfulness", "colourfulness", {1}},
       {"colorfulness_ratio", "colourfulness, relative to the truth"},
-      // Of held-out pixels by the source of their colour.
+      // Held-out pixels by the source of their colour.
       {"delta_e00_seen", "colour error where seen"},
       {"delta_e00_inferred", "colour error where inferred"},
       {"delta_e00_guessed", "colour error where guessed"},

@@ -6,6 +6,7 @@
 #include "core/base/evenly.h"
 #include "core/carry/confidence.h"
 #include "core/color/lab.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/image/codec.h"
 #include "core/keycolor/picture_checks.h"

@@ -57,7 +57,7 @@ Scene WithDensePoints(Scene scene,
   return scene;
 }
 
-// What the import saw of each view to stand still; empty where it did not look.
+// Static background of each view according to import; empty if import did not search for it.
 PictureSource StillRegionsOf(const Scene& scene,
                              const ViewImages& images,
                              const StageContext& context) {

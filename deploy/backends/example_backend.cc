@@ -42,7 +42,7 @@ Chroma Mix(const Chroma& first, const Chroma& second, double share) {
   return {first.a + share * (second.a - first.a), first.b + share * (second.b - first.b)};
 }
 
-// What takes the place of a model. `height`: 0 at the top of the picture, 1 at the bottom.
+// Stand-in for a model. `height`: 0 at the top of the picture, 1 at the bottom.
 Chroma Tint(double luminance, double height) {
   const Chroma sky{-4.0, -26.0}, foliage{-16.0, 22.0}, shadow{9.0, 13.0};
   const Chroma lit = Mix(sky, foliage, 1.0 / (1.0 + std::exp(-12.0 * (height - 0.5))));
@@ -99,7 +99,7 @@ std::string Colorize(const ColorizeRequest& request, Report report) {
   return EncodePng8(SrgbFromLab(JoinLab(l, ab)));
 }
 
-// What takes the place of a generator: the picture at half its size in one corner of the canvas,
+// Stand-in for a generator: the picture at half its size in one corner of the canvas,
 // mirrored beyond its two outer sides.
 Image Outpaint(const Image& srgb, int corner) {
   const Image part = Resize(srgb, (srgb.width + 1) / 2, (srgb.height + 1) / 2);

@@ -1,4 +1,4 @@
-// What becomes of a film: which stages it has, and with which options.
+// Stages and options of films.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

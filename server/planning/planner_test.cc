@@ -59,7 +59,8 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
 
 TEST(Planner, CorrectionsPrecedeChroma) {
   const NewGraph without = PlanJob(SceneSpec(), {}, kTwentyPhotos);
-  EXPECT_THAT(without.jobs[IndexOf(without, "correct_colors")].skip_reason, HasSubstr("nothing"));
+  EXPECT_THAT(without.jobs[IndexOf(without, "correct_colors")].skip_reason,
+              HasSubstr("no corrections were given"));
 
   v1::JobSpec spec = SceneSpec();
   v1::CorrectColorsSpec* correct = spec.mutable_colorize_scene()->mutable_correct_colors();

@@ -1,5 +1,4 @@
-// What the check of a spec says to sources of key colour, and how names of models enter plans and
-// cache keys.
+// Checks of sources of key colour, and names of models in plans and cache keys.
 #include "server/planning/spec_check.h"
 
 #include <gmock/gmock.h>
@@ -139,7 +138,7 @@ TEST(SpecNames, RefusesUnknownNames) {
               AllOf(HasSubstr("UNKNOWN_BACKEND"), HasSubstr("it has: none")));
 }
 
-// The files' digests are added to the key by whoever knows the files.
+// The planner adds the digests of the files to the key.
 TEST(SpecNames, CacheKeysNameTheirFiles) {
   const NewGraph graph =
       PlanJob(SpecWithNames(), {}, {.pictures = 20, .layout = CaptureLayout::kColmap});

@@ -80,7 +80,7 @@ void LocalPipeline::Run(const std::string& kind,
                        recorder,
                        recorder,
                        cancel);
-  if (LeaveOutIdleStage(kind, context).empty()) stage(context);
+  if (SkipIdleStage(kind, context).empty()) stage(context);
   const double seconds = recorder.Seconds();
   if (!recorder.points().empty()) {
     context.WriteOutput(artifact::kCurves + kind + ".csv", CurvesToCsv(recorder.points()));

@@ -142,7 +142,7 @@ TEST_F(FilmTest, EstimatesPosesOnRequestOnly) {
   const ProcessResult still = Colorize(Path("frames"), {"--film", "--poses"});
   EXPECT_EQ(still.exit_code, 0) << still.err;
   EXPECT_THAT(still.err, HasSubstr("the camera stands still"));
-  EXPECT_THAT(still.err, HasSubstr("the scene is a relief (2.5D), its depth is assumed"));
+  EXPECT_THAT(still.err, HasSubstr("the scene is a relief (2.5D) with assumed depth"));
   const ProcessResult off = Colorize(Path("frames"), {"--film"});
   EXPECT_EQ(off.exit_code, 0) << off.err;
   EXPECT_EQ(off.err.find("stands still"), std::string::npos);

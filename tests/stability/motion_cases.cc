@@ -174,7 +174,7 @@ StabilityResult FarMoments(ThreadPool& pool) {
       if (at.Row(kOpacityRow)[i] > -9.0f) continue;
       for (int r = 0; r < kRows; ++r) d_at.Row(r)[i] = 0.0f;
     }
-    ApplyMotionBackward(moving, kRows, t, 0, at, d_at, pool, gradient);
+    ApplyMotionBackward({moving, kRows, t, 0}, at, d_at, pool, gradient);
     for (const ParameterBlock* block : {&at, &gradient}) {
       for (int r = 0; r < block->rows(); ++r) {
         result.non_finite += CountNonFinite(block->Row(r), kBlockCount);

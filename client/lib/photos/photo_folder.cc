@@ -136,7 +136,7 @@ void CollectAugmentFiles(const fs::path& root, PhotoFolder* result) {
     if (IsSystemPath(file)) continue;
     if (!HasImageExtension(file)) {
       throw InvalidArgument(
-          "{} is no picture ({}); augment/ is for pictures in colour that the colorizer learns "
+          "{} is not a picture ({}); augment/ is for pictures in colour that the colorizer learns "
           "from: move it elsewhere",
           path.string(),
           ReadableImageFormats());
@@ -185,7 +185,7 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames, const SkippedFiles& 
   }
   if (folder.photos.size() == 1 && as_frames) {
     throw InvalidArgument(
-        "{} contains one picture ({}), and one frame is no film; give the folder of all its "
+        "{} contains one picture ({}), and one frame is not a film; give the folder of all its "
         "frames{}",
         root,
         folder.photos[0].path,

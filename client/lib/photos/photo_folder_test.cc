@@ -65,7 +65,7 @@ TEST_F(PhotoFolderTest, AugmentPicturesAreNoPhotos) {
   EXPECT_THAT(Paths(folder.augment_files), ElementsAre("augment/deep/y.jpg", "augment/x.png"));
   EXPECT_EQ(folder.AllFiles().size(), 4u);
   Write("augment/notes.txt");
-  EXPECT_THAT(ErrorOf(root()), HasSubstr("augment/notes.txt is no picture"));
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("augment/notes.txt is not a picture"));
 }
 
 TEST_F(PhotoFolderTest, TakesSplatInsteadOfPhotos) {
@@ -264,7 +264,7 @@ TEST_F(PhotoFolderTest, ErrorsNameFolder) {
 TEST_F(PhotoFolderTest, RefusesFilmOfOnePicture) {
   Write("one.jpg");
   EXPECT_THAT(ErrorOf(root(), /*as_frames=*/true),
-              HasSubstr("contains one picture (one.jpg), and one frame is no film"));
+              HasSubstr("contains one picture (one.jpg), and one frame is not a film"));
 }
 
 TEST_F(PhotoFolderTest, RefusesNamesThatAreNotUtf8) {

@@ -63,7 +63,7 @@ Profile OpenProfile(const ColorTag& tag, std::string* problem) {
   if (tag.profile.empty()) {
     if (tag.gamma == 0.0) return nullptr;
     Profile profile = ProfileOfNumbers(tag);
-    if (!profile) *problem = "its primaries are nonsense";
+    if (!profile) *problem = "its primaries are invalid";
     return profile;
   }
   Profile profile(

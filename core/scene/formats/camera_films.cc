@@ -81,7 +81,7 @@ std::vector<CameraFilm> FilmsOfTransforms(const fs::path& scene_folder, const Fi
   }
   if (!films.empty() && !photo.empty()) {
     throw InvalidArgument(
-        "{} names the film {}, but {} is no film; give films or pictures, not both",
+        "{} names the film {}, but {} is not a film; give films or pictures, not both",
         kTransforms,
         films[0].file,
         photo);

@@ -111,7 +111,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
       image.observations.push_back(observation);
     }
     if (!images.emplace(id, std::move(image)).second) {
-      throw InvalidArgument("{} has the number of another one", place);
+      throw InvalidArgument("{} has the same number as another one", place);
     }
   }
   return images;

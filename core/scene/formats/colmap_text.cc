@@ -198,7 +198,7 @@ std::map<uint32_t, ColmapImage> ReadImages(const fs::path& path) {
       }
     }
     if (!images.emplace(id, std::move(image)).second) {
-      throw InvalidArgument("{} has the number of another one", place);
+      throw InvalidArgument("{} has the same number as another one", place);
     }
   }
   return images;

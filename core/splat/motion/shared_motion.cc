@@ -15,7 +15,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Of GaussianMotion's t. Time steps are counted from it; with an even number of them none is at 0.
+// In units of GaussianMotion's t. Origin of the time steps; with an even number of them none is at
+// 0.
 constexpr double kFirstTime = -1.0;
 constexpr size_t kFewest = 4;           // neighbours, the Gaussian itself among them
 constexpr double kOfAnotherStep = 0.5;  // weight

@@ -23,7 +23,7 @@ class CarriedFrames {
 
   // Frames that are nearest in time to `view`, one of each camera with a key view.
   std::vector<int> NearestTo(int view) const;
-  // Whether a camera with a key view took it.
+  // True if a camera with a key view took it.
   bool Has(int view) const { return has_[static_cast<size_t>(view)] != 0; }
   CarriedColor Of(int view) const;
 

@@ -286,8 +286,8 @@ class ShotColorer {
   }
 
   const ShotToColor& shot_;
-  const FrameColoring& coloring_;
   const FilmToColor& film_;
+  const FrameColoring& coloring_;
   StageContext& context_;
   std::set<int> guessed_;               // anchors with guessed colours
   int last_ = -1;                       // frame of the last stretch

@@ -15,7 +15,7 @@ struct FrameColoring {
   std::function<ColorSources(int view)> sources;
   // Called once with the colour of each view that was not done, in any order. Thread-safe.
   std::function<void(int view, const FusedColor& color)> deliver;
-  // Whether an interrupted run has delivered the view. Thread-safe.
+  // Returns true if an interrupted run has delivered the view. Thread-safe.
   std::function<bool(int view)> was_done;
   // Views that keep their given colours, in the order in which they were given.
   std::vector<int> key_views;

@@ -49,7 +49,7 @@ std::vector<int> TrainingViewsOf(const Shot& shot, const Scene& scene) {
 struct ShotKeys {
   int possible = 0;
   int own = 0;
-  // Whether it shows the place of a shot with a key frame again; nothing: not known yet.
+  // True if it shows the place of a shot with a key frame again; nullopt: not known yet.
   std::optional<bool> returns;
 
   int Serving() const { return std::max(own, returns.value_or(false) ? 1 : 0); }
@@ -75,7 +75,7 @@ int NextShot(const std::vector<Shot>& shots, const std::vector<ShotKeys>& keys) 
 
 int MiddleOf(const Shot& shot) { return shot.views[shot.views.size() / 2]; }
 
-// Whether the middle of `shot` shows the place of the middle of one of `others`, by the same search
+// True if the middle of `shot` shows the place of the middle of one of `others`, by the same search
 // as in carry_color.
 bool Returns(const Shot& shot,
              const std::vector<const Shot*>& others,

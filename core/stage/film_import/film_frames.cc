@@ -111,8 +111,7 @@ void WarnOfUnusedOptions(const FilmOptions& options, ImportedAs scene, StageCont
 void CheckFrameCount(size_t frames, double seconds, const FilmOptions& options) {
   if (frames <= kMaxFilmFrames) return;
   throw InvalidArgument(
-      "{} frames ({:.0f} s) exceed the limit of {}; set film_stride to {}, or take a part of at "
-      "most "
+      "{} frames ({:.0f} s) exceed the limit of {}; set film_stride to {}, or take at most "
       "{:.0f} s (film_begin_s, film_end_s)",
       frames,
       seconds,

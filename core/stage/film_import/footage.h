@@ -19,8 +19,8 @@ struct Footage {
   CameraFilm film;
   std::vector<std::string>
       pictures;  // if is_pictures: their names in order, relative to the folder
-  // Of all frames, seconds since the first frame of all films. Minus infinity for a frame at nearly
-  // the time of the one before it, as in damaged films.
+  // Times of all frames, seconds since the first frame of all films. Minus infinity for a frame at
+  // nearly the time of the one before it, as in damaged films.
   std::vector<double> times;
   std::vector<int> frames;  // requested ones, in order
 };

@@ -152,7 +152,7 @@ void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageConte
     context.ThrowIfCancelled();
     context.ReportProgress(i, count, "steadying exposure");
     StoreFrame(frames.scene.views[i],
-               Toned(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
+               ApplyToneCurve(LuminanceFromSrgb(stream.read(frames.index[i])), tones.curves[i]),
                context);
   }
   constexpr double kUnchangedL = 1e-6;

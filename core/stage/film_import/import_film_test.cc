@@ -225,7 +225,7 @@ TEST_F(ImportFilmTest, RefusesFourHoursWithRemedy) {
   const std::string complaint = Complaint();
   EXPECT_THAT(complaint, HasSubstr("3600 frames (14396 s)"));
   EXPECT_THAT(complaint, HasSubstr("set film_stride to 2"));
-  EXPECT_THAT(complaint, HasSubstr("part of at most 11996 s"));
+  EXPECT_THAT(complaint, HasSubstr("take at most 11996 s"));
   EXPECT_EQ(Import({.begin_s = 100.0, .end_s = 140.0}).views.size(), 10u);
 }
 

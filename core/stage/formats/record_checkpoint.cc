@@ -33,7 +33,7 @@ void ForEachRecord(const fs::path& file,
   uint64_t left = fs::file_size(file);
   std::string bytes(magic.size(), '\0');
   if (!in.read(bytes.data(), static_cast<std::streamsize>(bytes.size())) || bytes != magic) {
-    throw Error(ErrorCode::kDataLoss, "it is none of this version");
+    throw Error(ErrorCode::kDataLoss, "it has another version");
   }
   left -= bytes.size();
   while (left > 0) {

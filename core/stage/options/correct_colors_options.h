@@ -8,7 +8,7 @@
 
 namespace color3d {
 
-// What a user paints on a photo in its present colours (sources/given_colors.h).
+// Paint of the user on a photo in its present colours (sources/given_colors.h).
 struct PaintedColors {
   enum class Kind { kStrokes, kPoints, kPicture };
   Kind kind = Kind::kPicture;

@@ -7,7 +7,7 @@ namespace color3d {
 
 inline constexpr int kMaxFilmFrames = 3000;
 
-// Whether the frames' poses are looked for (film_import/film_poses.h).
+// Estimation of the frames' poses (film_import/film_poses.h).
 enum class FilmPoses { kOff, kAuto };
 
 struct FilmOptions {

@@ -230,7 +230,7 @@ TEST(RangesOfTest, RefusesImpossibleRanges) {
   for (int i = 0; i < 10; ++i) scene.views[i].cam_from_world.translation = {0.1 * i, 0.0, 0.0};
   EXPECT_THAT(Complaint({KeyOf("f03", 0.1, 0.2)}, scene), HasSubstr("has poses"));
   for (View& view : scene.views) view.moment.reset();
-  EXPECT_THAT(Complaint({KeyOf("f03", 0.1, 0.2)}, scene), HasSubstr("is no film"));
+  EXPECT_THAT(Complaint({KeyOf("f03", 0.1, 0.2)}, scene), HasSubstr("is not a film"));
 }
 
 }  // namespace

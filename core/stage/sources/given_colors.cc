@@ -101,7 +101,7 @@ GivenColors Read(const PaintedColors& painted,
                  StageContext& context) {
   switch (painted.kind) {
     case PaintedColors::Kind::kStrokes:
-      return FromMap(HintsOfStrokes(ReadPainted(painted.file, srgb)), srgb);
+      return FromMap(HintsFromStrokes(ReadPainted(painted.file, srgb)), srgb);
     case PaintedColors::Kind::kPoints:
       return FromHints(painted, srgb, context);
     case PaintedColors::Kind::kPicture:

@@ -20,7 +20,7 @@ Eigen::Vector3d Bounded(const Eigen::Vector3d& v) {
 constexpr double kMaxDifference = 15.0;  // L units; photos of one surface are exposed differently
 constexpr int kWindowRadius = 2;
 
-// Whether two pictures of the same size agree around a pixel: by the mean of |difference|.
+// True if two pictures of the same size agree around a pixel, by the mean of |difference|.
 bool Agree(const Image& x, const Image& y, int column, int row) {
   const int left = std::max(0, column - kWindowRadius), top = std::max(0, row - kWindowRadius);
   const int right = std::min(x.width - 1, column + kWindowRadius);

@@ -16,7 +16,7 @@ class ViewPositions {
   // Positions are unknown without geometry among the inputs.
   ViewPositions(const Scene& scene, const StageContext& context);
 
-  // Whether the geometry is static, so that frames are like photos.
+  // True if the geometry is static, so that frames are like photos.
   bool IsStatic() const { return geometry_ && geometry_->motion.size() == 0; }
 
   // Returns PictureFacts::position of the size of `luminance`, which is the view's as taken by

@@ -54,7 +54,7 @@ SmoothPath::SmoothPath(const std::vector<PathCamera>& knots, double unit) {
     numbers << knot.cam_from_world.Center(),
         knot.cam_from_world.rotation.conjugate().normalized().coeffs(), std::log(camera.fx),
         std::log(camera.fy), camera.cx, camera.cy;
-    // Of the two quaternions of a rotation, the one closer to the previous.
+    // Takes the quaternion of the rotation that is closer to the previous one.
     if (knots_.size() > 1 && numbers.segment<4>(3).dot(knots_.back().segment<4>(3)) < 0.0) {
       numbers.segment<4>(3) *= -1.0;
     }

@@ -45,7 +45,7 @@ def colorize(gray, prompt, seed, report):
 
     This one knows no model: sepia, or blueprint blue when the prompt asks for blue. The luminance
     may change a little; color3d puts the photo's own back. Call report(0..1) as you go: it raises
-    when nobody waits for the result any more.
+    when the call has been cancelled.
     """
     del seed  # nothing here is random
     tint = (0.85, 1.0, 1.35) if "blue" in prompt.lower() else (1.2, 1.0, 0.72)

@@ -141,7 +141,7 @@ class EditBackend(backend_pb2_grpc.ColorBackendServicer):
         if "image" in result:
             yield update(image=result["image"])
         elif call.cancelled:
-            context.abort(grpc.StatusCode.CANCELLED, "nobody waits any more")
+            context.abort(grpc.StatusCode.CANCELLED, "the call was cancelled")
         else:
             context.abort(STATUS[result["error"].kind], str(result["error"]))
 

@@ -119,7 +119,7 @@ class EditServer:
         self._max_answer_bytes = max_answer_bytes
 
     def check(self, timeout_s=3.0):
-        """Raises EditError when nobody listens there."""
+        """Raises EditError if no server listens there."""
         port = self._port or (443 if self._parts.scheme == "https" else 80)
         try:
             socket.create_connection((self._parts.hostname, port), timeout_s).close()
@@ -181,7 +181,7 @@ class EditServer:
             ) from None
         except (OSError, http.client.HTTPException) as error:
             if call.cancelled:
-                raise EditError("cancelled", "nobody waits any more") from None
+                raise EditError("cancelled", "the call was cancelled") from None
             raise EditError(
                 "away", f"the edit server {self.url} broke off ({type(error).__name__}: {error})"
             ) from None

@@ -56,8 +56,8 @@ Script ParseScript(const std::string& text) {
 // Artifacts of this stage that other stages read; a folder gets two files.
 std::vector<std::string> ArtifactsOf(const std::string& kind) {
   const Stage& stage = StageOf(kind);
-  if (stage.leaves.empty()) return {};
-  const std::string name = stage.leaves.front();
+  if (stage.outputs.empty()) return {};
+  const std::string name = stage.outputs.front();
   if (!name.ends_with('/')) return {name};
   return {name + "a.png", name + "b.png"};
 }

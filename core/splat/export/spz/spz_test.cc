@@ -82,7 +82,7 @@ TEST(SpzTest, RejectsUnsupportedModels) {
   EXPECT_THAT(refusal(g), testing::HasSubstr("opacity of Gaussian 3"));
   g = Gaussians(5, 1);
   g.position[0] = 1e9f;
-  EXPECT_THAT(refusal(g), testing::HasSubstr("beyond"));
+  EXPECT_THAT(refusal(g), testing::HasSubstr("out of the range of SPZ"));
   g = Gaussians(5, 1);
   for (float& s : g.log_scale) s -= 15.0f;
   EXPECT_THAT(refusal(g), testing::HasSubstr("smaller than"));
