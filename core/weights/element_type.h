@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 
 namespace color3d {
 

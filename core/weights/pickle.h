@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 #include "core/weights/element_type.h"
 
 namespace color3d {

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 
 namespace color3d {
 

@@ -2,7 +2,7 @@
 // without PyTorch and without executing anything in them. For this folder only.
 #pragma once
 
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 #include "core/weights/weight_map.h"
 
 namespace color3d {

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 #include "core/weights/safetensors.h"
 #include "core/weights/weight_map.h"
 

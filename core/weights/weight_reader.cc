@@ -6,7 +6,7 @@
 #include <bit>
 #include <utility>
 
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 #include "core/base/error.h"
 
 namespace color3d {

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <utility>
 
+#include "core/base/bytes/little_endian.h"
 #include "core/base/files.h"
-#include "core/base/little_endian.h"
 
 // Field offsets as in the .ZIP File Format Specification (APPNOTE.TXT 6.3.10), 4.3.
 namespace color3d {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 
 namespace color3d {
 

@@ -16,7 +16,7 @@ namespace {
 struct ScoreArguments {
   std::string truth;
   std::string pictures;
-  std::string views = "pictures";
+  std::vector<std::string> views;
   std::string json;
   int threads = 2;
 };
@@ -30,16 +30,10 @@ constexpr const char* kShown[] = {"delta_e00_chroma",
                                   "colorfulness",
                                   "colorfulness_truth"};
 
-ScoredViews ViewsNamed(const std::string& name) {
-  return name == "all"        ? ScoredViews::kAll
-         : name == "held-out" ? ScoredViews::kHeldOut
-                              : ScoredViews::kPictures;
-}
-
 void RunScore(const ScoreArguments& args) {
   ThreadPool pool(args.threads);
   const std::vector<PictureScores> views =
-      ScorePictures(args.truth, args.pictures, ViewsNamed(args.views), pool, CancellationToken());
+      ScorePictures(args.truth, args.pictures, args.views, pool, CancellationToken());
   nlohmann::ordered_json json;
   json["views"] = views.size();
   std::string table = fmt::format("{:<24}", "view");
@@ -49,9 +43,8 @@ void RunScore(const ScoreArguments& args) {
     for (const char* name : kShown) table += fmt::format(" {:>18.3f}", view.scores.at(name));
     json["scores"][view.view] = view.scores;
   }
-  std::string mean = "\nmean", interval = "\n95 % interval";
   table += fmt::format("\n{:<24}", "mean");
-  interval = fmt::format("\n{:<24}", "95 % interval");
+  std::string interval = fmt::format("\n{:<24}", "95 % interval");
   for (const char* name : kShown) {
     std::vector<double> values;
     for (const PictureScores& view : views) values.push_back(view.scores.at(name));
@@ -78,13 +71,8 @@ void AddScoreCommand(CLI::App& app) {
                    args->pictures,
                    "Folder of the method's pictures, named as the photos (any extension)")
       ->required();
-  command
-      ->add_option("--views",
-                   args->views,
-                   "Scored views: `held-out` (every eighth photo, starting with the first), `all`, "
-                   "or those with `pictures`")
-      ->check(CLI::IsMember({"held-out", "all", "pictures"}))
-      ->capture_default_str();
+  command->add_option(
+      "--view", args->views, "Photos to score, all of which need a picture; default: all pictures");
   command->add_option("--json", args->json, "File for the scores of all views as JSON");
   command->add_option("--threads", args->threads, "Number of threads")->capture_default_str();
   command->callback([args] { RunScore(*args); });

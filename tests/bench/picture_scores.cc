@@ -18,7 +18,6 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr size_t kHoldOutEvery = 8;
 constexpr double kShapeTolerance = 0.02;
 constexpr int kBootstrapSamples = 2000;
 
@@ -45,19 +44,14 @@ std::map<std::string, fs::path> PicturesByStem(const fs::path& folder) {
   return found;
 }
 
-std::vector<std::string> SelectViews(const std::map<std::string, fs::path>& photos,
-                                     const std::map<std::string, fs::path>& pictures,
-                                     ScoredViews views) {
-  std::vector<std::string> selected;
-  size_t index = 0;
-  for (const auto& [stem, photo] : photos) {
-    const bool is_held_out = index++ % kHoldOutEvery == 0;
-    if (views == ScoredViews::kAll || (views == ScoredViews::kHeldOut && is_held_out) ||
-        (views == ScoredViews::kPictures && pictures.contains(stem))) {
-      selected.push_back(stem);
-    }
+// Stem of the photo with this stem or name.
+std::string FindPhoto(const std::string& view,
+                      const std::map<std::string, fs::path>& photos,
+                      const fs::path& folder) {
+  for (const std::string& stem : {view, fs::path(view).stem().string()}) {
+    if (photos.contains(stem)) return stem;
   }
-  return selected;
+  throw InvalidArgument("{} has no photo {}", folder.string(), view);
 }
 
 Image ReadColor(const fs::path& file) {
@@ -100,7 +94,7 @@ std::map<std::string, double> Score(const fs::path& photo, const fs::path& pictu
 
 std::vector<PictureScores> ScorePictures(const fs::path& truth,
                                          const fs::path& pictures,
-                                         ScoredViews views,
+                                         const std::vector<std::string>& views,
                                          ThreadPool& pool,
                                          const CancellationToken& cancel) {
   const auto photos = PicturesByStem(truth), given = PicturesByStem(pictures);
@@ -112,7 +106,11 @@ std::vector<PictureScores> ScorePictures(const fs::path& truth,
         picture.string(),
         truth.string());
   }
-  const std::vector<std::string> selected = SelectViews(photos, given, views);
+  std::vector<std::string> selected;
+  for (const std::string& view : views) selected.push_back(FindPhoto(view, photos, truth));
+  for (const auto& [stem, picture] : given) {
+    if (views.empty()) selected.push_back(stem);
+  }
   std::string missing;
   size_t count = 0;
   for (const std::string& stem : selected) {

@@ -12,25 +12,18 @@
 
 namespace color3d {
 
-// Views of a folder of photos that are scored, in the order of their names.
-enum class ScoredViews {
-  kPictures,  // those that the method has pictures of
-  kHeldOut,   // every eighth photo, starting with the first
-  kAll,
-};
-
 struct PictureScores {
   std::string view;                      // stem of the file
   std::map<std::string, double> scores;  // ScoreView (core/metrics/view_scores.h)
 };
 
 // Pairs the pictures with the photos of the same stem, and scores each at the size of ScoreView.
-// Throws Error{kInvalidArgument} that names the file if a scored view has no picture, a picture has
-// no photo or another shape than it (by more than 2 %), two files share a stem, or the photos are
-// grey.
+// `views`: stems or names of the scored photos; empty: those that have a picture. Throws
+// Error{kInvalidArgument} that names the file if a scored view has no picture, a picture has no
+// photo or another shape than it (by more than 2 %), two files share a stem, or a photo is grey.
 std::vector<PictureScores> ScorePictures(const std::filesystem::path& truth,
                                          const std::filesystem::path& pictures,
-                                         ScoredViews views,
+                                         const std::vector<std::string>& views,
                                          ThreadPool& pool,
                                          const CancellationToken& cancel);
 

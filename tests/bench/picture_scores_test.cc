@@ -46,11 +46,11 @@ class PictureScoresTest : public ::testing::Test {
   static void Write(const fs::path& folder, int view, const Image& image) {
     WriteFileAtomic(folder / ("v" + std::to_string(view) + ".png"), EncodePng8(image));
   }
-  std::vector<PictureScores> Score(ScoredViews views = ScoredViews::kPictures) const {
+  std::vector<PictureScores> Score(const std::vector<std::string>& views = {}) const {
     ThreadPool pool(2);
     return ScorePictures(truth(), pictures(), views, pool, CancellationToken());
   }
-  std::string ErrorText(ScoredViews views = ScoredViews::kPictures) const {
+  std::string ErrorText(const std::vector<std::string>& views = {}) const {
     try {
       Score(views);
     } catch (const Error& e) {
@@ -66,7 +66,7 @@ class PictureScoresTest : public ::testing::Test {
 TEST_F(PictureScoresTest, TrueColorsHaveNoErrorAndGrayHasThatOfGray) {
   Write(pictures(), 0, Stripes(60, 40, 0));
   Write(pictures(), 8, GrayOf(Stripes(60, 40, 8)));
-  const auto scores = Score(ScoredViews::kHeldOut);
+  const auto scores = Score({"v0.png", "v8"});
   ASSERT_EQ(scores.size(), 2u);
   EXPECT_EQ(scores[0].view, "v0");
   EXPECT_LT(scores[0].scores.at("delta_e00"), 1e-3);
@@ -88,9 +88,10 @@ TEST_F(PictureScoresTest, AcceptsSmallerPictures) {
 TEST_F(PictureScoresTest, ErrorsNameFile) {
   EXPECT_THAT(ErrorText(), HasSubstr("has no pictures"));
   Write(pictures(), 0, Stripes(60, 40, 0));
-  EXPECT_THAT(ErrorText(ScoredViews::kHeldOut),
-              HasSubstr("no picture of 1 of the 2 scored views: v8"));
-  EXPECT_THAT(ErrorText(ScoredViews::kAll), HasSubstr("v1, v2, v3, v4, v5, ..."));
+  EXPECT_THAT(ErrorText({"v0", "v8"}), HasSubstr("no picture of 1 of the 2 scored views: v8"));
+  EXPECT_THAT(ErrorText({"v1", "v2", "v3", "v4", "v5", "v6"}),
+              HasSubstr("of the 6 scored views: v1, v2, v3, v4, v5, ..."));
+  EXPECT_THAT(ErrorText({"v9"}), HasSubstr("has no photo v9"));
   Write(pictures(), 0, Stripes(40, 60, 0));
   EXPECT_THAT(ErrorText(), HasSubstr("v0.png has 40 x 60 px"));
   Write(pictures(), 0, Stripes(60, 40, 0));

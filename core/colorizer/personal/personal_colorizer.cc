@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 #include "core/base/error.h"
 #include "core/colorizer/model/named_tensors.h"
 #include "core/colorizer/model/padding.h"

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/base/bytes/little_endian.h"
 #include "core/base/error.h"
-#include "core/base/little_endian.h"
 #include "core/splat/model/spherical_harmonics.h"
 
 namespace color3d {

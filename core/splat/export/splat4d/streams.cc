@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/base/little_endian.h"
+#include "core/base/bytes/little_endian.h"
 #include "core/splat/export/zstd.h"
 
 namespace color3d {

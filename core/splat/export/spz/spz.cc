@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/base/bytes/little_endian.h"
 #include "core/base/error.h"
-#include "core/base/little_endian.h"
 #include "core/splat/export/bytes.h"
 #include "core/splat/export/morton.h"
 #include "core/splat/export/zstd.h"

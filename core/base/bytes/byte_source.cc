@@ -1,4 +1,4 @@
-#include "core/base/byte_source.h"
+#include "core/base/bytes/byte_source.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
