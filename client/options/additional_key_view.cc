@@ -57,9 +57,9 @@ AdditionalKeyView ParseAdditionalKeyView(const std::string& text) {
   const size_t equals = text.find('=');
   if (equals == std::string::npos || equals == 0 || equals + 1 == text.size()) {
     throw InvalidArgument(
-        "--add-key-view wants VIEW=COLOURED.png, the name of a photo and its coloured picture (or "
-        "VIEW=POINTS.json, VIEW=auto), of a film also VIEW=COLOURED.png@BEGIN-END, in seconds; "
-        "'{}' is not of that form",
+        "--add-key-view '{}' is not of the form VIEW=COLOURED.png, the name of a photo and its "
+        "coloured picture; VIEW=POINTS.json and VIEW=auto are possible, too, and for films "
+        "VIEW=COLOURED.png@BEGIN-END, in seconds",
         text);
   }
   std::string value = text.substr(equals + 1);
