@@ -11,6 +11,7 @@
 #include "core/carry/confidence.h"
 #include "core/color/lab.h"
 #include "core/colorizer/corrector.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/image/codec.h"
 #include "core/scene/key_photo.h"
 #include "core/scene/photo_masks.h"
