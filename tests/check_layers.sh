@@ -187,7 +187,7 @@ public server/worker supervision/supervisor supervision/worker_settings
 kind_branches='
 client/commands/colorize.cc 1
 core/stage/carry_color.cc 1
-core/stage/colorize_scene.cc 3
+core/stage/colorize_scene.cc 2
 core/stage/evaluate.cc 1
 core/stage/movie/film_clock.cc 1
 core/stage/recolor/time_ranges.cc 1

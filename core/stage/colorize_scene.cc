@@ -217,12 +217,11 @@ std::string Summary(const Scene& scene,
                     const PlanFacts& facts,
                     const ordered_json& metrics,
                     const std::vector<std::string>& keys) {
-  const bool is_film = !InfoOf(facts.kind).is_reconstructed;
-  const std::string result =
-      is_film ? "Coloured" : fmt::format("{} Gaussians", metrics.value("gaussians", 0));
+  const int gaussians = metrics.value("gaussians", 0);
+  const std::string result = gaussians > 0 ? fmt::format("{} Gaussians", gaussians) : "Coloured";
   return fmt::format("{} {}{} ({} held out){}. {} in {} s of computing.",
                      scene.views.size(),
-                     is_film ? "frames" : "views",
+                     scene.HasTimes() && gaussians == 0 ? "frames" : "views",
                      facts.time_steps > 0 ? fmt::format(" of {} times", facts.time_steps) : "",
                      scene.HeldOutViews().size(),
                      keys.empty() ? std::string()

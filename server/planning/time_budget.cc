@@ -46,12 +46,15 @@ struct ExpectedViews {
   bool is_counted = false;  // the frames of video files are not counted before the import
   const char* noun = "photos";
   const char* fewer = ", or fewer photos";  // remedy
+  double seconds_each = kSecondsPerPhoto;
   bool have_geometry = false;
+  bool are_reconstructed = true;
 };
 
 ExpectedViews ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   const bool is_counted = facts.pictures > 0;
-  switch (InfoOf(facts.layout).views) {
+  const CaptureLayoutInfo& layout = InfoOf(facts.layout);
+  switch (layout.views) {
     case ViewSource::kSplatRenders:
       return {.count = import.has_splat_views() ? import.splat_views() : kSplatViews,
               .is_counted = true,
@@ -59,15 +62,17 @@ ExpectedViews ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import
               .fewer = ", or fewer views (splat_views)",
               .have_geometry = true};
     case ViewSource::kFrames:
-      return {FramesInRange(facts, import), is_counted, "frames", kFewerFrames};
+      return {.count = FramesInRange(facts, import),
+              .is_counted = is_counted,
+              .noun = "frames",
+              .fewer = kFewerFrames,
+              .seconds_each =
+                  InfoOf(layout.kind).is_reconstructed ? kSecondsPerPhoto : kSecondsPerFrame,
+              .are_reconstructed = InfoOf(KindBeforeImport(facts, import)).is_reconstructed};
     case ViewSource::kPhotos:
       break;
   }
   return {facts.pictures, is_counted};
-}
-
-bool IsReconstructed(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
-  return InfoOf(KindBeforeImport(facts, import)).is_reconstructed;
 }
 
 std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSceneSpec& import) {
@@ -88,10 +93,9 @@ std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSc
 }  // namespace
 
 double FixedSeconds(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
-  const bool is_film = !InfoOf(InfoOf(facts.layout).kind).is_reconstructed;
-  const double per_view = (is_film ? kSecondsPerFrame : kSecondsPerPhoto) +
-                          (EstimatesPoses(facts, import) ? kPosesSecondsPerPhoto : 0.0);
-  return kBaseSeconds + per_view * ViewsOf(facts, import).count;
+  const ExpectedViews views = ViewsOf(facts, import);
+  const double poses = EstimatesPoses(facts, import) ? kPosesSecondsPerPhoto : 0.0;
+  return kBaseSeconds + (views.seconds_each + poses) * views.count;
 }
 
 TimeBudget DivideTimeBudget(double seconds,
@@ -108,7 +112,7 @@ TimeBudget DivideTimeBudget(double seconds,
   if (views.have_geometry) {
     return {0.0, (kGeometryShare + kPersonalizeShare) * rest, kChromaShare * rest};
   }
-  if (!IsReconstructed(facts, import)) {
+  if (!views.are_reconstructed) {
     // The shares of geometry and chroma are kept for frames that are not counted yet.
     return {0.0, views.is_counted ? rest : kPersonalizeShare * rest, 0.0};
   }

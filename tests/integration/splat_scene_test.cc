@@ -104,7 +104,7 @@ TEST_F(SplatSceneServiceTest, RefusesOtherFilesByName) {
       {"nan.ply", SplatPly(nan), {"nan.ply", "not a number"}},
       {"old.sog", StoredZip({{"meta.json", R"({"version":1})"}}), {"old.sog", "version 1"}},
       {"cut.sog", sog.substr(0, sog.size() - 30), {"cut.sog", "cut short"}},
-      {"text.spz", "this is not a splat", {"text.spz", "not a splat"}},
+      {"text.spz", "this is not a splat", {"text.spz", "not a readable splat"}},
   };
   for (const auto& bad : cases) {
     ExpectRefusal(Colorize(Write(bad.name, bad.bytes), {"--auto"}), 2, bad.words);
