@@ -164,8 +164,7 @@ cv::Mat DecodeStored(std::string_view bytes,
   if (mat.empty()) {
     throw InvalidArgument(
         "{} cannot be decoded: its image data is damaged or of an unsupported kind; save it again "
-        "as JPEG "
-        "or PNG",
+        "as JPEG or PNG",
         file_name);
   }
   const auto reduced = [reduction](int size) { return (size + reduction - 1) / reduction; };

@@ -112,13 +112,9 @@ PlanFacts FactsOfKind(const Scene& scene, const StageContext& context) {
   const CaptureKindInfo& capture = ColoredAs(context, scene);
   PlanFacts facts{.kind = capture.kind};
   if (!capture.is_dynamic) return facts;
-  std::set<double> times;
   std::set<int> cameras;
-  for (const View& view : scene.views) {
-    times.insert(view.moment->time_s);
-    cameras.insert(view.moment->shot);
-  }
-  facts.time_steps = static_cast<int>(times.size());
+  for (const View& view : scene.views) cameras.insert(view.moment->shot);
+  facts.time_steps = static_cast<int>(scene.Times().size());
   facts.cameras = static_cast<int>(cameras.size());
   return facts;
 }

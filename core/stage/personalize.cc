@@ -26,8 +26,7 @@ void ExpectShapeOf(const Image& luminance, StageContext& context) {
   if (std::abs(height - luminance.height) <= 1.0 + 0.01 * luminance.height) return;
   throw InvalidArgument(
       "{} is {}x{} px, but the key view {}: the aspect ratio differs; colour the photo that is the "
-      "key "
-      "view",
+      "key view",
       artifact::kKeyColor,
       color.width,
       color.height,

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "core/base/error.h"
-#include "core/base/files.h"
+#include "core/base/file_kind.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
@@ -23,13 +23,13 @@ constexpr int kBootstrapSamples = 2000;
 
 // Pictures directly in the folder, by stem.
 std::map<std::string, fs::path> PicturesByStem(const fs::path& folder) {
-  if (!fs::is_directory(folder)) {
+  if (!IsFolder(folder)) {
     throw Error(ErrorCode::kNotFound, "there is no folder {}", folder.string());
   }
   std::map<std::string, fs::path> found;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
-    if (name.starts_with('.') || !entry.is_regular_file() || !HasImageExtension(name)) continue;
+    if (name.starts_with('.') || !IsFile(entry.path()) || !HasImageExtension(name)) continue;
     const auto [other, is_new] = found.emplace(entry.path().stem().string(), entry.path());
     if (!is_new) {
       throw InvalidArgument("{} has {} and {}: give one picture a view",

@@ -93,8 +93,7 @@ std::shared_ptr<const AutomaticColorizer> AutomaticColorizer::FromWeightFile(
   if (!Ddcolor::Recognizes(weights)) {
     throw InvalidArgument(
         "{} contains no DDColor model (it has {} arrays, none called refine_net.0.0.weight_orig); "
-        "give a "
-        "published DDColor file",
+        "give a published DDColor file",
         ddcolor_weights.string(),
         weights.size());
   }

@@ -151,10 +151,8 @@ void FindFilmPoses(const fs::path& frames_root,
   if (motion.camera_stands_still) {
     context.Warn(
         "the camera stands still (the background shifts by {:.2f} px at {} px), so depth is "
-        "unknown: "
-        "the scene is a relief (2.5D) with assumed depth. Ground lies in front of an upright "
-        "backdrop, "
-        "and moving objects stand on it; view it from close to the camera only",
+        "unknown: the scene is a relief (2.5D) with assumed depth. Ground lies in front of an "
+        "upright backdrop, and moving objects stand on it; view it from close to the camera only",
         motion.background_px,
         kMotionSidePx);
     Scene relief = ReliefScene(*scene, shot, files);
@@ -184,8 +182,7 @@ void FindFilmPoses(const fs::path& frames_root,
   if (!AreEnough(result.scene.views.size(), scene->views.size())) {
     return keep_film(
         fmt::format("only {} of {} frames have a pose; {:.0f} % of the picture is moving objects, "
-                    "and the other "
-                    "frames share too little static background with these",
+                    "and the other frames share too little static background with these",
                     result.scene.views.size(),
                     scene->views.size(),
                     100.0 * motion.moving_share));

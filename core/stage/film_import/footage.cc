@@ -190,8 +190,7 @@ void SelectFrames(const FilmOptions& options, std::vector<Footage>* all, StageCo
     if (!footage.frames.empty()) continue;
     throw InvalidArgument(
         "{}: the film has no frame in the requested part (film_begin_s, film_end_s, film_stride); "
-        "it "
-        "runs from {:.2f} to {:.2f} s on the common clock",
+        "it runs from {:.2f} to {:.2f} s on the common clock",
         footage.film.file,
         spans[film].first,
         spans[film].second);

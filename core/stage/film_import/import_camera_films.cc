@@ -131,8 +131,7 @@ class CameraFilmsImport {
     if (shots.cuts.empty()) return;
     throw InvalidArgument(
         "{} has a cut before {}: to estimate the poses of several cameras, each film must be one "
-        "shot; "
-        "take a part without cuts (film_begin_s, film_end_s), or split the films",
+        "shot; take a part without cuts (film_begin_s, film_end_s), or split the films",
         camera.film,
         frames_.views[camera.views[shots.cuts.front()]].name);
   }

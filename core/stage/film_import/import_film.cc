@@ -44,8 +44,7 @@ std::vector<int> RequestedFilmFrames(const std::vector<double>& times, const Fil
   if (wanted.size() == 1) {
     throw InvalidArgument(
         "a film needs at least two frames, and one was requested; give a longer film, or request "
-        "more "
-        "frames (film_stride, film_begin_s, film_end_s)");
+        "more frames (film_stride, film_begin_s, film_end_s)");
   }
   return wanted;
 }
@@ -162,8 +161,7 @@ void WriteSteady(const FrameStream& stream, const ReadFrames& frames, StageConte
   }
   context.Warn(
       "exposure is steadied: mean change between frames {:.2f} L before, {:.2f} L after; the "
-      "coloured "
-      "film has the steadied luminance",
+      "coloured film has the steadied luminance",
       tones.flicker_before,
       tones.flicker_after);
 }
