@@ -184,8 +184,9 @@ const std::map<std::string, Method>& Methods() {
        })},
       {"personalize",
        MakeMethod<v1::PersonalizeSpec>([](const auto& s) { return ColorizerOptionsFrom(s, 1); })},
-      {"colorize_views",
-       MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) { return MaxSideFrom(s); })},
+      {"colorize_views", MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) {
+         return ColorizeViewsOptionsFrom(s);
+       })},
       {"carry_color",
        MakeMethod<v1::CarryColorSpec>([](const auto& s) { return CarryOptionsFrom(s); })},
       {"correct_colors",

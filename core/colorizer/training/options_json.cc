@@ -59,6 +59,7 @@ nlohmann::json JsonFromOptions(const ColorizerOptions& options) {
   nlohmann::json json{{"recipe", NameOf(kRecipes, options.recipe)},
                       {"precision", NameOf(kPrecisions, options.precision)}};
   ForEachNumber(options, [&](const char* name, const auto& value) { json[name] = value; });
+  if (!options.augment) json["augment"] = false;  // files of earlier versions do not have it
   return json;
 }
 
@@ -68,6 +69,7 @@ ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
   options.precision = FromName(
       kPrecisions, "precision", json.value("precision", NameOf(kPrecisions, options.precision)));
   ForEachNumber(options, [&](const char* name, auto& value) { value = json.value(name, value); });
+  options.augment = json.value("augment", options.augment);
   return options;
 }
 
