@@ -171,14 +171,16 @@ void CheckMethod(const ColorizeSceneSpec& scene) {
   if (method == v1::ColorizeViewsSpec::METHOD_CARRIED && scene.carry_color().skip()) {
     throw InvalidArgument("{}, but no colours are carried; set carry_color.skip to false", is);
   }
+  const v1::PersonalizeSpec& training = scene.personalize();
   if (method == v1::ColorizeViewsSpec::METHOD_NEAREST_NEIGHBORS &&
-      scene.personalize().recipe() == v1::PersonalizeSpec::RECIPE_PAPER) {
+      (training.recipe() == v1::PersonalizeSpec::RECIPE_PAPER ||
+       (training.has_neighbors() && !training.neighbors()))) {
     throw InvalidArgument(
-        "{}, but colorizers of RECIPE_PAPER have no neighbours; set personalize.recipe to "
-        "RECIPE_COLOR3D",
+        "{}, but the colorizer has no neighbours; set personalize.recipe to RECIPE_COLOR3D and "
+        "personalize.neighbors to true",
         is);
   }
-  if (method == v1::ColorizeViewsSpec::METHOD_DECODER && scene.personalize().iterations() == 0) {
+  if (method == v1::ColorizeViewsSpec::METHOD_DECODER && training.iterations() == 0) {
     throw InvalidArgument(
         "{}, but personalize.iterations is 0, so that the decoder is not trained; give some", is);
   }

@@ -152,6 +152,7 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
   if (spec.has_average_decay()) options.average_decay = spec.average_decay();
   if (spec.has_min_improvement()) options.min_improvement = spec.min_improvement();
   if (spec.has_augment()) options.augment = spec.augment();
+  if (spec.has_neighbors()) options.neighbors = spec.neighbors();
   return options;
 }
 
@@ -177,6 +178,7 @@ ColorizeViewsOptions ColorizeViewsOptionsFrom(const v1::ColorizeViewsSpec& spec)
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
   options.method = MethodFrom(spec.method());
   if (spec.has_guess()) options.guess = spec.guess();
+  if (spec.has_spread()) options.spread = spec.spread();
   return options;
 }
 

@@ -239,7 +239,7 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
   parts.decodes = use != ColorizerParts::kNeighbors;
   if (!parts.decodes && !has_neighbors) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "colorizers of the paper's recipe have no nearest neighbours; train another one");
+                "the colorizer was trained without nearest neighbours; train another one");
   }
   return std::make_shared<const PersonalColorizer>(std::move(parts));
 }

@@ -59,7 +59,9 @@ nlohmann::json JsonFromOptions(const ColorizerOptions& options) {
   nlohmann::json json{{"recipe", NameOf(kRecipes, options.recipe)},
                       {"precision", NameOf(kPrecisions, options.precision)}};
   ForEachNumber(options, [&](const char* name, const auto& value) { json[name] = value; });
-  if (!options.augment) json["augment"] = false;  // files of earlier versions do not have it
+  // Only what is off: colorizer files of the defaults are those of earlier versions.
+  if (!options.augment) json["augment"] = false;
+  if (!options.neighbors) json["use_neighbors"] = false;
   return json;
 }
 
@@ -70,6 +72,7 @@ ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
       kPrecisions, "precision", json.value("precision", NameOf(kPrecisions, options.precision)));
   ForEachNumber(options, [&](const char* name, auto& value) { value = json.value(name, value); });
   options.augment = json.value("augment", options.augment);
+  options.neighbors = json.value("use_neighbors", options.neighbors);
   return options;
 }
 

@@ -26,6 +26,7 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
     recipe.warmup_iterations = 0;
     recipe.neighbors = false;
   }
+  recipe.neighbors = recipe.neighbors && options.neighbors;
   if (!options.augment) recipe.augment = AugmentOptions::CropsOnly();
   if (options.adapter_stages >= 0) recipe.model.adapter_stages = options.adapter_stages;
   recipe.model.decoder_width = options.decoder_width;

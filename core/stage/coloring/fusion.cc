@@ -29,6 +29,7 @@ void ColorByFusion(const ViewColoring& coloring, StageContext& context) {
       return coloring.positions.Of(
           number, images.WorkingCamera(number), luminance, images.Mask(number).get());
     });
+    of_view.spread = coloring.options.spread;
     if (coloring.options.guess) return of_view;
     // Without distances nothing is guessed.
     of_view.infer = [infer = std::move(of_view.infer)](const Image& luminance, const Image& known) {

@@ -19,7 +19,8 @@ struct ColorizeViewsOptions {
   };
   int max_side_px = 500;  // 64..4096
   Method method = Method::kFusion;
-  bool guess = true;  // kFusion: automatic guesses where nothing similar has a colour
+  bool guess = true;   // kFusion: automatic guesses where nothing similar has a colour
+  bool spread = true;  // kFusion: spread colours between the edges of the luminance
 
   void Validate() const { CheckMaxSide(max_side_px); }
   // True if the method reads the scene's colorizer.
