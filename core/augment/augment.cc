@@ -224,6 +224,17 @@ AugmentOptions AugmentOptions::Paper() {
   return options;
 }
 
+AugmentOptions AugmentOptions::CropsOnly() {
+  AugmentOptions options;
+  options.min_scale = 1.0;
+  options.max_scale = 1.0;
+  options.flip_probability = 0.0;
+  options.elastic_probability = 0.0;
+  options.perspective_probability = 0.0;
+  options.luminance_jitter = 0.0;
+  return options;
+}
+
 AugmentedSample Augment(const Image& luminance,
                         const Image& ab,
                         const Image& weight,

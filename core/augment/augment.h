@@ -24,6 +24,7 @@ struct AugmentOptions {
   double shuffle_probability = 0.0;
   int shuffle_grid = 8;
   static AugmentOptions Paper();
+  static AugmentOptions CropsOnly();
 };
 
 struct AugmentedSample {

@@ -68,7 +68,7 @@ const std::vector<Stage>& StageCatalogue() {
        .step = "view_colors",
        .purpose = "every view gets a colour at every pixel",
        .needs = {kScene, kColorizer},
-       .reads = {kCarried, kCarryFacts, kGeometry},
+       .reads = {kCarried, kCarryFacts, kGeometry, kKeyView, kKeyColor},  // the latter: baselines
        .resumes = true},
       {.kind = kCorrectColors,
        .step = "corrections",

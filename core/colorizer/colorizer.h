@@ -51,6 +51,8 @@ struct ColorizerOptions {
   // (kColor3d: none, kPaper: all).
   int adapter_stages = -1;
   double decoder_width = 1.0;  // factor of the decoder's channels, 0.25..4
+  bool augment = true;         // transform the training pictures; false: crop them only
+  bool neighbors = true;       // kColor3d: feature neighbors; false: the decoder alone
   uint64_t seed = 1;
   // Sets the recipe and its crop of 320 px.
   void UsePaperRecipe();

@@ -100,17 +100,13 @@ v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
     if (!stage->has_max_side_px()) stage->set_max_side_px(merged.max_side_px());
   };
   take_size(merged.mutable_carry_color());
+  take_size(merged.mutable_colorize_views());
   take_size(merged.mutable_reconstruct_geometry());
   take_size(merged.mutable_render());
   return merged;
 }
 
 void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
-  if (spec->has_colorize_views()) {  // not a field of ColorizeSceneSpec
-    auto* views = spec->mutable_colorize_views();
-    if (!views->has_max_side_px()) views->set_max_side_px(scene.max_side_px());
-    return;
-  }
   const std::string kind = KindOf(*spec);
   const FieldDescriptor* options = scene.GetDescriptor()->FindFieldByName(kind);
   if (options == nullptr) return;

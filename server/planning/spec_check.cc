@@ -291,6 +291,11 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
            " is set, but a whole scene names its key view in key_view and additional ones in "
            "carry_color.further_key_views");
   }
+  if (!spec.colorize_views().encoder().empty()) {
+    Reject(fmt::format("{}.encoder", kind::kColorizeViews),
+           " is set, but a whole scene is coloured with the encoder that its colorizer is trained "
+           "with; name it in personalize.encoder");
+  }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), kind::kSelectKeyView);
   CheckCarryColor(spec.carry_color(), /*of_whole_scene=*/true, kind::kCarryColor);
   CheckCorrections(spec.correct_colors(), kind::kCorrectColors);

@@ -18,6 +18,28 @@ ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precisi
   }
 }
 
+ColorizeViewsOptions::Method MethodFrom(v1::ColorizeViewsSpec::Method method) {
+  using Method = ColorizeViewsOptions::Method;
+  switch (method) {
+    case v1::ColorizeViewsSpec::METHOD_PERSONALIZED:
+      return Method::kPersonalized;
+    case v1::ColorizeViewsSpec::METHOD_NEAREST_NEIGHBORS:
+      return Method::kNearestNeighbors;
+    case v1::ColorizeViewsSpec::METHOD_DECODER:
+      return Method::kDecoder;
+    case v1::ColorizeViewsSpec::METHOD_CARRIED:
+      return Method::kCarried;
+    case v1::ColorizeViewsSpec::METHOD_AUTOMATIC:
+      return Method::kAutomatic;
+    case v1::ColorizeViewsSpec::METHOD_FLOW:
+      return Method::kFlow;
+    case v1::ColorizeViewsSpec::METHOD_GRAY:
+      return Method::kGray;
+    default:
+      return Method::kFusion;
+  }
+}
+
 // Throws if the job was planned by a version whose stages coloured additional key views themselves.
 void RequireColoredBefore(const v1::FurtherKeyView& key) {
   if (!key.has_color()) return;
@@ -78,6 +100,9 @@ SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
     case v1::SelectKeyViewSpec::STRATEGY_TRACKS:
       options.selection.strategy = KeyViewStrategy::kTracks;
       break;
+    case v1::SelectKeyViewSpec::STRATEGY_RANDOM:
+      options.selection.strategy = KeyViewStrategy::kRandom;
+      break;
     case v1::SelectKeyViewSpec::STRATEGY_MANUAL:
       options.selection.strategy = KeyViewStrategy::kManual;
       break;
@@ -126,6 +151,8 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
   options.precision = PrecisionFrom(spec.precision());
   if (spec.has_average_decay()) options.average_decay = spec.average_decay();
   if (spec.has_min_improvement()) options.min_improvement = spec.min_improvement();
+  if (spec.has_augment()) options.augment = spec.augment();
+  if (spec.has_neighbors()) options.neighbors = spec.neighbors();
   return options;
 }
 
@@ -138,10 +165,20 @@ CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
     options.carry.luminance_tolerance = spec.luminance_tolerance();
   if (spec.has_depth_side_px()) options.depth_side_px = spec.depth_side_px();
   if (spec.has_depth_sources()) options.depth_sources = spec.depth_sources();
+  if (spec.has_flow_check() && !spec.flow_check()) options.carry.flow_tolerance_px = 0.0;
   for (const v1::FurtherKeyView& key : spec.further_key_views()) {
     RequireColoredBefore(key);
     options.additional_key_views.push_back(key.view());
   }
+  return options;
+}
+
+ColorizeViewsOptions ColorizeViewsOptionsFrom(const v1::ColorizeViewsSpec& spec) {
+  ColorizeViewsOptions options;
+  if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
+  options.method = MethodFrom(spec.method());
+  if (spec.has_guess()) options.guess = spec.guess();
+  if (spec.has_spread()) options.spread = spec.spread();
   return options;
 }
 
@@ -172,6 +209,7 @@ GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uin
   if (spec.recipe() == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
     options.recipe = GeometryOptions::Recipe::kPaper;
   }
+  if (spec.has_dense_start()) options.dense_start = spec.dense_start();
   if (spec.still()) options.motion = GeometryOptions::Motion::kStill;
   if (spec.has_warm_up()) options.warm_up = spec.warm_up();
   return options;

@@ -38,7 +38,7 @@ PersonalColorizer::PersonalColorizer(Parts parts)
     : parts_(std::move(parts)), recipe_(RecipeFor(parts_.options)) {
   const double trained =
       parts_.curve.empty() ? 0.0 : static_cast<double>(parts_.curve.back().iteration);
-  trust_ = 1.0 - std::exp(-trained / recipe_.trust_iterations);
+  if (parts_.decodes) trust_ = 1.0 - std::exp(-trained / recipe_.trust_iterations);
   torch::NoGradGuard no_grad;
   parts_.model->RequireGradients(false);
   parts_.model->set_half_products(false);
@@ -197,7 +197,10 @@ std::string PersonalColorizer::Serialize() const {
 }
 
 std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
-    std::string_view bytes, std::shared_ptr<const TapEncoder> encoder, int threads) {
+    std::string_view bytes,
+    std::shared_ptr<const TapEncoder> encoder,
+    int threads,
+    ColorizerParts use) {
   TensorFile file = ReadTensorFile(bytes, kColorizerFormat, kWhat);
   Parts parts;
   bool has_neighbors = false;
@@ -231,6 +234,12 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
   if (!file.arrays.empty()) {
     throw InvalidArgument(
         "{} has an unknown array {}", kWhat, QuotedName(file.arrays.begin()->first));
+  }
+  if (use == ColorizerParts::kDecoder) parts.neighbors.reset();
+  parts.decodes = use != ColorizerParts::kNeighbors;
+  if (!parts.decodes && !has_neighbors) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "the colorizer was trained without nearest neighbours; train another one");
   }
   return std::make_shared<const PersonalColorizer>(std::move(parts));
 }

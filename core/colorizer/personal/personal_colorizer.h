@@ -12,6 +12,7 @@
 #include "core/colorizer/corrector.h"
 #include "core/colorizer/model/personal_model.h"
 #include "core/colorizer/neighbors/feature_neighbors.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/training/recipe.h"
 #include "core/colorizer/training/training_session.h"
 
@@ -26,7 +27,8 @@ class PersonalColorizer : public Colorizer {
     std::unique_ptr<FeatureNeighbors> neighbors;  // may be null
     RelativeChroma relative_chroma;
     std::vector<TrainingPoint> curve;
-    int threads = 0;  // for prediction; 0: one per core
+    int threads = 0;      // for prediction; 0: one per core
+    bool decodes = true;  // false: neighbors alone predict
   };
   // Rounds the model's parameters to half precision, as in colorizer files.
   explicit PersonalColorizer(Parts parts);
@@ -54,7 +56,8 @@ class PersonalColorizer : public Colorizer {
 
   static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
                                                       std::shared_ptr<const TapEncoder> encoder,
-                                                      int threads);
+                                                      int threads,
+                                                      ColorizerParts use);
 
  private:
   struct Answer {

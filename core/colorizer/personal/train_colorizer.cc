@@ -198,9 +198,10 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
 
 std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
-                                               int threads) {
+                                               int threads,
+                                               ColorizerParts parts) {
   return WithTorchErrors("colorizer file", [&] {
-    return PersonalColorizer::Deserialize(bytes, RequireTaps(encoder), threads);
+    return PersonalColorizer::Deserialize(bytes, RequireTaps(encoder), threads, parts);
   });
 }
 

@@ -27,11 +27,15 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
                                                 const RunControl& control,
                                                 const std::optional<BatchPlace>& place = {});
 
+// Parts of a colorizer that predict colours (STILL.md "Blend of neighbours and decoder").
+enum class ColorizerParts { kBoth, kNeighbors, kDecoder };
+
 // Reads a colorizer file. The colorizer predicts on `threads` threads; 0: one per core. Throws
 // Error{kInvalidArgument} if the file is damaged, kFailedPrecondition naming both digests if it was
-// trained on another encoder.
+// trained on another encoder, or if `parts` is kNeighbors and it has none.
 std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
-                                               int threads = 0);
+                                               int threads = 0,
+                                               ColorizerParts parts = ColorizerParts::kBoth);
 
 }  // namespace color3d

@@ -59,6 +59,9 @@ nlohmann::json JsonFromOptions(const ColorizerOptions& options) {
   nlohmann::json json{{"recipe", NameOf(kRecipes, options.recipe)},
                       {"precision", NameOf(kPrecisions, options.precision)}};
   ForEachNumber(options, [&](const char* name, const auto& value) { json[name] = value; });
+  // Only what is off: colorizer files of the defaults are those of earlier versions.
+  if (!options.augment) json["augment"] = false;
+  if (!options.neighbors) json["use_neighbors"] = false;
   return json;
 }
 
@@ -68,6 +71,8 @@ ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
   options.precision = FromName(
       kPrecisions, "precision", json.value("precision", NameOf(kPrecisions, options.precision)));
   ForEachNumber(options, [&](const char* name, auto& value) { value = json.value(name, value); });
+  options.augment = json.value("augment", options.augment);
+  options.neighbors = json.value("use_neighbors", options.neighbors);
   return options;
 }
 

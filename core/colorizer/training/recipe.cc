@@ -26,6 +26,8 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
     recipe.warmup_iterations = 0;
     recipe.neighbors = false;
   }
+  recipe.neighbors = recipe.neighbors && options.neighbors;
+  if (!options.augment) recipe.augment = AugmentOptions::CropsOnly();
   if (options.adapter_stages >= 0) recipe.model.adapter_stages = options.adapter_stages;
   recipe.model.decoder_width = options.decoder_width;
   if (options.learning_rate > 0.0) recipe.first_learning_rate = options.learning_rate;

@@ -94,7 +94,8 @@ struct GeometryOptions {
   // kAuto: motion is detected if views have times. kStill: the scene is static.
   enum class Motion { kAuto, kStill };
   Motion motion = Motion::kAuto;
-  int iterations = 1500;  // 0..100000
+  bool dense_start = true;  // kColor3d: also start from points of plane sweeps
+  int iterations = 1500;    // 0..100000
   // Seconds of training, 0: none, at most 86400. The whole schedule fits into this time or the
   // iterations, whichever ends first; equal inputs give similar results, not equal ones.
   double time_limit_seconds = 0.0;
