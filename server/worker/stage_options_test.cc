@@ -316,6 +316,25 @@ TEST(OptionDefaults, AreThoseOfProto) {
       });
 }
 
+TEST(JointTrainingOptions, ReachTheMethod) {
+  const v1::ColorizeSceneSpec& paper = OptionsOf(v1::PRESET_PAPER);
+  const GeometryOptions geometry = GeometryOptionsFrom(paper.reconstruct_geometry(), 1);
+  EXPECT_EQ(geometry.recipe, GeometryOptions::Recipe::kPaper);
+  EXPECT_EQ(geometry.iterations, 30'000);
+  EXPECT_EQ(geometry.warm_up, 0.5);
+  EXPECT_EQ(geometry.sh_degree, 3);
+  EXPECT_EQ(geometry.ssim_weight, 0.2);
+  EXPECT_EQ(geometry.edge_weight, 1.0);
+  v1::SolveChromaSpec chroma = paper.solve_chroma();
+  EXPECT_EQ(ChromaOptionsFrom(chroma, 1).solver, ChromaOptions::Solver::kJoint);
+  EXPECT_EQ(ChromaOptionsFrom(chroma, 1).color_space, ColorSpace::kLab);
+  EXPECT_EQ(ChromaOptionsFrom(chroma, 1).chroma_sh_degree, 3);
+  chroma.set_color_space(v1::SolveChromaSpec::COLOR_SPACE_RGB);
+  EXPECT_EQ(ChromaOptionsFrom(chroma, 1).color_space, ColorSpace::kSrgb);
+  chroma.set_solver(v1::SolveChromaSpec::SOLVER_ADAM);
+  EXPECT_THROW(ChromaOptionsFrom(chroma, 1).Validate(), Error);
+}
+
 // The defaults of library and service are equal.
 TEST(OptionDefaults, EqualFastPreset) {
   const v1::ColorizeSceneSpec fast = WithPreset({});

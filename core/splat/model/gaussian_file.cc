@@ -17,6 +17,7 @@ constexpr char kMagic[8] = {'C', '3', 'D', 'G', 'A', 'U', 'S', 'S'};
 constexpr uint32_t kPlainVersion = 1;
 constexpr uint32_t kConfidenceVersion = 2;  // confidence is the last buffer
 constexpr uint32_t kMotionVersion = 3;      // a MotionHeader follows the header, motion is the last
+constexpr uint32_t kSrgbVersion = 4;        // as version 3, of 0 or more moving Gaussians, in sRGB
 constexpr size_t kDigestBytes = 64;         // hexadecimal SHA-256 of all bytes before it
 
 struct Header {
@@ -62,13 +63,14 @@ Header ReadHeader(std::string_view bytes) {
   if (std::memcmp(h.magic, kMagic, sizeof(kMagic)) != 0) {
     throw Refuse("it does not begin with C3DGAUSS");
   }
-  if (h.version < kPlainVersion || h.version > kMotionVersion) {
+  if (h.version < kPlainVersion || h.version > kSrgbVersion) {
     throw Refuse("version {}; this program reads versions {} to {}, update it",
                  h.version,
                  kPlainVersion,
-                 kMotionVersion);
+                 kSrgbVersion);
   }
-  if ((h.channels != 1 && h.channels != 3) || h.sh_degree > 3 || h.chroma_sh_degree > 3) {
+  if ((h.channels != 1 && h.channels != 3) || h.sh_degree > 3 || h.chroma_sh_degree > 3 ||
+      (h.version == kSrgbVersion && h.channels != 3)) {
     throw Refuse("channels {} or a degree is out of range", h.channels);
   }
   return h;
@@ -76,13 +78,14 @@ Header ReadHeader(std::string_view bytes) {
 
 MotionHeader ReadMotionHeader(std::string_view bytes, const Header& h) {
   MotionHeader m{0, 0.0, 0.0, h.version == kConfidenceVersion ? 1u : 0u};
-  if (h.version != kMotionVersion) return m;
+  if (h.version < kMotionVersion) return m;
   if (bytes.size() < sizeof(h) + sizeof(m) + kDigestBytes) {
     throw Refuse("it has only {} bytes", bytes.size());
   }
   std::memcpy(&m, bytes.data() + sizeof(h), sizeof(m));
-  if (m.moving == 0 || m.moving > h.count || m.with_confidence > 1 || !std::isfinite(m.begin_s) ||
-      !std::isfinite(m.end_s) || m.begin_s > m.end_s) {
+  if ((m.moving == 0 && h.version == kMotionVersion) || m.moving > h.count ||
+      m.with_confidence > 1 || !std::isfinite(m.begin_s) || !std::isfinite(m.end_s) ||
+      m.begin_s > m.end_s) {
     throw Refuse(
         "its motion of {} Gaussians from {} s to {} s is invalid", m.moving, m.begin_s, m.end_s);
   }
@@ -98,13 +101,16 @@ std::string SerializeGaussians(const GaussianModel& model) {
   const bool with_confidence = !model.confidence.empty();
   const MotionHeader m{
       model.motion.size(), model.motion.begin_s, model.motion.end_s, with_confidence ? 1u : 0u};
-  h.version = m.moving > 0 ? kMotionVersion : with_confidence ? kConfidenceVersion : kPlainVersion;
+  h.version = model.color_space == ColorSpace::kSrgb ? kSrgbVersion
+              : m.moving > 0                         ? kMotionVersion
+              : with_confidence                      ? kConfidenceVersion
+                                                     : kPlainVersion;
   h.channels = static_cast<uint32_t>(model.channels);
   h.sh_degree = static_cast<uint32_t>(model.sh_degree);
   h.chroma_sh_degree = static_cast<uint32_t>(model.chroma_sh_degree);
   h.count = model.size();
   std::string bytes(reinterpret_cast<const char*>(&h), sizeof(h));
-  if (m.moving > 0) bytes.append(reinterpret_cast<const char*>(&m), sizeof(m));
+  if (h.version >= kMotionVersion) bytes.append(reinterpret_cast<const char*>(&m), sizeof(m));
   const auto append = [&](const char* name, const std::vector<float>& buffer, int width, size_t) {
     const std::string place = FirstNotFinite(name, buffer, width);
     if (!place.empty()) {
@@ -120,11 +126,12 @@ std::string SerializeGaussians(const GaussianModel& model) {
 GaussianModel ParseGaussians(std::string_view bytes) {
   const Header h = ReadHeader(bytes);
   GaussianModel model;
+  if (h.version == kSrgbVersion) model.color_space = ColorSpace::kSrgb;
   model.channels = static_cast<int>(h.channels);
   model.sh_degree = static_cast<int>(h.sh_degree);
   model.chroma_sh_degree = static_cast<int>(h.chroma_sh_degree);
   const MotionHeader m = ReadMotionHeader(bytes, h);
-  const size_t head = sizeof(Header) + (h.version == kMotionVersion ? sizeof(MotionHeader) : 0);
+  const size_t head = sizeof(Header) + (h.version >= kMotionVersion ? sizeof(MotionHeader) : 0);
   const size_t body = bytes.size() - head - kDigestBytes;
   // No product of a number from the file may overflow.
   size_t floats_left = body / sizeof(float);

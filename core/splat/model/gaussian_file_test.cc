@@ -44,6 +44,42 @@ TEST(GaussianFileTest, KeepsConfidenceIfPresent) {
   EXPECT_THROW(SerializeGaussians(m), Error);
 }
 
+TEST(GaussianFileTest, KeepsChromaOfDegree3AndColorSpace) {
+  GaussianModel m = RandomModel({5, 3, 3, 3});
+  EXPECT_EQ(SerializeGaussians(m)[8], 1) << "Lab, which older programs read";
+  m.color_space = ColorSpace::kSrgb;
+  m.confidence = {0.0f, 0.25f, 0.5f, 0.75f, 1.0f};
+  const std::string bytes = SerializeGaussians(m);
+  EXPECT_EQ(bytes[8], 4) << "older programs refuse it";
+  const GaussianModel back = ParseGaussians(bytes);
+  EXPECT_EQ(back.color_space, ColorSpace::kSrgb);
+  EXPECT_EQ(back.chroma_sh_degree, 3);
+  EXPECT_EQ(back.sh_a, m.sh_a);
+  EXPECT_EQ(back.sh_b, m.sh_b);
+  EXPECT_EQ(back.confidence, m.confidence);
+  EXPECT_EQ(back.motion.size(), 0u);
+  EXPECT_EQ(SerializeGaussians(back), bytes);
+}
+
+std::string Signed(std::string content);
+
+// Byte by byte what version 1 wrote.
+TEST(GaussianFileTest, OpensFileOfVersion1) {
+  std::string content = "C3DGAUSS";
+  for (const uint32_t value : {1u, 3u, 0u, 0u, 1u, 0u}) {  // version, channels, degrees, count
+    content.append(reinterpret_cast<const char*>(&value), 4);
+  }
+  for (int i = 0; i < 14; ++i) {
+    const float value = 0.25f * static_cast<float>(i);
+    content.append(reinterpret_cast<const char*>(&value), 4);
+  }
+  const GaussianModel m = ParseGaussians(Signed(content));
+  EXPECT_EQ(m.color_space, ColorSpace::kLab);
+  EXPECT_EQ(m.position, (std::vector<float>{0.0f, 0.25f, 0.5f}));
+  EXPECT_EQ(m.sh_l, std::vector<float>{2.75f});
+  EXPECT_EQ(m.sh_b, std::vector<float>{3.25f});
+}
+
 void ExpectRefused(const std::string& bytes, const std::string& why) {
   try {
     ParseGaussians(bytes);
@@ -72,6 +108,9 @@ TEST(GaussianFileTest, RejectsHostileBytes) {
   bytes = good;
   bytes[100] ^= 1;
   ExpectRefused(bytes, "checksum");
+  bytes = content;
+  bytes[8] = 4;  // without the header of version 4
+  EXPECT_THROW(ParseGaussians(Signed(bytes)), Error);
   bytes = content;
   bytes[8] = 2;  // without the confidence that version 2 has
   ExpectRefused(Signed(bytes), "claims");
