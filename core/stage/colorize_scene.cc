@@ -268,7 +268,10 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   std::optional<int> key;
   if (context.HasInput(artifact::kKeyView)) key = ReadKeyView(context, scene);
   std::vector<std::string> keys = ReadCarryFacts(context).key_views;
-  if (keys.empty() && key) keys = {scene.views[*key].name};
+  if (keys.empty() && key) {
+    keys = AdditionalKeyViewNames(context);
+    keys.insert(keys.begin(), scene.views[*key].name);
+  }
   const auto next = keys.empty() ? std::nullopt : AdviseNextKeyView(scene, keys, context);
   const ColorFacts colors(scene, context, next);
   const std::vector<CurvePoint> curves = CollectCurves(context);

@@ -263,7 +263,13 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
       TrainAtFrameSize(scene.max_side_px(), spec.mutable_personalize());
     }
     std::string skip_reason;
-    if (kind == kind::kCarryColor) skip_reason = NoCarryReason(given, scene);
+    if (kind == kind::kCarryColor) {
+      skip_reason = NoCarryReason(given, scene);
+      const v1::CarryColorSpec& carry = scene.carry_color();
+      if (carry.skip() && carry.train_jointly()) {
+        builder->AddJointKeyViews(carry.further_key_views());
+      }
+    }
     if (kind == kind::kCorrectColors && !given.has_correct_colors() &&
         scene.correct_colors().corrections().empty()) {
       skip_reason = "no corrections were given";
