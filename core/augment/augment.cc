@@ -229,7 +229,7 @@ AugmentOptions AugmentOptions::Paper() {
   options.luminance_jitter = 0.0;
   options.perspective_probability = 0.0;
   options.elastic.kind = ElasticOptions::Kind::kNoise;
-  options.rot90_probability = 0.5;
+  options.rot90_probability = 1.0;
   options.shuffle_probability = 0.7;
   return options;
 }

@@ -1,4 +1,4 @@
-// Elastic transform of Simard et al. 2003 (METHOD.md "The paper's recipe"). Immutable, thread-safe.
+// Elastic transform of Simard et al. 2003 (PAPER.md "Colour"). Immutable, thread-safe.
 #pragma once
 
 #include <algorithm>

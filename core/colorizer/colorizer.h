@@ -66,7 +66,7 @@ struct ColorizerOptions {
   bool neighbors = true;       // kColor3d: feature neighbors; false: the decoder alone
   uint64_t seed = 1;
   // Sets the recipe with its crop, sampling, resolution and elastic transform, without averaging
-  // and clipping (METHOD.md "The paper's recipe").
+  // and clipping (PAPER.md).
   void UsePaperRecipe();
   void Validate() const;
   bool operator==(const ColorizerOptions&) const = default;

@@ -15,6 +15,7 @@
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/key_view_ranking.h"
+#include "core/stage/formats/key_views.h"
 #include "core/stage/report/color_sections.h"
 #include "core/stage/report/key_view_section.h"
 #include "core/stage/report/repeat_section.h"

@@ -124,6 +124,10 @@ std::string NoCarryReason(const ColorizeSceneSpec& given, const ColorizeSceneSpe
                                         : "the preset carries no colour";
 }
 
+bool TrainsJointly(const ColorizeSceneSpec& scene) {
+  return scene.carry_color().skip() && scene.carry_color().train_jointly();
+}
+
 struct MethodInputs {
   bool colorizer = false;  // of the scene
   bool carried = false;    // colours, also for training the colorizer
@@ -265,9 +269,8 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     std::string skip_reason;
     if (kind == kind::kCarryColor) {
       skip_reason = NoCarryReason(given, scene);
-      const v1::CarryColorSpec& carry = scene.carry_color();
-      if (carry.skip() && carry.train_jointly()) {
-        builder->AddJointKeyViews(carry.further_key_views());
+      if (TrainsJointly(scene)) {
+        builder->AddJointKeyViews(scene.carry_color().further_key_views());
       }
     }
     if (kind == kind::kCorrectColors && !given.has_correct_colors() &&

@@ -1,5 +1,5 @@
 // The options of PRESET_PAPER, resolved to those that the stages get, against the paper's values.
-// METHOD.md "The paper's recipe" has the same rows in prose.
+// PAPER.md has the same rows in prose.
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -87,7 +87,7 @@ std::vector<Row> ColorRows(const Resolved& r) {
       {"nearest neighbours beside the decoder", 0, "3.2", 1.0 * r.recipe.neighbors},
       {"decoder at the size of the picture", 1, "silent", 1.0 * r.recipe.model.full_resolution},
       {"augment: flip", 0.5, "silent", augment.flip_probability},
-      {"augment: rotation", 0.5, "silent", augment.rot90_probability},
+      {"augment: rotation by a random quarter turn", 1, "silent", augment.rot90_probability},
       {"augment: grid shuffle", 0.7, "silent", augment.shuffle_probability},
       {"augment: cells a side", 8, "silent", 1.0 * augment.shuffle_grid},
       {"augment: elastic", 0.7, "silent", augment.elastic_probability},
