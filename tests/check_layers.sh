@@ -145,7 +145,7 @@ public() {
   [ -z "$bad" ] || complain "headers private to $folder:" "$bad"
 }
 
-public core/augment augment outpaint surrogates
+public core/augment augment elastic_options outpaint surrogates
 public core/carry carry carry_views confidence dense_points plane_sweep view_color view_propagation
 public core/colorizer colorizer corrector scene_batch personal/scene_colorizers personal/train_colorizer
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \

@@ -117,8 +117,8 @@ TEST(AugmentTest, ShuffleMovesWholeCellsWithoutMixing) {
   options.shuffle_probability = 1.0;
   options.shuffle_grid = 4;
   options.elastic_probability = 1.0;  // positions between pixels, too
-  options.elastic_alpha_px = 3.0;
-  options.elastic_sigma_px = 20.0;
+  options.elastic.alpha_px = 3.0;
+  options.elastic.sigma_px = 20.0;
   Random random(5);
   const AugmentedSample sample = Augment(luminance, ab, {}, options, random);
   for (float value : sample.ab.data) ASSERT_EQ(value, std::round(value));

@@ -32,7 +32,7 @@ void RunColorizeViews(const ColorizeViewsOptions& options,
     colorizer = LoadColorizer(context.ReadInput(artifact::kColorizer),
                               context.LoadEncoder(encoder),
                               /*threads=*/1,
-                              PartsFor(options.method));
+                              {PartsFor(options.method), options.full_size});
   }
   const ViewPositions positions(scene, context);
   const bool are_frames = scene.HasTimes() && !positions.IsStatic();

@@ -124,6 +124,10 @@ std::string NoCarryReason(const ColorizeSceneSpec& given, const ColorizeSceneSpe
                                         : "the preset carries no colour";
 }
 
+bool TrainsJointly(const ColorizeSceneSpec& scene) {
+  return scene.carry_color().skip() && scene.carry_color().train_jointly();
+}
+
 struct MethodInputs {
   bool colorizer = false;  // of the scene
   bool carried = false;    // colours, also for training the colorizer
@@ -263,7 +267,12 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
       TrainAtFrameSize(scene.max_side_px(), spec.mutable_personalize());
     }
     std::string skip_reason;
-    if (kind == kind::kCarryColor) skip_reason = NoCarryReason(given, scene);
+    if (kind == kind::kCarryColor) {
+      skip_reason = NoCarryReason(given, scene);
+      if (TrainsJointly(scene)) {
+        builder->AddJointKeyViews(scene.carry_color().further_key_views());
+      }
+    }
     if (kind == kind::kCorrectColors && !given.has_correct_colors() &&
         scene.correct_colors().corrections().empty()) {
       skip_reason = "no corrections were given";

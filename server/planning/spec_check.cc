@@ -217,10 +217,17 @@ void CheckCarryColor(const v1::CarryColorSpec& spec, bool of_whole_scene, const 
              fmt::format(" has a range of time: it corrects a coloured film and belongs to {}",
                          kind::kCorrectColors));
     }
-    if (!HasRange(key) && spec.skip()) {
+    if (!HasRange(key) && spec.skip() && !spec.train_jointly()) {
       Reject(path + ".skip",
-             " is set, but further_key_views need the stage; leave one of them out");
+             " is set, but further_key_views need the stage; leave one of them out, or set "
+             "train_jointly");
     }
+  }
+  if (spec.train_jointly() && !of_whole_scene) {
+    Reject(path + ".train_jointly",
+           fmt::format(" is set, but it is an option of {}, for it concerns other stages; leave it "
+                       "out",
+                       kind::kColorizeScene));
   }
 }
 

@@ -40,6 +40,17 @@ ColorizeViewsOptions::Method MethodFrom(v1::ColorizeViewsSpec::Method method) {
   }
 }
 
+void SetElastic(const v1::PersonalizeSpec& spec, ElasticOptions* elastic) {
+  if (spec.elastic() != v1::PersonalizeSpec::ELASTIC_UNSPECIFIED) {
+    elastic->kind = spec.elastic() == v1::PersonalizeSpec::ELASTIC_NOISE
+                        ? ElasticOptions::Kind::kNoise
+                        : ElasticOptions::Kind::kSpline;
+  }
+  if (spec.has_elastic_alpha_px()) elastic->alpha_px = spec.elastic_alpha_px();
+  if (spec.has_elastic_sigma_px()) elastic->sigma_px = spec.elastic_sigma_px();
+  if (spec.has_elastic_affine_px()) elastic->affine_px = spec.elastic_affine_px();
+}
+
 // Throws if the job was planned by a version whose stages coloured additional key views themselves.
 void RequireColoredBefore(const v1::FurtherKeyView& key) {
   if (!key.has_color()) return;
@@ -143,6 +154,12 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
   ColorizerOptions options;
   options.seed = seed;
   if (spec.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) options.UsePaperRecipe();
+  SetElastic(spec, &options.elastic);
+  if (spec.has_max_gradient_norm()) options.max_gradient_norm = spec.max_gradient_norm();
+  if (spec.has_equal_draws()) options.equal_draws = spec.equal_draws();
+  if (spec.has_full_resolution()) options.full_resolution = spec.full_resolution();
+  if (spec.has_adapter_stages()) options.adapter_stages = spec.adapter_stages();
+  if (spec.has_instance_norm()) options.instance_norm = spec.instance_norm();
   if (spec.has_iterations()) options.iterations = spec.iterations();
   if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
@@ -179,6 +196,7 @@ ColorizeViewsOptions ColorizeViewsOptionsFrom(const v1::ColorizeViewsSpec& spec)
   options.method = MethodFrom(spec.method());
   if (spec.has_guess()) options.guess = spec.guess();
   if (spec.has_spread()) options.spread = spec.spread();
+  options.full_size = spec.full_size();
   return options;
 }
 

@@ -8,6 +8,7 @@
 #include "core/stage/coloring/view_coloring.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_facts.h"
+#include "core/stage/formats/key_views.h"
 
 namespace color3d {
 namespace {
@@ -85,8 +86,8 @@ std::vector<int> KeyViewsOf(const Scene& scene, const StageContext& context) {
   for (const std::string& name : ReadCarryFacts(context).key_views) {
     views.push_back(scene.FindView(name));
   }
-  if (views.empty()) views.push_back(ReadKeyView(context, scene));
-  return views;
+  if (!views.empty()) return views;
+  return ReadKeyViews(context, scene, AdditionalKeyViewNames(context));
 }
 
 CarriedColor GivenColor(const ViewColoring& coloring, int key_view, const StageContext& context) {
@@ -95,6 +96,9 @@ CarriedColor GivenColor(const ViewColoring& coloring, int key_view, const StageC
   // The carried colours of key views are those that were given.
   if (context.HasInput(ViewArtifact(artifact::kCarried, view))) {
     return ReadCarried(context, view, camera.width, camera.height);
+  }
+  if (key_view != ReadKeyView(context, coloring.scene)) {
+    return ReadAdditionalKeyColor(context, coloring.scene, key_view, coloring.images);
   }
   return ReadKeyColor(context, camera.width, camera.height);
 }

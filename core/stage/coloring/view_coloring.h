@@ -49,7 +49,8 @@ void ColorGray(const ViewColoring& coloring, StageContext& context);
 ColorSources SourcesOf(const Colorizer& colorizer,
                        std::function<Image(const Image& luminance)> position = {});
 
-// Indices of the key views: of the carried colours or, if none were carried, the chosen one.
+// Indices of the key views: of the carried colours or, if none were carried, the chosen one and the
+// additional ones among the inputs.
 std::vector<int> KeyViewsOf(const Scene& scene, const StageContext& context);
 // Colours of one of these as they were given, of the size of `images`. Confidence is 0 where it is
 // not painted.

@@ -19,8 +19,9 @@ struct ColorizeViewsOptions {
   };
   int max_side_px = 500;  // 64..4096
   Method method = Method::kFusion;
-  bool guess = true;   // kFusion: automatic guesses where nothing similar has a colour
-  bool spread = true;  // kFusion: spread colours between the edges of the luminance
+  bool full_size = false;  // infer at the size of the views, even if training pictures are smaller
+  bool guess = true;       // kFusion: automatic guesses where nothing similar has a colour
+  bool spread = true;      // kFusion: spread colours between the edges of the luminance
 
   void Validate() const { CheckMaxSide(max_side_px); }
   // True if the method reads the scene's colorizer.
