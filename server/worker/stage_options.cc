@@ -173,6 +173,9 @@ GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uin
     options.recipe = GeometryOptions::Recipe::kPaper;
   }
   if (spec.still()) options.motion = GeometryOptions::Motion::kStill;
+  if (spec.deformation() == v1::ReconstructGeometrySpec::DEFORMATION_HEXPLANE) {
+    options.deformation = GeometryOptions::Deformation::kHexPlane;
+  }
   return options;
 }
 

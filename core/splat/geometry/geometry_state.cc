@@ -16,6 +16,13 @@ void VisitGeometryState(Archive& archive, State& state) {
   archive.Block(state.moving.parameters);
   archive.Block(state.moving.moments.first);
   archive.Block(state.moving.moments.second);
+  archive.Block(state.hexplane.planes);
+  archive.Block(state.hexplane.network);
+  archive.Block(state.hexplane.plane_moments.first);
+  archive.Block(state.hexplane.plane_moments.second);
+  archive.Block(state.hexplane.network_moments.first);
+  archive.Block(state.hexplane.network_moments.second);
+  archive.Value(state.hexplane.steps);
   archive.Value(state.densified_at);
   archive.Vector(state.exposures);
 }
@@ -30,9 +37,10 @@ std::string GeometryFingerprint(const GeometryProblem& problem,
   for (const PosedCamera& view : problem.training) {
     pixels += int64_t{view.camera.width} * view.camera.height;
   }
-  std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+  std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
                                  problem.colors ? 3 : 1,
                                  moments,
+                                 static_cast<int>(options.deformation),
                                  options.iterations,
                                  options.max_gaussians,
                                  options.sh_degree,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "core/base/error.h"
 #include "core/scene/photo_masks.h"
@@ -17,6 +18,7 @@
 #include "core/splat/motion/shared_motion.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
+#include "core/splat/training/hexplane_training.h"
 #include "core/splat/training/loss.h"
 #include "core/splat/training/training_guard.h"
 #include "core/splat/training/training_targets.h"
@@ -57,6 +59,15 @@ class GeometryTrainer {
     state_.statistics.Reset(initial_count_);
     state_.random = Random(options.seed);
     if (schedule_.tuning().exposure_rate > 0.0) state_.exposures.resize(problem.training.size());
+    if (IsHexPlane()) {
+      hexplanes_.emplace(HexPlaneShapeFor(state_.parameters,
+                                          {times_.begin_s, times_.end_s, times_.steps},
+                                          problem.extent,
+                                          schedule_.tuning().hexplane),
+                         schedule_.tuning().hexplane,
+                         problem.is_relief);
+      state_.hexplane = hexplanes_->First(options.seed);
+    }
     pipeline_.set_clock(&clock_);
   }
 
@@ -89,7 +100,10 @@ class GeometryTrainer {
       }
     }
     FinishTrace();
-    return ModelOfParts(state_.parameters, state_.moving, times_, channels_, options_.sh_degree);
+    GaussianModel model =
+        ModelOfParts(state_.parameters, state_.moving, times_, channels_, options_.sh_degree);
+    if (hexplanes_) model.hexplane = hexplanes_->Field(state_.hexplane);
+    return model;
   }
 
  private:
@@ -98,7 +112,7 @@ class GeometryTrainer {
   }
 
   std::string Fingerprint() const {
-    return GeometryFingerprint(problem_, options_, MayMove() ? times_.steps : 1, initial_count_);
+    return GeometryFingerprint(problem_, options_, IsDynamic() ? times_.steps : 1, initial_count_);
   }
 
   void Resume() {
@@ -132,6 +146,9 @@ class GeometryTrainer {
 
   // All Gaussians at the view's time.
   const ParameterBlock& At(const PosedCamera& view, float hidden = 0.0f) {
+    if (DeformsNow()) {
+      return hexplanes_->At(state_.hexplane, state_.parameters, view.time_s, run_.pool);
+    }
     if (state_.moving.parameters.count() == 0) return state_.parameters;
     ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_, hidden);
     return composed_;
@@ -139,9 +156,14 @@ class GeometryTrainer {
 
   int64_t Count() const { return state_.parameters.count() + state_.moving.parameters.count(); }
 
-  bool MayMove() const {
+  bool IsDynamic() const {
     return options_.motion == GeometryOptions::Motion::kAuto && times_.steps > 1;
   }
+  bool IsHexPlane() const {
+    return IsDynamic() && options_.deformation == GeometryOptions::Deformation::kHexPlane;
+  }
+  bool MayMove() const { return IsDynamic() && !IsHexPlane(); }
+  bool DeformsNow() const { return hexplanes_ && hexplanes_->IsActive(fraction_); }
 
   void FindMovers() {
     if (!MayMove()) return;
@@ -240,7 +262,14 @@ class GeometryTrainer {
     clock_.Enter(Phase::kAdam);
     std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
     MovingPart& moving = state_.moving;
-    bool finite = true;
+    bool finite =
+        !DeformsNow() || hexplanes_->Update(state_.parameters,
+                                            view.time_s,
+                                            fraction_,
+                                            options_.learning_rate_scale * state_.rate_scale,
+                                            run_.pool,
+                                            gradient_,
+                                            state_.hexplane);
     if (moving.parameters.count() > 0) {
       DecomposeGradient(state_.parameters,
                         moving,
@@ -412,6 +441,7 @@ class GeometryTrainer {
   TrainingTargets targets_;
   TrainingTargets masks_;
   TrainingTargets still_;
+  std::optional<HexPlaneTraining> hexplanes_;
   GeometryState state_;
   int64_t initial_count_ = 0;     // Gaussians
   double fraction_ = 0.0;         // completed fraction of the schedule

@@ -7,7 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/random.h"
-#include "core/splat/motion/motion.h"
+#include "core/splat/motion/geometry_in_time.h"
 #include "tests/support/formats/splat4d_reader.h"
 #include "tests/support/scenes/random_model.h"
 
