@@ -163,7 +163,8 @@ TEST_F(ColorizeOptionsTest, SuggestsSimilarOption) {
 TEST_F(ColorizeOptionsTest, HelpShowsRangesOfProto) {
   EXPECT_EQ(DescribeOption("personalize.crop_px"), "64 to 1024 px, default 256");
   EXPECT_EQ(DescribeOption("max_side_px"), "64 to 4096 px, default by preset");
-  EXPECT_EQ(DescribeOption("solve_chroma.solver"), "conjugate_gradients, adam, default by preset");
+  EXPECT_EQ(DescribeOption("solve_chroma.solver"),
+            "conjugate_gradients, adam, joint, default by preset");
   ColorizeOptions options;
   CLI::App app;
   DeclareOptions(app, &options);

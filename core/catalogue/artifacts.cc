@@ -35,6 +35,7 @@ std::vector<Artifact> MakeCatalogue() {
       {kKeyViews, kColorizeKeyView, kBinary, true},  // each file as above
       {kGeometry, kReconstructGeometry, kBinary},
       {kMemoryPlan, kReconstructGeometry, kJson},
+      {kWarmUp, kReconstructGeometry, kBinary},
       {kCarried, kCarryColor, kPng},
       {kCarryFacts, kCarryColor, kJson},
       {kAugmentationFacts, kGenerateAugmentations, kJson},
@@ -47,7 +48,8 @@ std::vector<Artifact> MakeCatalogue() {
       {kCorrectedProvenance, kCorrectColors, kPng},
       {kCorrections, kCorrectColors, kJson, true},
       {kPaint, kCorrectColors, kPng, true},
-      {kModel, kSolveChroma, kBinary, true}};
+      {kModel, kSolveChroma, kBinary, true},
+      {kJointTraining, kSolveChroma, kJson, true}};
   for (const ExportFormatInfo& format : kExportFormats) {
     artifacts.push_back({format.artifact, kExport, format.media_type, true, format.label});
   }

@@ -33,6 +33,8 @@ inline constexpr char kKeyViewColored[] = "key_view_colored.png";    // for user
 inline constexpr char kKeyViews[] = "key_views/";
 inline constexpr char kGeometry[] = "geometry.c3g";  // Gaussians with luminance only
 inline constexpr char kMemoryPlan[] = "memory_plan.json";
+// State of training at the end of the warm-up, if solve_chroma is to train the rest.
+inline constexpr char kWarmUp[] = "warm_up.c3t";
 inline constexpr char kCarried[] = "carried/";       // view's stem + ".png": ab and confidence
 inline constexpr char kCarryFacts[] = "carry.json";  // coverage, the view to colour next
 inline constexpr char kAugmentationFacts[] = "augmentations.json";  // samples made and left out
@@ -49,7 +51,8 @@ inline constexpr char kCorrectedProvenance[] = "corrected_provenance/";
 inline constexpr char kCorrections[] = "corrections.json";  // reach of each, and proposed views
 // view's stem + ".png": photos where a correction is proposed, in their present colours
 inline constexpr char kPaint[] = "paint/";
-inline constexpr char kModel[] = "model.c3g";  // Gaussians in colour
+inline constexpr char kModel[] = "model.c3g";                    // Gaussians in colour
+inline constexpr char kJointTraining[] = "joint_training.json";  // its size and seconds, if it ran
 // The other formats of export stand in export_formats.h alone.
 inline constexpr char kPly[] = "scene.ply";
 inline constexpr char kSog[] = "scene.sog";

@@ -1,16 +1,20 @@
+#include <algorithm>
 #include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/base/error.h"
 #include "core/carry/dense_points.h"
 #include "core/image/codec.h"
 #include "core/scene/masks/masked_points.h"
 #include "core/scene/masks/still_regions.h"
 #include "core/scene/view_images.h"
 #include "core/splat/geometry/geometry_trainer.h"
+#include "core/splat/geometry/warm_up.h"
 #include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/memory_plan.h"
+#include "core/splat/training/hexplane_training.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
 
@@ -35,7 +39,13 @@ MemoryPlan PlanMemory(const GeometryOptions& options,
   demand.max_side_px = max_side_px;
   demand.max_gaussians = options.max_gaussians;
   demand.sh_degree = options.sh_degree;
+  demand.channels = options.warm_up < 1.0 ? 3 : 1;
   demand.moves = scene.HasTimes();
+  if (demand.moves && options.motion == GeometryOptions::Motion::kAuto &&
+      options.deformation == GeometryOptions::Deformation::kHexPlane) {
+    demand.deformation_bytes =
+        HexPlaneBytes(TuningOf(options).hexplane, static_cast<int>(scene.Times().size()));
+  }
   return PlanGeometryMemory(demand, budget_bytes);
 }
 
@@ -80,6 +90,50 @@ std::string MemoryPlanToJson(const MemoryPlan& plan) {
          "\n";
 }
 
+void CheckWarmUp(const GeometryOptions& options) {
+  if (options.warm_up == 1.0 || options.recipe == GeometryOptions::Recipe::kPaper) return;
+  throw InvalidArgument(
+      "reconstruct_geometry.warm_up is {}, but only recipe=paper leaves a part of the training to "
+      "solve_chroma; choose it or leave warm_up out",
+      options.warm_up);
+}
+
+// Fewer Gaussians and iterations for a small scene. The paper's recipe takes both as given.
+GeometryOptions ForScene(GeometryOptions options,
+                         const Scene& scene,
+                         int max_side_px,
+                         StageContext& context) {
+  if (options.recipe == GeometryOptions::Recipe::kPaper) return options;
+  const std::vector<Camera> cameras = TrainingCameras(scene);
+  const int asked = options.iterations;
+  options.max_gaussians = GaussianCap(options.max_gaussians, cameras, max_side_px);
+  options.iterations = IterationCap(asked, static_cast<int>(cameras.size()));
+  if (options.iterations < asked) {
+    context.Warn(
+        "{} iterations are done of the {} asked for: with {} training views more gain nothing "
+        "(recipe=paper does all)",
+        options.iterations,
+        asked,
+        cameras.size());
+  }
+  return options;
+}
+
+// Gaussians that came with the scene, as they are, count as the result of a warm-up.
+void ForwardGivenGeometry(const GeometryOptions& options, int max_side_px, StageContext& context) {
+  const std::string bytes = context.ReadInput(artifact::kGivenGeometry);
+  context.WriteOutput(artifact::kGeometry, bytes);
+  if (options.warm_up == 1.0) return;
+  const GaussianModel geometry = ParseGaussians(bytes);
+  WarmUp warm_up{options, max_side_px, int64_t{512} << 20, {}};
+  warm_up.options.tuning = TuningOf(options);
+  warm_up.options.sh_degree = geometry.sh_degree;
+  warm_up.options.max_gaussians =
+      std::max(options.max_gaussians, static_cast<int>(geometry.size()));
+  warm_up.state = StateOf(geometry, warm_up.options);
+  context.WriteOutput(artifact::kWarmUp, SerializeWarmUp(warm_up));
+}
+
 }  // namespace
 
 void RunReconstructGeometry(const GeometryOptions& options,
@@ -87,17 +141,13 @@ void RunReconstructGeometry(const GeometryOptions& options,
                             StageContext& context) {
   options.Validate();
   CheckMaxSide(max_side_px);
+  CheckWarmUp(options);
   if (context.HasInput(artifact::kGivenGeometry)) {
-    context.WriteOutput(artifact::kGeometry, context.ReadInput(artifact::kGivenGeometry));
+    ForwardGivenGeometry(options, max_side_px, context);
     return;
   }
   const Scene scene = ReadScene(context);
-  GeometryOptions planned = options;
-  planned.max_gaussians = GaussianCap(options.max_gaussians, TrainingCameras(scene), max_side_px);
-  if (options.recipe == GeometryOptions::Recipe::kColor3d) {
-    planned.iterations =
-        IterationCap(options.iterations, static_cast<int>(scene.TrainingViews().size()));
-  }
+  GeometryOptions planned = ForScene(options, scene, max_side_px, context);
   const MemoryPlan memory = PlanMemory(planned, max_side_px, scene, context.MemoryBytes());
   planned.max_gaussians = memory.max_gaussians;
   if (!memory.note.empty()) context.Warn(memory.note);
@@ -113,8 +163,14 @@ void RunReconstructGeometry(const GeometryOptions& options,
   GeometryProblem problem = GeometryProblemOf(start, images);
   problem.still = still;
   problem.picture_cache_bytes = memory.target_cache_bytes;
-  const GaussianModel model = TrainGeometry(problem, planned, context.control());
+  WarmUp warm_up{planned, memory.max_side_px, memory.target_cache_bytes, {}};
+  const GaussianModel model =
+      TrainGeometry(problem, planned, context.control(), nullptr, &warm_up.state);
   context.WriteOutput(artifact::kGeometry, SerializeGaussians(model));
+  if (planned.warm_up < 1.0) {
+    warm_up.options.tuning = TuningOf(planned);
+    context.WriteOutput(artifact::kWarmUp, SerializeWarmUp(warm_up));
+  }
   context.WriteOutput(artifact::kMemoryPlan, MemoryPlanToJson(memory));
 }
 

@@ -76,8 +76,8 @@ void RunCorrectColors(const CorrectColorsOptions& options,
 // Gaussians are reduced with a warning. Gaussians that came with the scene are kept as they are.
 void RunReconstructGeometry(const GeometryOptions& options, int max_side_px, StageContext& context);
 
-// Fits the chroma of the views on the geometry, with confidence if every training view has its
-// provenance.
+// Fits the chroma of the views on the geometry, or trains both together, with confidence if every
+// training view has its provenance.
 void RunSolveChroma(const ChromaOptions& options, StageContext& context);
 
 // Writes the model in RGB formats for viewers, and their difference from our renders. For dynamic

@@ -1,16 +1,35 @@
+#include <utility>
+#include <vector>
+
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/splat/chroma/chroma_fit.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
+#include "core/stage/solve_chroma_jointly.h"
 #include "core/stage/sources/chroma_budget.h"
 
 namespace color3d {
+namespace {
+
+// The closed form, whose chroma is not used.
+ChromaOptions ForConfidenceAlone(ChromaOptions options) {
+  options.solver = ChromaOptions::Solver::kConjugateGradients;
+  options.color_space = ColorSpace::kLab;
+  options.iterations = 0;
+  options.chroma_sh_degree = 0;
+  return options;
+}
+
+}  // namespace
+
 void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
-  const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
+  const bool jointly = options.solver == ChromaOptions::Solver::kJoint;
+  const GaussianModel geometry = jointly ? SolveChromaJointly(options, scene, key, context)
+                                         : ParseGaussians(context.ReadInput(artifact::kGeometry));
   const ViewImages images(scene, context.scene_folder(), ColoredSide(context, scene.views[key]), 0);
   const ChromaTargetSource targets = [&](int view) {
     const Camera camera = images.WorkingCamera(view);
@@ -24,11 +43,15 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
     if (const auto mask = images.Mask(view)) target->weight = *mask;
     return target;
   };
+  ChromaOptions fit = ChromaWithinMemory(options, scene, geometry, context.MemoryBytes());
+  if (jointly) fit = ForConfidenceAlone(fit);
   GaussianModel model =
-      FitChroma(geometry,
-                ChromaProblemOf(scene, images, targets),
-                ChromaWithinMemory(options, scene, geometry, context.MemoryBytes()),
-                context.control());
+      FitChroma(geometry, ChromaProblemOf(scene, images, targets), fit, context.control());
+  if (jointly) {
+    std::vector<float> confidence = std::move(model.confidence);
+    model = geometry;
+    model.confidence = std::move(confidence);
+  }
   AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
 }

@@ -63,6 +63,7 @@ NewGraph PlanJob(v1::JobSpec spec, const std::vector<JobRecord>& inputs, const S
   // A fixed default, so that equal submissions have equal stage keys.
   if (spec.seed() == 0) spec.set_seed(1);
   const v1::ColorizeSceneSpec scene = SceneOf(spec, inputs);
+  if (spec.has_colorize_scene()) CheckJointTraining(scene);
   std::optional<TimeBudget> time_budget;
   if (scene.time_budget_seconds() > 0.0) {
     time_budget = DivideTimeBudget(scene.time_budget_seconds(), facts, scene.import_scene());

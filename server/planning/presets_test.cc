@@ -52,11 +52,12 @@ TEST(Presets, HaveTheDocumentedPlans) {
   const v1::ColorizeSceneSpec paper = WithPreset(Given(v1::PRESET_PAPER));
   EXPECT_EQ(paper.max_side_px(), 1600);
   EXPECT_EQ(paper.personalize().iterations(), 4000);
-  EXPECT_EQ(paper.reconstruct_geometry().iterations(), 15'000);
+  EXPECT_EQ(paper.reconstruct_geometry().iterations(), 30'000);
+  EXPECT_EQ(paper.reconstruct_geometry().warm_up(), 0.5);
   EXPECT_EQ(paper.reconstruct_geometry().sh_degree(), 3);
   EXPECT_EQ(paper.reconstruct_geometry().densify_gradient(), 2e-4);
-  EXPECT_EQ(paper.solve_chroma().solver(), v1::SolveChromaSpec::SOLVER_ADAM);
-  EXPECT_EQ(paper.solve_chroma().iterations(), 15'000);
+  EXPECT_EQ(paper.solve_chroma().solver(), v1::SolveChromaSpec::SOLVER_JOINT);
+  EXPECT_EQ(paper.solve_chroma().chroma_sh_degree(), 3);
   EXPECT_TRUE(paper.carry_color().skip());
   EXPECT_EQ(paper.generate_augmentations().samples(), 8);
 }

@@ -339,6 +339,41 @@ void CheckSpec(const v1::JobSpec& spec) {
       spec.evaluate().training_truth(), !spec.evaluate().truth().empty(), kind + ".training_truth");
 }
 
+void CheckJointTraining(const v1::ColorizeSceneSpec& scene) {
+  const v1::ReconstructGeometrySpec& geometry = scene.reconstruct_geometry();
+  const v1::SolveChromaSpec& chroma = scene.solve_chroma();
+  const bool leaves_part = geometry.has_warm_up() && geometry.warm_up() < 1.0;
+  const bool joint = chroma.solver() == v1::SolveChromaSpec::SOLVER_JOINT;
+  const std::string warm_up = fmt::format("{}.warm_up", kind::kReconstructGeometry);
+  if (leaves_part && geometry.recipe() != v1::ReconstructGeometrySpec::RECIPE_PAPER) {
+    Reject(warm_up, fmt::format(" is {}, which needs recipe=paper", geometry.warm_up()));
+  }
+  if (leaves_part && !joint) {
+    Reject(
+        warm_up,
+        fmt::format(" is {}, so that {} has to train the rest; choose {}.solver=joint or warm_up "
+                    "1",
+                    geometry.warm_up(),
+                    kind::kSolveChroma,
+                    kind::kSolveChroma));
+  }
+  if (joint && !leaves_part) {
+    Reject(fmt::format("{}.solver", kind::kSolveChroma),
+           fmt::format(" is joint, but {} trains to the end; give {} below 1 (the paper: 0.5) and "
+                       "recipe=paper",
+                       kind::kReconstructGeometry,
+                       warm_up));
+  }
+  if (joint && chroma.chroma_sh_degree() > geometry.sh_degree()) {
+    Reject(fmt::format("{}.chroma_sh_degree", kind::kSolveChroma),
+           fmt::format(" is {}, above the degree {} of luminance, from which a and b start; lower "
+                       "it or raise {}.sh_degree",
+                       chroma.chroma_sh_degree(),
+                       geometry.sh_degree(),
+                       kind::kReconstructGeometry));
+  }
+}
+
 std::vector<FileDigest> SpecBlobs(const v1::JobSpec& spec) {
   std::map<std::string, FileDigest> digests;
   ForEachValue(spec, [&](const SpecValue& value) {

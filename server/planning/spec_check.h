@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "color3d/v1/colorize_scene.pb.h"
 #include "color3d/v1/job.pb.h"
 #include "core/base/digest.h"
 
@@ -20,6 +21,10 @@ std::string KindOf(const v1::JobSpec& spec);
 // Throws Error: kInvalidArgument with field, value and range; kUnimplemented with the kind. Names
 // of models and backends are checked by CheckNames (spec_names.h).
 void CheckSpec(const v1::JobSpec& spec);
+
+// Checks that the parts of a training fit together: a geometry that leaves a part of it needs
+// SOLVER_JOINT, and the reverse. `scene`: merged with its preset. Throws as CheckSpec.
+void CheckJointTraining(const v1::ColorizeSceneSpec& scene);
 
 // Returns the digests in the spec, without repetition.
 std::vector<FileDigest> SpecBlobs(const v1::JobSpec& spec);

@@ -176,6 +176,7 @@ GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uin
   if (spec.deformation() == v1::ReconstructGeometrySpec::DEFORMATION_HEXPLANE) {
     options.deformation = GeometryOptions::Deformation::kHexPlane;
   }
+  if (spec.has_warm_up()) options.warm_up = spec.warm_up();
   return options;
 }
 
@@ -188,6 +189,12 @@ ChromaOptions ChromaOptionsFrom(const v1::SolveChromaSpec& spec, uint64_t seed) 
   if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
   if (spec.solver() == v1::SolveChromaSpec::SOLVER_ADAM) {
     options.solver = ChromaOptions::Solver::kAdam;
+  }
+  if (spec.solver() == v1::SolveChromaSpec::SOLVER_JOINT) {
+    options.solver = ChromaOptions::Solver::kJoint;
+  }
+  if (spec.color_space() == v1::SolveChromaSpec::COLOR_SPACE_RGB) {
+    options.color_space = ColorSpace::kSrgb;
   }
   if (spec.has_saturation()) options.adjustment.saturation = spec.saturation();
   if (spec.has_tint()) options.adjustment.tint = spec.tint();

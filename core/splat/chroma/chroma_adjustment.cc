@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/base/range_check.h"
 #include "core/splat/model/spherical_harmonics.h"
 
@@ -44,6 +45,14 @@ void ChromaAdjustment::Validate() const {
 void AdjustChroma(const ChromaAdjustment& adjustment, GaussianModel* model) {
   adjustment.Validate();
   if (adjustment == ChromaAdjustment{}) return;
+  if (model->color_space != ColorSpace::kLab) {
+    throw InvalidArgument(
+        "saturation {}, tint {} and warmth {} change a and b, but the model holds R, G and B; "
+        "solve it with solve_chroma.color_space=lab",
+        adjustment.saturation,
+        adjustment.tint,
+        adjustment.warmth);
+  }
   // Gain of a neutral grey per unit of L + 16, and the factor on X or Z that produces it.
   const double a_per_l = adjustment.tint / (kMiddle + kOffset);
   const double b_per_l = adjustment.warmth / (kMiddle + kOffset);

@@ -81,5 +81,12 @@ TEST(ChromaAdjustment, RejectsOutOfRangeValues) {
   EXPECT_THROW(AdjustChroma({.warmth = 51.0}, &model), Error);
 }
 
+TEST(ChromaAdjustment, RefusesModelInSrgb) {
+  GaussianModel model = OneGaussian(40.0, 12.3, -7.7);
+  model.color_space = ColorSpace::kSrgb;
+  EXPECT_NO_THROW(AdjustChroma({}, &model));
+  EXPECT_THROW(AdjustChroma({.saturation = 1.5}, &model), Error);
+}
+
 }  // namespace
 }  // namespace color3d

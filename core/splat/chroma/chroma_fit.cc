@@ -28,6 +28,9 @@ GaussianModel FitChroma(const GaussianModel& geometry,
   if (problem.training.empty()) {
     throw InvalidArgument("the scene has no training views; give at least one posed photo");
   }
+  if (options.solver == ChromaOptions::Solver::kJoint) {
+    throw Error(ErrorCode::kInternal, "the joint solver trains geometry, it does not fit chroma");
+  }
   const ChromaClock clock;
   ChromaParameters parameters = ChromaParameters::From(geometry, options.chroma_sh_degree);
   const bool solve =

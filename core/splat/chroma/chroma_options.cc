@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/error.h"
 #include "core/base/range_check.h"
 
 namespace color3d {
@@ -9,7 +10,7 @@ namespace color3d {
 void ChromaOptions::Validate() const {
   const RangeCheck check("chroma option");
   check("iterations", iterations, 0, 100'000);
-  check("chroma_sh_degree", chroma_sh_degree, 0, 1);
+  check("chroma_sh_degree", chroma_sh_degree, 0, 3);
   check("ssim_weight", ssim_weight, 0.0, 1.0);
   check("time_limit_seconds", time_limit_seconds, 0.0, 86'400.0);
   check("sweeps", sweeps, 0, 1000);
@@ -22,6 +23,20 @@ void ChromaOptions::Validate() const {
   check("memory_budget_bytes", static_cast<double>(memory_budget_bytes), 0.0, 1e15);
   check("target_budget_bytes", static_cast<double>(target_budget_bytes), 0.0, 1e15);
   adjustment.Validate();
+  if (color_space == ColorSpace::kLab) return;
+  if (solver != Solver::kJoint) {
+    throw InvalidArgument(
+        "solve_chroma.color_space is rgb, which the solver joint alone can train; choose "
+        "solver=joint or color_space=lab");
+  }
+  if (adjustment != ChromaAdjustment{}) {
+    throw InvalidArgument(
+        "saturation {}, tint {} and warmth {} change a and b, and a model in RGB has none; choose "
+        "color_space=lab or leave them out",
+        adjustment.saturation,
+        adjustment.tint,
+        adjustment.warmth);
+  }
 }
 
 ChromaOptions ForManyFrames(ChromaOptions options) {

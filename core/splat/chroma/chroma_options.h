@@ -4,17 +4,21 @@
 #include <cstdint>
 
 #include "core/splat/chroma/chroma_adjustment.h"
+#include "core/splat/model/gaussian_model.h"
 
 namespace color3d {
 
 struct ChromaOptions {
-  enum class Solver { kConjugateGradients, kAdam };
+  // kJoint: goes on with the training of the geometry, on luminance and chroma (STILL.md "Joint
+  // training"), by the options of that training.
+  enum class Solver { kConjugateGradients, kAdam, kJoint };
   Solver solver = Solver::kConjugateGradients;
   // 0..100000. Iterations of Adam, or at most this many of conjugate gradients (which stop by
   // themselves, see below). 0: closed form only.
   int iterations = 300;
-  int chroma_sh_degree = 0;         // 0..1
-  double ssim_weight = 0.2;         // of Adam's loss, 0..1
+  int chroma_sh_degree = 0;                   // 0..3
+  ColorSpace color_space = ColorSpace::kLab;  // kSrgb: kJoint only, and without adjustment
+  double ssim_weight = 0.2;                   // of Adam's loss, 0..1
   double time_limit_seconds = 0.0;  // 0: none; 0..86400. Ends in time with the best result so far
   uint64_t seed = 1;                // of Adam
 

@@ -1,6 +1,7 @@
 #include "core/splat/chroma/chroma_parameters.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/color/lab.h"
 #include "core/splat/model/model_parameters.h"
@@ -24,7 +25,8 @@ GaussianModel ChromaParameters::ToModel(const GaussianModel& geometry) const {
   GaussianModel model = geometry;
   const int chroma = coefficients();
   model.channels = 3;
-  model.chroma_sh_degree = chroma == 1 ? 0 : 1;
+  model.color_space = ColorSpace::kLab;
+  model.chroma_sh_degree = static_cast<int>(std::lround(std::sqrt(chroma))) - 1;
   model.sh_a.resize(model.size() * chroma);
   model.sh_b.resize(model.size() * chroma);
   for (size_t i = 0; i < model.size(); ++i) {

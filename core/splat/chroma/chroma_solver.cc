@@ -133,7 +133,8 @@ class ChromaSolver {
     const int n = parameters_.coefficients();
     run_.pool.ForRanges(2 * system_.count(), [&](int64_t begin, int64_t end, int) {
       for (int64_t i = begin; i < end; ++i) {
-        using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 4, 4>;
+        using Block =
+            Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor, 16, 16>;
         Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> block(
             residuals_.blocks.data() + i * n * n, n, n);
         Block m = block;

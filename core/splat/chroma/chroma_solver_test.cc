@@ -53,7 +53,7 @@ Eigen::VectorXd DenseSolution(const GaussianModel& geometry,
                               const ChromaOptions& options,
                               int channel,
                               const Eigen::VectorXd& first) {
-  const int n = options.chroma_sh_degree == 0 ? 1 : 4;
+  const int n = ShCoefficients(options.chroma_sh_degree);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(first.size(), first.size());
   Eigen::VectorXd right = Eigen::VectorXd::Zero(first.size());
   for (const PosedCamera& view : problem.training) {
@@ -105,7 +105,7 @@ TEST_P(ChromaSolverTest, AgreesWithDenseFactorization) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Degrees, ChromaSolverTest, testing::Values(0, 1));
+INSTANTIATE_TEST_SUITE_P(Degrees, ChromaSolverTest, testing::Values(0, 1, 3));
 
 TEST(FitChromaTest, ConjugateGradientsBeatClosedFormAndAdam) {
   const GaussianModel geometry = RandomGaussians(60, 4);

@@ -26,9 +26,9 @@ using ChromaVector = std::vector<double>;
 
 class ChromaSystem {
  public:
-  // `parameters` holds the geometry and has the rows of `color` (two channels of 1 or 4
-  // coefficients); `in_time` moves them to a view's time; `targets` returns the targets of views
-  // beyond the budget. All must outlive this object.
+  // `parameters` holds the geometry and has the rows of `color` (two channels of equal
+  // numbers of coefficients); `in_time` moves them to a view's time; `targets` returns the targets
+  // of views beyond the budget. All must outlive this object.
   ChromaSystem(const ParameterBlock& parameters,
                const ColorSpec& color,
                GeometryInTime& in_time,

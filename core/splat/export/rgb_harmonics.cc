@@ -55,6 +55,14 @@ Eigen::MatrixX3d RgbHarmonicsFitter::Colors(const GaussianModel& model, size_t i
   const int luminance = ShCoefficients(model.sh_degree);
   const int chroma = model.channels == 3 ? ShCoefficients(model.chroma_sh_degree) : 0;
   Eigen::MatrixX3d rgb(basis_.rows(), 3);
+  if (model.color_space == ColorSpace::kSrgb) {
+    for (Eigen::Index d = 0; d < basis_.rows(); ++d) {
+      rgb.row(d) << ShValue(basis_, d, model.sh_l.data() + index * luminance, luminance),
+          ShValue(basis_, d, model.sh_a.data() + index * chroma, chroma),
+          ShValue(basis_, d, model.sh_b.data() + index * chroma, chroma);
+    }
+    return (rgb.array() + 0.5).matrix();
+  }
   for (Eigen::Index d = 0; d < basis_.rows(); ++d) {
     LabColor lab;
     const double l = 0.5 + ShValue(basis_, d, model.sh_l.data() + index * luminance, luminance);
@@ -75,10 +83,10 @@ Eigen::MatrixX3d RgbHarmonicsFitter::Fit(const Eigen::MatrixX3d& colors) const {
 
 RgbHarmonics FitRgbHarmonics(const GaussianModel& model, ThreadPool& pool) {
   CheckModel(model);
-  const RgbHarmonicsFitter fitter(model.sh_degree);
-  const int coefficients = ShCoefficients(model.sh_degree);
   RgbHarmonics rgb;
-  rgb.degree = model.sh_degree;
+  rgb.degree = std::max(model.sh_degree, model.channels == 3 ? model.chroma_sh_degree : 0);
+  const RgbHarmonicsFitter fitter(rgb.degree);
+  const int coefficients = ShCoefficients(rgb.degree);
   rgb.sh.resize(model.size() * coefficients * 3);
   pool.ForRanges(static_cast<int64_t>(model.size()), [&](int64_t begin, int64_t end, int) {
     for (int64_t i = begin; i < end; ++i) {

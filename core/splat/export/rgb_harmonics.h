@@ -23,7 +23,8 @@ class RgbHarmonicsFitter {
  public:
   explicit RgbHarmonicsFitter(int degree);
 
-  // sRGB (gamut-mapped, 0..1) of Gaussian `index` seen along each direction; one row each.
+  // sRGB (of Lab models gamut-mapped, 0..1) of Gaussian `index` seen along each direction; one row
+  // each.
   Eigen::MatrixX3d Colors(const GaussianModel& model, size_t index) const;
   // Coefficients f with RGB = 0.5 + sum f_k Y_k, one row per coefficient.
   Eigen::MatrixX3d Fit(const Eigen::MatrixX3d& colors) const;
@@ -39,8 +40,9 @@ class RgbHarmonicsFitter {
   Eigen::MatrixXd solve_;  // coefficients x directions
 };
 
-// Fits harmonics of the luminance's degree by least squares over directions spread evenly over the
-// sphere. Throws Error{kInvalidArgument} if the sizes of the model's buffers disagree.
+// Fits harmonics of the model's largest degree by least squares over directions spread evenly over
+// the sphere; those of an sRGB model are its own. Throws Error{kInvalidArgument} if the sizes of
+// the model's buffers disagree.
 RgbHarmonics FitRgbHarmonics(const GaussianModel& model, ThreadPool& pool);
 
 // The colours without view dependence.

@@ -36,6 +36,39 @@ TEST(RgbHarmonicsTest, ReproducesColors) {
   EXPECT_EQ(DegreeZero(rgb).sh[3], rgb.sh[27]);
 }
 
+TEST(RgbHarmonicsTest, FollowChromaAboveDegreeOfLuminance) {
+  ThreadPool pool(1);
+  const GaussianModel m = DullModel(30, 1, 3);
+  const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
+  EXPECT_EQ(rgb.degree, 3);
+  const RgbHarmonicsFitter fitter(3);
+  double sum = 0.0;
+  for (size_t i = 0; i < m.size(); ++i) {
+    Eigen::MatrixX3d sh(16, 3);
+    for (int k = 0; k < 16; ++k) {
+      for (int c = 0; c < 3; ++c) sh(k, c) = rgb.sh[(i * 16 + k) * 3 + c];
+    }
+    const Eigen::MatrixX3d back = ((fitter.Basis() * sh).array() + 0.5).matrix();
+    sum += (back - fitter.Colors(m, i)).cwiseAbs().mean();
+  }
+  EXPECT_LT(sum / 30.0, 0.03);
+}
+
+TEST(RgbHarmonicsTest, KeepThoseOfSrgbModel) {
+  ThreadPool pool(1);
+  GaussianModel m = RandomModel({10, 3, 2, 2});
+  m.color_space = ColorSpace::kSrgb;
+  const RgbHarmonics rgb = FitRgbHarmonics(m, pool);
+  ASSERT_EQ(rgb.degree, 2);
+  for (size_t i = 0; i < m.size(); ++i) {
+    for (int k = 0; k < 9; ++k) {
+      EXPECT_NEAR(rgb.sh[(i * 9 + k) * 3], m.sh_l[i * 9 + k], 1e-5);
+      EXPECT_NEAR(rgb.sh[(i * 9 + k) * 3 + 1], m.sh_a[i * 9 + k], 1e-5);
+      EXPECT_NEAR(rgb.sh[(i * 9 + k) * 3 + 2], m.sh_b[i * 9 + k], 1e-5);
+    }
+  }
+}
+
 TEST(RgbHarmonicsTest, DiffuseColorIsExact) {
   ThreadPool pool(1);
   GaussianModel m = DullModel(1, 0, 0);

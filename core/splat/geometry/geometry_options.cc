@@ -1,21 +1,26 @@
 #include "core/splat/geometry/geometry_options.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/base/range_check.h"
 
 namespace color3d {
 namespace {
 
-// The schedule of Kerbl et al. 2023, whose times are iterations.
+// The schedule of Kerbl et al. 2023, whose times are iterations: of 30,000, densification after
+// every 100 from 600 to 14,900, opacity resets after 3000, 6000, 9000 and 12,000.
 GeometryTuning PaperTuning(int iterations) {
+  constexpr double kFirst = 600.0, kInterval = 100.0, kResetInterval = 3000.0;
   const double n = std::max(1, iterations);
+  // After the first one; those at half of the iterations or later are left out.
+  const double rounds = std::ceil((0.5 * n - kFirst) / kInterval) - 1.0;
   GeometryTuning tuning;
   tuning.half_size_until = 0.0;
-  tuning.densify_from = std::min(500.0 / n, 0.5);
-  tuning.densify_until = 0.5;
-  tuning.densify_rounds = std::max(1, static_cast<int>((0.5 * n - 500.0) / 100.0));
-  tuning.opacity_reset_every = 3000.0 / n;
+  tuning.densify_from = (kFirst - 0.5) / n;  // half an iteration, against rounding
+  tuning.densify_until = rounds < 0.0 ? 0.0 : tuning.densify_from + rounds * kInterval / n;
+  tuning.densify_rounds = static_cast<int>(std::max(1.0, rounds));
+  tuning.opacity_reset_every = kResetInterval / n;
   tuning.prune_scale = 0.1;
   tuning.last_drop_rate = 0.0;
   tuning.exposure_rate = 0.0;
@@ -51,6 +56,7 @@ void GeometryOptions::Validate() const {
   check("edge_weight", edge_weight, 0.0, 10.0);
   check("densify_gradient", densify_gradient, 1e-9, 1e9);
   check("learning_rate_scale", learning_rate_scale, 1e-3, 1e3);
+  check("warm_up", warm_up, 0.0, 1.0);
 }
 
 GeometryTuning TuningOf(const GeometryOptions& options) {

@@ -112,6 +112,9 @@ struct GeometryOptions {
   double edge_weight = 1.0;          // of the Charbonnier-Laplacian term, 0..10
   double densify_gradient = 5e-5;    // NDC units, 1e-9..1e9 (3DGS: 2e-4, for 30k iterations)
   double learning_rate_scale = 1.0;  // on all learning rates, 1e-3..1e3
+  // Share of the schedule after which training on luminance ends, 0..1; the rest is trained on
+  // luminance and chroma (GeometryProblem::start).
+  double warm_up = 1.0;
   uint64_t seed = 1;
   std::optional<GeometryTuning> tuning;  // replaces the recipe's, for measurements
 

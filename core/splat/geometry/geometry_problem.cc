@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/splat/model/spherical_harmonics.h"
@@ -54,7 +55,10 @@ size_t SampleInitialColors(const Scene& scene, GeometryProblem& problem) {
   }
   GaussianModel& model = problem.initial;
   model.channels = channels;
-  if (srgb) model.sh_a = model.sh_b = model.sh_l;
+  if (srgb) {
+    model.color_space = ColorSpace::kSrgb;
+    model.sh_a = model.sh_b = model.sh_l;
+  }
   std::vector<float>* const sh[3] = {&model.sh_l, &model.sh_a, &model.sh_b};
   for (size_t i = 0; i < scene.points.size(); ++i) {
     if (count[i] == 0) continue;
@@ -69,9 +73,24 @@ size_t SampleInitialColors(const Scene& scene, GeometryProblem& problem) {
 
 }  // namespace
 
-GeometryProblem GeometryProblemOf(const Scene& scene,
-                                  const ViewImages& images,
-                                  TrainingColors colors) {
+ColorLayout TrainedLayout(const GeometryProblem& problem, const GeometryOptions& options) {
+  const int degree = options.sh_degree;
+  if (!problem.colors) return {ColorSpace::kLab, 1, degree, 0};
+  if (problem.color_space == ColorSpace::kSrgb) return {ColorSpace::kSrgb, 3, degree, degree};
+  if (problem.chroma_sh_degree > degree) {
+    throw InvalidArgument(
+        "chroma_sh_degree {} is above the degree {} of luminance, from which a and b start; lower "
+        "it or raise reconstruct_geometry.sh_degree",
+        problem.chroma_sh_degree,
+        degree);
+  }
+  if (problem.start == nullptr) {
+    throw InvalidArgument("training on luminance and chroma starts from a warm-up; give its state");
+  }
+  return {ColorSpace::kLab, 3, degree, problem.chroma_sh_degree};
+}
+
+GeometryProblem GeometryProblemWithoutStart(const Scene& scene, const ViewImages& images) {
   GeometryProblem problem;
   problem.training = PosedCameras(scene, images, scene.TrainingViews());
   problem.held_out = PosedCameras(scene, images, scene.HeldOutViews());
@@ -81,17 +100,16 @@ GeometryProblem GeometryProblemOf(const Scene& scene,
       })) {
     problem.mask = [&images](int view) { return images.Mask(view); };
   }
-  if (colors == TrainingColors::kSrgb) {
-    // Decoded once, because every pyramid level reads it.
-    problem.colors = [&images,
-                      kept = std::map<int, std::shared_ptr<const Image>>()](int view) mutable {
-      std::shared_ptr<const Image>& picture = kept[view];
-      if (picture == nullptr) picture = std::make_shared<const Image>(images.Srgb(view));
-      return picture;
-    };
-  }
   problem.extent = scene.Extent();
   problem.is_relief = scene.relief.has_value();
+  return problem;
+}
+
+GeometryProblem GeometryProblemOf(const Scene& scene,
+                                  const ViewImages& images,
+                                  PictureSource srgb) {
+  GeometryProblem problem = GeometryProblemWithoutStart(scene, images);
+  problem.colors = std::move(srgb);
   problem.initial = InitialGaussians(scene);
   if (SampleInitialColors(scene, problem) == 0) {
     throw InvalidArgument(
@@ -101,6 +119,21 @@ GeometryProblem GeometryProblemOf(const Scene& scene,
         kNearPlane);
   }
   return problem;
+}
+
+GeometryProblem GeometryProblemOf(const Scene& scene,
+                                  const ViewImages& images,
+                                  TrainingColors colors) {
+  if (colors == TrainingColors::kLuminance) return GeometryProblemOf(scene, images);
+  // Decoded once, because every pyramid level reads it.
+  return GeometryProblemOf(
+      scene,
+      images,
+      [&images, kept = std::map<int, std::shared_ptr<const Image>>()](int view) mutable {
+        std::shared_ptr<const Image>& picture = kept[view];
+        if (picture == nullptr) picture = std::make_shared<const Image>(images.Srgb(view));
+        return picture;
+      });
 }
 
 }  // namespace color3d

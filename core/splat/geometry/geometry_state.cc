@@ -5,29 +5,6 @@
 #include <utility>
 
 namespace color3d {
-namespace {
-
-template <class Archive, class State>
-void VisitGeometryState(Archive& archive, State& state) {
-  VisitState(archive, state);
-  archive.Vector(state.statistics.gradient);
-  archive.Vector(state.statistics.count);
-  archive.Vector(state.statistics.radius);
-  archive.Block(state.moving.parameters);
-  archive.Block(state.moving.moments.first);
-  archive.Block(state.moving.moments.second);
-  archive.Block(state.hexplane.planes);
-  archive.Block(state.hexplane.network);
-  archive.Block(state.hexplane.plane_moments.first);
-  archive.Block(state.hexplane.plane_moments.second);
-  archive.Block(state.hexplane.network_moments.first);
-  archive.Block(state.hexplane.network_moments.second);
-  archive.Value(state.hexplane.steps);
-  archive.Value(state.densified_at);
-  archive.Vector(state.exposures);
-}
-
-}  // namespace
 
 std::string GeometryFingerprint(const GeometryProblem& problem,
                                 const GeometryOptions& options,
@@ -55,6 +32,13 @@ std::string GeometryFingerprint(const GeometryProblem& problem,
                                  pixels,
                                  problem.extent,
                                  initial_count);
+  if (problem.start != nullptr) {
+    text += fmt::format(" joint {} {} {} {}",
+                        static_cast<int>(problem.color_space),
+                        problem.chroma_sh_degree,
+                        problem.start->iteration,
+                        problem.start->elapsed_seconds);
+  }
   const GeometryTuning tuning = TuningOf(options);
   VisitFields(tuning, [&](const char* name, const auto& value) {
     text += fmt::format(" {}={}", name, value);

@@ -20,6 +20,21 @@ struct GeometryState : TrainingState {
   Exposures exposures;       // of the training views, in their order; empty: not fitted
 };
 
+// Visits all values in the order of checkpoints. `archive`: CheckpointWriter or CheckpointReader.
+template <class Archive, class State>
+void VisitGeometryState(Archive& archive, State& state) {
+  VisitState(archive, state);
+  archive.Vector(state.statistics.gradient);
+  archive.Vector(state.statistics.count);
+  archive.Vector(state.statistics.radius);
+  archive.Block(state.moving.parameters);
+  archive.Block(state.moving.moments.first);
+  archive.Block(state.moving.moments.second);
+  VisitHexPlaneState(archive, state.hexplane);
+  archive.Value(state.densified_at);
+  archive.Vector(state.exposures);
+}
+
 // All inputs of training except the pictures. `moments`: number of time steps, 1 for static scenes;
 // `initial_count`: initial number of Gaussians.
 std::string GeometryFingerprint(const GeometryProblem& problem,

@@ -1,25 +1,25 @@
 #include "core/splat/geometry/geometry_trainer.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
-#include <optional>
 
 #include "core/base/error.h"
 #include "core/scene/photo_masks.h"
-#include "core/splat/geometry/first_parameters.h"
 #include "core/splat/geometry/geometry_state.h"
 #include "core/splat/geometry/held_out.h"
 #include "core/splat/geometry/moving_part.h"
+#include "core/splat/geometry/picture_loss.h"
 #include "core/splat/geometry/regularize.h"
 #include "core/splat/geometry/training_schedule.h"
+#include "core/splat/geometry/warm_up.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/motion/motion.h"
 #include "core/splat/motion/shared_motion.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/training/hexplane_training.h"
-#include "core/splat/training/loss.h"
 #include "core/splat/training/training_guard.h"
 #include "core/splat/training/training_targets.h"
 
@@ -30,7 +30,7 @@ constexpr double kErrorReports = 100.0;
 constexpr int64_t kMinDensifyInterval = 10;  // iterations: gradients of fewer are noise
 constexpr double kHeldOutMoments[] = {0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 1.0};
 constexpr double kSurveyAt = 0.15;  // fraction of the schedule at which motion is searched for
-constexpr float kBackground[3] = {0.0f, 0.0f, 0.0f};
+constexpr double kAbUnits = 255.0;  // Lab units of 1 in a' and b'
 
 class GeometryTrainer {
  public:
@@ -44,30 +44,18 @@ class GeometryTrainer {
         trace_(trace),
         schedule_(options, problem.extent, problem.is_relief),
         times_(TimeSpanOf(problem)),
-        channels_(problem.colors ? 3 : 1),
+        layout_(TrainedLayout(problem, options)),
+        end_(layout_.channels == 1 ? options.warm_up : 1.0),
         targets_(problem.colors ? problem.colors : problem.luminance,
-                 channels_,
+                 layout_.channels,
                  problem.colors ? 1.0f : 0.01f,
                  problem.picture_cache_bytes),
         masks_(problem.mask, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask),
-        still_(problem.still, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask) {
-    state_.parameters = FirstParameters(
-        problem.initial, channels_, ShCoefficients(options.sh_degree), options.max_gaussians);
+        still_(problem.still, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask),
+        hexplanes_(schedule_.tuning().hexplane, problem.is_relief),
+        state_(FirstState(problem, options, layout_)),
+        loss_(options, layout_) {
     initial_count_ = state_.parameters.count();
-    const ParameterBlock zeros = state_.parameters.ZerosOfSameShape();
-    state_.moments = {zeros, zeros};
-    state_.statistics.Reset(initial_count_);
-    state_.random = Random(options.seed);
-    if (schedule_.tuning().exposure_rate > 0.0) state_.exposures.resize(problem.training.size());
-    if (IsHexPlane()) {
-      hexplanes_.emplace(HexPlaneShapeFor(state_.parameters,
-                                          {times_.begin_s, times_.end_s, times_.steps},
-                                          problem.extent,
-                                          schedule_.tuning().hexplane),
-                         schedule_.tuning().hexplane,
-                         problem.is_relief);
-      state_.hexplane = hexplanes_->First(options.seed);
-    }
     pipeline_.set_clock(&clock_);
   }
 
@@ -78,7 +66,7 @@ class GeometryTrainer {
     earlier_seconds_ = state_.elapsed_seconds;
     last_round_.iteration = state_.iteration;
     fraction_ = FractionNow();
-    while (fraction_ < 1.0) {
+    while (fraction_ < end_) {
       run_.cancel.ThrowIfCancelled();
       if (!Step()) {
         guard.Restore(state_);
@@ -100,11 +88,14 @@ class GeometryTrainer {
       }
     }
     FinishTrace();
-    GaussianModel model =
-        ModelOfParts(state_.parameters, state_.moving, times_, channels_, options_.sh_degree);
-    if (hexplanes_) model.hexplane = hexplanes_->Field(state_.hexplane);
+    state_.elapsed_seconds = earlier_seconds_ + clock_.TrainingSeconds();
+    GaussianModel model = ModelOfParts(state_.parameters, state_.moving, times_, layout_);
+    model.hexplane = FieldOf(state_.hexplane);
     return model;
   }
+
+  // The state at the end of Train().
+  GeometryState TakeState() { return std::move(state_); }
 
  private:
   double FractionNow() {
@@ -112,7 +103,7 @@ class GeometryTrainer {
   }
 
   std::string Fingerprint() const {
-    return GeometryFingerprint(problem_, options_, IsDynamic() ? times_.steps : 1, initial_count_);
+    return GeometryFingerprint(problem_, options_, IsAuto() ? times_.steps : 1, initial_count_);
   }
 
   void Resume() {
@@ -130,16 +121,12 @@ class GeometryTrainer {
                             view.cam_from_world);
   }
 
-  ColorSpec Colors() const {
-    ColorSpec spec;
-    spec.channels = channels_;
-    for (int c = 0; c < channels_; ++c) {
-      spec.channel[c] = {kColorRow + c * ShCoefficients(options_.sh_degree),
-                         ShCoefficients(schedule_.ActiveDegree(fraction_)),
-                         0.5f,
-                         true};
-    }
-    return spec;
+  ColorSpec Colors() const { return layout_.Spec(schedule_.ActiveDegree(fraction_)); }
+
+  // Black; neutral in a' and b'.
+  std::array<float, 3> Background() const {
+    const float chroma = layout_.space == ColorSpace::kLab ? layout_.Base(1) : 0.0f;
+    return {0.0f, chroma, chroma};
   }
 
   float UnitTime(const PosedCamera& view) const { return times_.UnitTime(view.time_s); }
@@ -147,7 +134,7 @@ class GeometryTrainer {
   // All Gaussians at the view's time.
   const ParameterBlock& At(const PosedCamera& view, float hidden = 0.0f) {
     if (DeformsNow()) {
-      return hexplanes_->At(state_.hexplane, state_.parameters, view.time_s, run_.pool);
+      return hexplanes_.At(state_.hexplane, state_.parameters, view.time_s, run_.pool);
     }
     if (state_.moving.parameters.count() == 0) return state_.parameters;
     ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_, hidden);
@@ -156,14 +143,9 @@ class GeometryTrainer {
 
   int64_t Count() const { return state_.parameters.count() + state_.moving.parameters.count(); }
 
-  bool IsDynamic() const {
-    return options_.motion == GeometryOptions::Motion::kAuto && times_.steps > 1;
-  }
-  bool IsHexPlane() const {
-    return IsDynamic() && options_.deformation == GeometryOptions::Deformation::kHexPlane;
-  }
-  bool MayMove() const { return IsDynamic() && !IsHexPlane(); }
-  bool DeformsNow() const { return hexplanes_ && hexplanes_->IsActive(fraction_); }
+  bool IsAuto() const { return options_.motion == GeometryOptions::Motion::kAuto; }
+  bool MayMove() const { return IsAuto() && times_.steps > 1 && state_.hexplane.empty(); }
+  bool DeformsNow() const { return !state_.hexplane.empty() && hexplanes_.IsActive(fraction_); }
 
   void FindMovers() {
     if (!MayMove()) return;
@@ -189,16 +171,15 @@ class GeometryTrainer {
     const RasterCamera camera = CameraAt(view, level);
     const ColorSpec color = Colors();
     const ParameterBlock& now = At(view, schedule_.HiddenTime(state_.iteration, times_.Interval()));
-    pipeline_.Forward({now, color, camera}, kBackground, false, run_.pool, DroppingNow());
-    LossWeights weights;
-    weights.ssim = static_cast<float>(options_.ssim_weight);
-    weights.l1 = 1.0f - weights.ssim;
-    weights.edge = static_cast<float>(options_.edge_weight);
+    pipeline_.Forward({now, color, camera}, Background().data(), false, run_.pool, DroppingNow());
     clock_.Enter(Phase::kLoss);
     const bool exposed = !state_.exposures.empty();
     if (exposed) Expose(state_.exposures[drawn], pipeline_.color(), run_.pool, exposed_);
-    const LossValue loss =
-        Compare(exposed ? exposed_ : pipeline_.color(), target, TrainingMask(view, level), weights);
+    const PictureLossValue loss = loss_.Evaluate(exposed ? exposed_ : pipeline_.color(),
+                                                 *target,
+                                                 TrainingMask(view, level).get(),
+                                                 run_.pool,
+                                                 d_color_);
     if (!std::isfinite(loss.total)) return false;
     if (exposed) {
       FitExposure(pipeline_.color(),
@@ -234,23 +215,6 @@ class GeometryTrainer {
     return both;
   }
 
-  // Computes the loss and d_color_. Masked pixels are set to the render, so that they have no loss,
-  // not even in windows that cross the mask's edge, and no gradient.
-  LossValue Compare(const PlaneBuffer& drawn,
-                    const std::shared_ptr<const PlaneBuffer>& target,
-                    const std::shared_ptr<const PlaneBuffer>& mask,
-                    const LossWeights& weights) {
-    if (mask == nullptr) {
-      return loss_.Evaluate(drawn, *target, nullptr, weights, run_.pool, d_color_);
-    }
-    masked_target_ = *target;
-    CopyMasked(*mask, drawn, masked_target_);
-    const LossValue loss =
-        loss_.Evaluate(drawn, masked_target_, mask.get(), weights, run_.pool, d_color_);
-    ZeroMasked(*mask, d_color_);
-    return loss;
-  }
-
   // Seeded by the iteration's number, so that a resumed training drops the same Gaussians.
   SplatDropping DroppingNow() const {
     return {schedule_.DropRate(fraction_, static_cast<int>(problem_.training.size())),
@@ -260,16 +224,16 @@ class GeometryTrainer {
   // Updates parameters from the gradient. Returns false if a value was not finite.
   bool Update(const PosedCamera& view) {
     clock_.Enter(Phase::kAdam);
-    std::vector<float> rates = schedule_.LearningRates(fraction_, channels_);
+    std::vector<float> rates = schedule_.LearningRates(fraction_, layout_);
     MovingPart& moving = state_.moving;
     bool finite =
-        !DeformsNow() || hexplanes_->Update(state_.parameters,
-                                            view.time_s,
-                                            fraction_,
-                                            options_.learning_rate_scale * state_.rate_scale,
-                                            run_.pool,
-                                            gradient_,
-                                            state_.hexplane);
+        !DeformsNow() || hexplanes_.Update(state_.parameters,
+                                           view.time_s,
+                                           fraction_,
+                                           options_.learning_rate_scale * state_.rate_scale,
+                                           run_.pool,
+                                           gradient_,
+                                           state_.hexplane);
     if (moving.parameters.count() > 0) {
       DecomposeGradient(state_.parameters,
                         moving,
@@ -279,7 +243,7 @@ class GeometryTrainer {
                         gradient_,
                         moving_gradient_);
       finite = UpdatePart(moving_gradient_,
-                          schedule_.MoverRates(fraction_, channels_, times_.Interval()),
+                          schedule_.MoverRates(fraction_, layout_, times_.Interval()),
                           moving.parameters,
                           moving.moments);
       LimitWindows(static_cast<float>(std::log(schedule_.tuning().least_width * times_.Interval())),
@@ -354,13 +318,15 @@ class GeometryTrainer {
     if (schedule_.OpacityResetDue(before, fraction_)) ResetOpacity(0.01, target);
   }
 
+  bool InLab() const { return layout_.channels == 3 && layout_.space == ColorSpace::kLab; }
+
   std::string Named(const char* what, const char* unit = "") const {
-    return std::string(what) + (channels_ == 3 ? "_rgb" : "_l") + unit;
+    return std::string(what) + (InLab() ? "_ab" : layout_.channels == 3 ? "_rgb" : "_l") + unit;
   }
 
   void Report(double before) {
     const auto now = std::chrono::steady_clock::now();
-    if (now - last_progress_ > std::chrono::milliseconds(250) || fraction_ >= 1.0) {
+    if (now - last_progress_ > std::chrono::milliseconds(250) || fraction_ >= end_) {
       last_progress_ = now;
       const Camera& camera = problem_.training.front().camera;
       const int level = schedule_.Level(fraction_, camera);
@@ -373,7 +339,9 @@ class GeometryTrainer {
                       SizeAtLevel(camera.height, level)));
     }
     if (std::floor(fraction_ * kErrorReports) > std::floor(before * kErrorReports)) {
-      run_.progress.OnError(state_.iteration, Named("train_l1"), state_.mean_error);
+      run_.progress.OnError(state_.iteration,
+                            Named("train_l1"),
+                            InLab() ? kAbUnits * state_.mean_error : state_.mean_error);
     }
     for (const double moment : kHeldOutMoments) {
       if (before < moment && fraction_ >= moment) {
@@ -401,14 +369,15 @@ class GeometryTrainer {
     const double each = 1.0 / static_cast<double>(views.size());
     for (const PosedCamera& view : views) {
       const std::shared_ptr<const PlaneBuffer> target = targets_.Get(view, 0);
-      pipeline_.Forward({At(view), Colors(), CameraAt(view, 0)}, kBackground, false, run_.pool);
+      pipeline_.Forward(
+          {At(view), Colors(), CameraAt(view, 0)}, Background().data(), false, run_.pool);
       PlaneBuffer drawn = pipeline_.color();
       const PictureQuality quality =
-          CompareClamped(*target, MaskOf(view, 0).get(), loss_, run_.pool, drawn);
+          CompareClamped(*target, MaskOf(view, 0).get(), loss_.image_loss(), run_.pool, drawn);
       point.psnr_db += each * quality.psnr_db;
       point.ssim += each * quality.ssim;
       point.l1 += each * quality.l1;
-      if (fraction_ >= 1.0 && trace_ != nullptr && trace_->on_picture) {
+      if (fraction_ >= end_ && trace_ != nullptr && trace_->on_picture) {
         trace_->on_picture(view.view, ImageFromPlanes(drawn));
       }
     }
@@ -437,11 +406,12 @@ class GeometryTrainer {
   TrainingTrace* const trace_;  // may be null
   const TrainingSchedule schedule_;
   const TimeSpan times_;
-  const int channels_;
+  const ColorLayout layout_;
+  const double end_;  // fraction of the schedule
   TrainingTargets targets_;
   TrainingTargets masks_;
   TrainingTargets still_;
-  std::optional<HexPlaneTraining> hexplanes_;
+  HexPlaneTraining hexplanes_;
   GeometryState state_;
   int64_t initial_count_ = 0;     // Gaussians
   double fraction_ = 0.0;         // completed fraction of the schedule
@@ -451,8 +421,7 @@ class GeometryTrainer {
   std::chrono::steady_clock::time_point last_progress_;
   // Work space.
   SplatPipeline pipeline_;
-  ImageLoss loss_;
-  PlaneBuffer masked_target_;
+  PictureLoss loss_;
   PlaneBuffer exposed_;
   PlaneBuffer d_color_;
   ParameterBlock composed_;
@@ -465,12 +434,16 @@ class GeometryTrainer {
 GaussianModel TrainGeometry(const GeometryProblem& problem,
                             const GeometryOptions& options,
                             const RunControl& run,
-                            TrainingTrace* trace) {
+                            TrainingTrace* trace,
+                            GeometryState* state) {
   options.Validate();
   if (problem.training.empty()) {
     throw InvalidArgument("the scene has no training views; give at least one posed photo");
   }
-  return GeometryTrainer(problem, options, run, trace).Train();
+  GeometryTrainer trainer(problem, options, run, trace);
+  GaussianModel model = trainer.Train();
+  if (state != nullptr) *state = trainer.TakeState();
+  return model;
 }
 
 }  // namespace color3d

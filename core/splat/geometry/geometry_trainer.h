@@ -1,5 +1,5 @@
-// Lab Gaussian reconstruction, first half: luminance geometry (the paper's warm-up, one channel;
-// STILL.md "Stage 2"). Deterministic for a seed and a thread count.
+// Lab Gaussian reconstruction: luminance geometry (the paper's warm-up, one channel), or luminance
+// and chroma together (STILL.md "Stage 2"). Deterministic for a seed and a thread count.
 #pragma once
 
 #include <cstdint>
@@ -43,12 +43,14 @@ struct TrainingTrace {
 // Reports curves "train_l1_l" (running mean of |L'-L'_true|) and "heldout_psnr_l_db" (a few times,
 // if there are held-out views). Resumes from and saves to the checkpoints. Non-finite values never
 // survive: the last good state is restored with a smaller step and a warning. When training on
-// colours the curves are "train_l1_rgb" and "heldout_psnr_rgb_db", and the result has 3 channels:
-// sh_l, sh_a, sh_b are those of R, G, B, all around 0.5. `trace` may be null. Throws
-// Error{kInvalidArgument} without training views, Error{kCancelled}.
+// colours the curves are "train_l1_rgb" and "heldout_psnr_rgb_db", or "train_l1_ab" (Lab units),
+// and the result has 3 channels of GeometryProblem::color_space. Training on luminance ends at
+// options.warm_up of the schedule. `trace` may be null, and so may `state`, which receives the
+// state at the end. Throws Error{kInvalidArgument} without training views, Error{kCancelled}.
 GaussianModel TrainGeometry(const GeometryProblem& problem,
                             const GeometryOptions& options,
                             const RunControl& run,
-                            TrainingTrace* trace = nullptr);
+                            TrainingTrace* trace = nullptr,
+                            GeometryState* state = nullptr);
 
 }  // namespace color3d

@@ -213,16 +213,14 @@ void DensifyParts(const GradientDensifyOptions& options, DensifyTarget& still, M
 GaussianModel ModelOfParts(const ParameterBlock& still,
                            const MovingPart& moving,
                            const TimeSpan& times,
-                           int channels,
-                           int sh_degree) {
+                           const ColorLayout& layout) {
   const int64_t first = still.count(), count = moving.parameters.count();
   ParameterBlock all = still;
   all.Resize(first + count);
   for (int row = 0; row < still.rows() && count > 0; ++row) {
     std::copy_n(moving.parameters.Row(row), count, all.Row(row) + first);
   }
-  GaussianModel model =
-      ModelFromParameters(all, channels, sh_degree, channels == 3 ? sh_degree : 0);
+  GaussianModel model = ModelFromParameters(all, layout);
   if (count == 0) return model;
   model.motion.begin_s = times.begin_s;
   model.motion.end_s = times.end_s;

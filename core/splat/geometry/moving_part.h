@@ -14,6 +14,7 @@
 #include "core/splat/geometry/geometry_options.h"
 #include "core/splat/geometry/geometry_problem.h"
 #include "core/splat/geometry/mover_seeds.h"
+#include "core/splat/model/color_layout.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/model/parameter_block.h"
 #include "core/splat/training/adam.h"
@@ -83,11 +84,10 @@ void DecomposeGradient(const ParameterBlock& still,
 // shared in proportion to their counts.
 void DensifyParts(const GradientDensifyOptions& options, DensifyTarget& still, MovingPart& moving);
 
-// The trained model; when training on colours all its channels have the same degree.
+// The trained model.
 GaussianModel ModelOfParts(const ParameterBlock& still,
                            const MovingPart& moving,
                            const TimeSpan& times,
-                           int channels,
-                           int sh_degree);
+                           const ColorLayout& layout);
 
 }  // namespace color3d

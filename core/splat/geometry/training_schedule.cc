@@ -59,10 +59,10 @@ double TrainingSchedule::DropRate(double fraction, int views) const {
   return tuning_.last_drop_rate * fraction * Sparsity(tuning_.sparse_views, views);
 }
 
-std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels) const {
-  const int coefficients = ShCoefficients(options_.sh_degree);
-  const int active = ShCoefficients(ActiveDegree(fraction));
-  std::vector<float> rates(kColorRow + channels * coefficients, 0.0f);
+std::vector<float> TrainingSchedule::LearningRates(double fraction,
+                                                   const ColorLayout& layout) const {
+  const ColorSpec active = layout.Spec(ActiveDegree(fraction));
+  std::vector<float> rates(layout.rows(), 0.0f);
   const double scale = options_.learning_rate_scale;
   // Grows from 0 to 1 after the end of densification.
   const double settling =
@@ -80,22 +80,23 @@ std::vector<float> TrainingSchedule::LearningRates(double fraction, int channels
     }
   }
   set(kOpacityRow, 1, fade * tuning_.opacity_rate);
-  for (int c = 0; c < channels; ++c) {
-    const int row = kColorRow + c * coefficients;
-    set(row, 1, fade * tuning_.dc_rate);
-    set(row + 1, active - 1, fade * tuning_.dc_rate / tuning_.rest_divisor);
+  for (int c = 0; c < layout.channels; ++c) {
+    set(layout.Row(c), 1, fade * tuning_.dc_rate);
+    set(layout.Row(c) + 1,
+        active.channel[c].coefficients - 1,
+        fade * tuning_.dc_rate / tuning_.rest_divisor);
   }
   return rates;
 }
 
 std::vector<float> TrainingSchedule::MoverRates(double fraction,
-                                                int channels,
+                                                const ColorLayout& layout,
                                                 double interval) const {
-  std::vector<float> rates = LearningRates(fraction, channels);
-  const int coefficients = ShCoefficients(options_.sh_degree);
-  const int kept = std::min(coefficients, ShCoefficients(tuning_.mover_sh_degree));
-  for (int c = 0; c < channels; ++c) {
-    std::fill_n(rates.begin() + kColorRow + c * coefficients + kept, coefficients - kept, 0.0f);
+  std::vector<float> rates = LearningRates(fraction, layout);
+  for (int c = 0; c < layout.channels; ++c) {
+    const int coefficients = layout.Coefficients(c);
+    const int kept = std::min(coefficients, ShCoefficients(tuning_.mover_sh_degree));
+    std::fill_n(rates.begin() + layout.Row(c) + kept, coefficients - kept, 0.0f);
   }
   const auto first = static_cast<int>(rates.size());
   rates.resize(first + kMotionRows, 0.0f);
@@ -136,13 +137,18 @@ bool TrainingSchedule::DensifyDue(double before, double now) const {
 
 bool TrainingSchedule::OpacityResetDue(double before, double now) const {
   const double every = tuning_.opacity_reset_every;
+  // Rounding must not move a reset to the next iteration.
+  const double slack = HalfAnIteration();
   return every > 0.0 && now < tuning_.densify_until &&
-         StepsDone(now, 0.0, every) > StepsDone(before, 0.0, every);
+         StepsDone(now, -slack, every) > StepsDone(before, -slack, every);
 }
 
 bool TrainingSchedule::HasReset(double fraction) const {
-  return tuning_.opacity_reset_every > 0.0 && fraction > tuning_.opacity_reset_every;
+  const double every = tuning_.opacity_reset_every;
+  return every > 0.0 && fraction > every + HalfAnIteration();
 }
+
+double TrainingSchedule::HalfAnIteration() const { return 0.5 / std::max(1, options_.iterations); }
 
 int64_t TrainingSchedule::AffordableCount(double fraction,
                                           int64_t iteration,

@@ -8,6 +8,7 @@
 
 #include "core/scene/camera.h"
 #include "core/splat/geometry/geometry_options.h"
+#include "core/splat/model/color_layout.h"
 
 namespace color3d {
 
@@ -27,11 +28,11 @@ class TrainingSchedule {
   double PositionRate(double fraction) const;
   // Share of Gaussians dropped from one picture, for this number of training views.
   double DropRate(double fraction, int views) const;
-  // One per parameter row, for `channels` colour channels of degree options.sh_degree.
-  std::vector<float> LearningRates(double fraction, int channels) const;
+  // One per parameter row.
+  std::vector<float> LearningRates(double fraction, const ColorLayout& layout) const;
   // The same for moving Gaussians, followed by one per row of motion (motion/motion.h); `interval`
   // between time steps in units of t.
-  std::vector<float> MoverRates(double fraction, int channels, double interval) const;
+  std::vector<float> MoverRates(double fraction, const ColorLayout& layout, double interval) const;
   // Gaussians of time steps nearer than this, in units of t, are omitted from this iteration's
   // picture: half of the interval, at random by the iteration's number, or 0.
   float HiddenTime(int64_t iteration, double interval) const;
@@ -48,6 +49,8 @@ class TrainingSchedule {
                           int64_t count) const;
 
  private:
+  double HalfAnIteration() const;  // as a fraction of the schedule
+
   const GeometryOptions& options_;
   const GeometryTuning tuning_;
   double extent_;

@@ -34,7 +34,7 @@ TEST(TrainingScheduleTest, EndsAtFullSizeWithFinalRates) {
   EXPECT_EQ(schedule.ActiveDegree(0.0), 0);
   EXPECT_EQ(schedule.ActiveDegree(0.999), options.sh_degree);
   EXPECT_NEAR(schedule.PositionRate(1.0), 2.0 * schedule.tuning().position_rate_last, 1e-9);
-  const std::vector<float> rates = schedule.LearningRates(1.0, 3);
+  const std::vector<float> rates = schedule.LearningRates(1.0, {ColorSpace::kSrgb, 3, 2, 2});
   ASSERT_EQ(rates.size(), static_cast<size_t>(kColorRow + 3 * 9));
   EXPECT_FLOAT_EQ(rates[kColorRow], rates[kColorRow + 9]);
   EXPECT_GT(rates.back(), 0.0f);
@@ -76,26 +76,48 @@ TEST(IterationCapTest, GrowsWithViewsAndAllowsDefault) {
   EXPECT_EQ(IterationCap(100'000, 1'000'000'000), 100'000);
 }
 
-TEST(TrainingScheduleTest, PaperRecipeSchedulesByIteration) {
-  GeometryOptions options;
-  options.recipe = GeometryOptions::Recipe::kPaper;
-  options.iterations = 15'000;
-  options.sh_degree = 3;
-  const TrainingSchedule schedule(options, 1.0);
+// Iterations after which the paper's recipe densifies, and resets opacities.
+struct PaperEvents {
   std::vector<int> densified, resets;
+};
+PaperEvents EventsOf(const GeometryOptions& options) {
+  const TrainingSchedule schedule(options, 1.0);
+  PaperEvents events;
   for (int i = 1; i <= options.iterations; ++i) {
     const double before = schedule.Fraction(i - 1, 0.0), now = schedule.Fraction(i, 0.0);
-    if (schedule.DensifyDue(before, now)) densified.push_back(i);
-    if (schedule.OpacityResetDue(before, now)) resets.push_back(i);
+    if (schedule.DensifyDue(before, now)) events.densified.push_back(i);
+    if (schedule.OpacityResetDue(before, now)) events.resets.push_back(i);
   }
-  ASSERT_GE(densified.size(), 70u);
-  EXPECT_NEAR(densified.front(), 500, 1);
-  EXPECT_NEAR(densified[1] - densified[0], 100, 1);
-  EXPECT_NEAR(densified.back(), 7500, 1);
-  EXPECT_THAT(resets, testing::SizeIs(2));
-  EXPECT_NEAR(resets[0], 3000, 1);
+  return events;
+}
+
+// The reference implementation: after every 100 iterations from 600 on, and every 3000, both below
+// half of the iterations.
+TEST(TrainingScheduleTest, PaperRecipeIsThatOf3dgs) {
+  GeometryOptions options;
+  options.recipe = GeometryOptions::Recipe::kPaper;
+  options.sh_degree = 3;
+  for (const int iterations : {30'000, 7000, 2000, 1000}) {
+    options.iterations = iterations;
+    std::vector<int> densified, resets;
+    for (int i = 600; i < iterations / 2; i += 100) densified.push_back(i);
+    for (int i = 3000; i < iterations / 2; i += 3000) resets.push_back(i);
+    const PaperEvents events = EventsOf(options);
+    EXPECT_EQ(events.densified, densified) << iterations;
+    EXPECT_EQ(events.resets, resets) << iterations;
+  }
+  options.iterations = 30'000;
+  EXPECT_EQ(EventsOf(options).densified.size(), 144u);
+  EXPECT_THAT(EventsOf(options).resets, testing::ElementsAre(3000, 6000, 9000, 12'000));
+  const TrainingSchedule schedule(options, 2.0);
+  EXPECT_FALSE(schedule.HasReset(schedule.Fraction(3000, 0.0)));
+  EXPECT_TRUE(schedule.HasReset(schedule.Fraction(3100, 0.0)));
   EXPECT_EQ(schedule.ActiveDegree(schedule.Fraction(999, 0.0)), 0);
   EXPECT_EQ(schedule.ActiveDegree(schedule.Fraction(3001, 0.0)), 3);
+  // Decays over all iterations, to 1 % at their end.
+  EXPECT_NEAR(schedule.PositionRate(0.0), 2.0 * 1.6e-4, 1e-12);
+  EXPECT_NEAR(schedule.PositionRate(schedule.Fraction(15'000, 0.0)), 2.0 * 1.6e-5, 1e-12);
+  EXPECT_NEAR(schedule.PositionRate(1.0), 2.0 * 1.6e-6, 1e-12);
   Camera camera;
   camera.width = camera.height = 1000;
   EXPECT_EQ(schedule.Level(0.0, camera), 0);

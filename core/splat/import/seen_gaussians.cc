@@ -70,7 +70,7 @@ SeenGaussians::SeenGaussians(const GaussianModel& model, const Camera& picture, 
 
 void SeenGaussians::Render(const Pose& cam_from_world) {
   constexpr float kBlack[3] = {0.0f, 0.0f, 0.0f};
-  pipeline_.Forward({parameters_, ColorSpecOf(1, 0, 0), MakeRasterCamera(small_, cam_from_world)},
+  pipeline_.Forward({parameters_, ColorLayout{}.Spec(), MakeRasterCamera(small_, cam_from_world)},
                     kBlack,
                     /*depth_channel=*/true,
                     pool_);

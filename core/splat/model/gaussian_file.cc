@@ -18,7 +18,8 @@ constexpr char kMagic[8] = {'C', '3', 'D', 'G', 'A', 'U', 'S', 'S'};
 constexpr uint32_t kPlainVersion = 1;
 constexpr uint32_t kConfidenceVersion = 2;  // confidence is the last buffer
 constexpr uint32_t kMotionVersion = 3;      // a MotionHeader follows the header, motion is the last
-constexpr uint32_t kFieldVersion = 4;  // a FieldHeader follows the header, the field is the last
+constexpr uint32_t kSrgbVersion = 4;        // as version 3, of 0 or more moving Gaussians, in sRGB
+constexpr uint32_t kFieldVersion = 5;  // a FieldHeader follows the header, the field is the last
 constexpr size_t kDigestBytes = 64;    // hexadecimal SHA-256 of all bytes before it
 
 struct Header {
@@ -50,7 +51,8 @@ struct FieldHeader {
   uint32_t levels;
   uint32_t space_samples[kMaxHexPlaneLevels];
   uint32_t time_samples[kMaxHexPlaneLevels];
-  uint64_t with_confidence;  // 0 or 1
+  uint32_t with_confidence;  // 0 or 1
+  uint32_t in_srgb;          // 0 or 1
 };
 static_assert(sizeof(FieldHeader) == 96);
 
@@ -112,28 +114,35 @@ Header ReadHeader(std::string_view bytes) {
                  kPlainVersion,
                  kFieldVersion);
   }
-  if ((h.channels != 1 && h.channels != 3) || h.sh_degree > 3 || h.chroma_sh_degree > 3) {
+  if ((h.channels != 1 && h.channels != 3) || h.sh_degree > 3 || h.chroma_sh_degree > 3 ||
+      (h.version == kSrgbVersion && h.channels != 3)) {
     throw Refuse("channels {} or a degree is out of range", h.channels);
   }
   return h;
 }
 
+bool HasMotionHeader(const Header& h) {
+  return h.version == kMotionVersion || h.version == kSrgbVersion;
+}
+
 MotionHeader ReadMotionHeader(std::string_view bytes, const Header& h) {
   MotionHeader m{0, 0.0, 0.0, h.version == kConfidenceVersion ? 1u : 0u};
-  if (h.version != kMotionVersion) return m;
+  if (!HasMotionHeader(h)) return m;
   if (bytes.size() < sizeof(h) + sizeof(m) + kDigestBytes) {
     throw Refuse("it has only {} bytes", bytes.size());
   }
   std::memcpy(&m, bytes.data() + sizeof(h), sizeof(m));
-  if (m.moving == 0 || m.moving > h.count || m.with_confidence > 1 || !std::isfinite(m.begin_s) ||
-      !std::isfinite(m.end_s) || m.begin_s > m.end_s) {
+  if ((m.moving == 0 && h.version == kMotionVersion) || m.moving > h.count ||
+      m.with_confidence > 1 || !std::isfinite(m.begin_s) || !std::isfinite(m.end_s) ||
+      m.begin_s > m.end_s) {
     throw Refuse(
         "its motion of {} Gaussians from {} s to {} s is invalid", m.moving, m.begin_s, m.end_s);
   }
   return m;
 }
 
-FieldHeader FieldHeaderOf(const HexPlaneShape& shape, bool with_confidence) {
+FieldHeader FieldHeaderOf(const GaussianModel& model, bool with_confidence) {
+  const HexPlaneShape& shape = model.hexplane.shape;
   FieldHeader f{};
   f.begin_s = shape.begin_s;
   f.end_s = shape.end_s;
@@ -148,12 +157,14 @@ FieldHeader FieldHeaderOf(const HexPlaneShape& shape, bool with_confidence) {
     f.time_samples[k] = static_cast<uint32_t>(shape.levels[k].time);
   }
   f.with_confidence = with_confidence ? 1 : 0;
+  f.in_srgb = model.color_space == ColorSpace::kSrgb ? 1 : 0;
   return f;
 }
 
-// Sets the shape. Returns true if the model has confidence.
-bool ReadFieldHeader(std::string_view bytes, HexPlaneShape* shape) {
+// Sets the field's shape and the colour space. Returns true if the model has confidence.
+bool ReadFieldHeader(std::string_view bytes, const Header& h, GaussianModel* model) {
   FieldHeader f;
+  HexPlaneShape* shape = &model->hexplane.shape;
   if (bytes.size() < sizeof(Header) + sizeof(f) + kDigestBytes) {
     throw Refuse("it has only {} bytes", bytes.size());
   }
@@ -170,9 +181,11 @@ bool ReadFieldHeader(std::string_view bytes, HexPlaneShape* shape) {
         {static_cast<int>(f.space_samples[k]), static_cast<int>(f.time_samples[k])});
   }
   const std::string complaint = f.levels > kMaxHexPlaneLevels ? "too many levels"
-                                : f.with_confidence > 1       ? "a flag is out of range"
-                                                              : shape->Complaint();
+                                : f.with_confidence > 1 || f.in_srgb > (h.channels == 3 ? 1 : 0)
+                                    ? "a flag is out of range"
+                                    : shape->Complaint();
   if (!complaint.empty()) throw Refuse("its deformation field: {}", complaint);
+  if (f.in_srgb == 1) model->color_space = ColorSpace::kSrgb;
   return f.with_confidence == 1;
 }
 
@@ -193,18 +206,19 @@ std::string SerializeGaussians(const GaussianModel& model) {
   const MotionHeader m{
       model.motion.size(), model.motion.begin_s, model.motion.end_s, with_confidence ? 1u : 0u};
   const bool with_field = !model.hexplane.empty();
-  h.version = with_field        ? kFieldVersion
-              : m.moving > 0    ? kMotionVersion
-              : with_confidence ? kConfidenceVersion
-                                : kPlainVersion;
+  h.version = with_field                               ? kFieldVersion
+              : model.color_space == ColorSpace::kSrgb ? kSrgbVersion
+              : m.moving > 0                           ? kMotionVersion
+              : with_confidence                        ? kConfidenceVersion
+                                                       : kPlainVersion;
   h.channels = static_cast<uint32_t>(model.channels);
   h.sh_degree = static_cast<uint32_t>(model.sh_degree);
   h.chroma_sh_degree = static_cast<uint32_t>(model.chroma_sh_degree);
   h.count = model.size();
   std::string bytes(reinterpret_cast<const char*>(&h), sizeof(h));
-  if (m.moving > 0) bytes.append(reinterpret_cast<const char*>(&m), sizeof(m));
+  if (HasMotionHeader(h)) bytes.append(reinterpret_cast<const char*>(&m), sizeof(m));
   if (with_field) {
-    const FieldHeader f = FieldHeaderOf(model.hexplane.shape, with_confidence);
+    const FieldHeader f = FieldHeaderOf(model, with_confidence);
     bytes.append(reinterpret_cast<const char*>(&f), sizeof(f));
   }
   const auto append = [&](const char* name, const std::vector<float>& buffer, int width, size_t) {
@@ -222,16 +236,17 @@ std::string SerializeGaussians(const GaussianModel& model) {
 GaussianModel ParseGaussians(std::string_view bytes) {
   const Header h = ReadHeader(bytes);
   GaussianModel model;
+  if (h.version == kSrgbVersion) model.color_space = ColorSpace::kSrgb;
   model.channels = static_cast<int>(h.channels);
   model.sh_degree = static_cast<int>(h.sh_degree);
   model.chroma_sh_degree = static_cast<int>(h.chroma_sh_degree);
   const MotionHeader m = ReadMotionHeader(bytes, h);
   const bool with_field = h.version == kFieldVersion;
   const bool with_confidence =
-      with_field ? ReadFieldHeader(bytes, &model.hexplane.shape) : m.with_confidence == 1;
-  const size_t head = sizeof(Header) + (with_field                    ? sizeof(FieldHeader)
-                                        : h.version == kMotionVersion ? sizeof(MotionHeader)
-                                                                      : 0);
+      with_field ? ReadFieldHeader(bytes, h, &model) : m.with_confidence == 1;
+  const size_t head = sizeof(Header) + (with_field           ? sizeof(FieldHeader)
+                                        : HasMotionHeader(h) ? sizeof(MotionHeader)
+                                                             : 0);
   const size_t body = bytes.size() - head - kDigestBytes;
   // No product of a number from the file may overflow.
   size_t floats_left = body / sizeof(float);

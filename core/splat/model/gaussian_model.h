@@ -29,11 +29,16 @@ struct GaussianMotion {
   float UnitTime(double time_s) const;
 };
 
+// What three channels hold: L', a', b', or R, G, B for comparison with those (STILL.md "Joint
+// training").
+enum class ColorSpace { kLab, kSrgb };
+
 // Raw (pre-activation) parameters. Row i of an n-wide buffer is [i*n, (i+1)*n).
 struct GaussianModel {
-  int channels = 1;          // 1: luminance only (warm-up); 3: L', a', b'
-  int sh_degree = 0;         // of luminance, 0..3
-  int chroma_sh_degree = 0;  // of a' and b', 0..1
+  ColorSpace color_space = ColorSpace::kLab;
+  int channels = 1;          // 1: luminance only (warm-up); 3: L', a', b' or R, G, B
+  int sh_degree = 0;         // of the first channel, 0..3
+  int chroma_sh_degree = 0;  // of the others, 0..3
 
   std::vector<float> position;       // 3: world
   std::vector<float> log_scale;      // 3: scale = exp
@@ -41,6 +46,7 @@ struct GaussianModel {
   std::vector<float> opacity_logit;  // 1: opacity = sigmoid
   // Spherical harmonics, (degree + 1)^2 coefficients; the value of a channel is 0.5 + sum for L',
   // and kNeutralChroma + sum for a' and b' (so all-zero chroma coefficients are exactly neutral).
+  // In kSrgb they are those of R, G and B, all around 0.5.
   std::vector<float> sh_l;
   std::vector<float> sh_a;  // empty when channels == 1
   std::vector<float> sh_b;
@@ -66,8 +72,8 @@ struct GaussianModel {
 GaussianModel InitialGaussians(const Scene& scene);
 
 // Native file with a versioned header and a checksum: the whole model, bit for bit. Version 1 has
-// no confidence, version 2 has it, version 3 (with or without it) has motion, version 4 (with or
-// without it) has a field.
+// no confidence, version 2 has it, version 3 (with or without it) has motion, version 4 is in
+// kSrgb, version 5 (with or without confidence) has a field.
 std::string SerializeGaussians(const GaussianModel& model);
 // Throws Error{kInvalidArgument} on anything else (wrong magic, newer version, truncated, NaN).
 GaussianModel ParseGaussians(std::string_view bytes);

@@ -15,7 +15,8 @@ constexpr int64_t kBytesPerPair = 42;
 constexpr int64_t kPairsPerGaussian = 8;
 constexpr int64_t kPairsPerTile = 400;
 constexpr int64_t kTilePx = 256;
-constexpr int64_t kWorkBytesPerPixel = 80;   // pictures, gradients and filtered moments of the loss
+constexpr int64_t kWorkBytesPerPixel =
+    80;  // of a channel: pictures, gradients and filtered moments of the loss
 constexpr int64_t kPhotoBytesPerPixel = 36;  // decoded (3 x 16 bit), as float, turned, undistorted
 // Maximum caches of training pictures and of decoded ones.
 constexpr int64_t kTargetCacheBytes = 512 * kMiB;
@@ -60,13 +61,14 @@ int64_t TargetCacheBytes(const MemoryDemand& demand) {
 int64_t FixedBytes(const MemoryDemand& demand, int side) {
   const PixelCounts px = WorkingPixels(demand, side);
   // The trainer keeps pictures at two sizes (4 + 1 bytes a pixel) within its own budget.
-  return kProgramBytes + PhotoBytes(demand) + kWorkBytesPerPixel * px.largest +
-         std::min(TargetCacheBytes(demand), 5 * px.all) + (demand.moves ? kSurveyBytes : 0) +
+  return kProgramBytes + PhotoBytes(demand) + demand.channels * kWorkBytesPerPixel * px.largest +
+         std::min(TargetCacheBytes(demand), (4 * demand.channels + 1) * px.all) +
+         (demand.moves ? kSurveyBytes : 0) + demand.deformation_bytes +
          kBytesPerPair * kPairsPerTile * (px.largest / kTilePx + 1);
 }
 
-int64_t BytesWithPairs(int sh_degree) {
-  return BytesPerGaussian(sh_degree) + kBytesPerPair * kPairsPerGaussian;
+int64_t BytesWithPairs(const MemoryDemand& demand) {
+  return BytesPerGaussian(demand.sh_degree, demand.channels) + kBytesPerPair * kPairsPerGaussian;
 }
 
 std::string MiB(int64_t bytes) { return fmt::format("{} MiB", (bytes + kMiB - 1) / kMiB); }
@@ -91,12 +93,12 @@ void ThrowTooLarge(const MemoryDemand& demand, int64_t budget) {
 
 }  // namespace
 
-int64_t BytesPerGaussian(int sh_degree) {
-  return 4 * (11 * (11 + int64_t{ShCoefficients(sh_degree)}) + 32);
+int64_t BytesPerGaussian(int sh_degree, int channels) {
+  return 4 * (11 * (11 + int64_t{channels} * ShCoefficients(sh_degree)) + 32);
 }
 
 int64_t GeometryBytes(const MemoryDemand& demand, int max_side_px, int max_gaussians) {
-  return FixedBytes(demand, max_side_px) + max_gaussians * BytesWithPairs(demand.sh_degree);
+  return FixedBytes(demand, max_side_px) + max_gaussians * BytesWithPairs(demand);
 }
 
 MemoryPlan PlanGeometryMemory(const MemoryDemand& demand, int64_t budget_bytes) {
@@ -107,7 +109,7 @@ MemoryPlan PlanGeometryMemory(const MemoryDemand& demand, int64_t budget_bytes) 
   for (int side = demand.max_side_px;; side = static_cast<int>(side * kSideStep)) {
     const bool last = side <= kSmallestSidePx;
     const int64_t left = budget_bytes - FixedBytes(demand, side);
-    const int64_t fits = std::max<int64_t>(0, left) / BytesWithPairs(demand.sh_degree);
+    const int64_t fits = std::max<int64_t>(0, left) / BytesWithPairs(demand);
     const int64_t enough = last ? std::min(fewest, kFewestGaussians) : fewest;
     if (fits < enough) {
       if (last) ThrowTooLarge(demand, budget_bytes);

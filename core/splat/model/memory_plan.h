@@ -1,11 +1,12 @@
 // Memory estimate of training geometry, and its reduction to the available memory. Pure functions.
 //
-// Per Gaussian, in floats, with R = 11 + (degree + 1)^2 parameters: parameters and two Adam moments
-// (3R), the last good state (3R), the gradient (R), one copy while densifying (R), a checkpoint
-// being written (3R), and 32 for splats, sorting keys and statistics; that is 1008 bytes at degree
-// 2 and 1316 at degree 3. Each of its (Gaussian, tile) pairs takes 42 bytes more: about 8 pairs a
-// Gaussian, and not less than 400 pairs a tile. Measured on fern at degree 2 without checkpoints:
-// 1.2 kB a Gaussian, pairs and all; whole peaks were 14 to 31 % below the estimate.
+// Per Gaussian, in floats, with R = 11 + channels (degree + 1)^2 parameters: parameters and two
+// Adam moments (3R), the last good state (3R), the gradient (R), one copy while densifying (R), a
+// checkpoint being written (3R), and 32 for splats, sorting keys and statistics; that is 1008 bytes
+// at degree 2 and 1316 at degree 3 in one channel. Each of its (Gaussian, tile) pairs takes 42
+// bytes more: about 8 pairs a Gaussian, and not less than 400 pairs a tile. Measured on fern at
+// degree 2 without checkpoints: 1.2 kB a Gaussian, pairs and all; whole peaks were 14 to 31 % below
+// the estimate.
 #pragma once
 
 #include <cstdint>
@@ -21,11 +22,13 @@ struct MemoryDemand {
     Camera captured;  // at full size: determines the memory of decoding
     Camera camera;    // undistorted, at full size: determines the working size
   };
-  std::vector<View> views;  // views that are trained on or measured
-  int max_side_px = 0;      // wanted working size
-  int max_gaussians = 0;    // wanted cap
-  int sh_degree = 0;        // of luminance, 0..3
-  bool moves = false;       // the views are frames, possibly many: caches stay small
+  std::vector<View> views;        // views that are trained on or measured
+  int max_side_px = 0;            // wanted working size
+  int max_gaussians = 0;          // wanted cap
+  int sh_degree = 0;              // of every channel, 0..3
+  int channels = 1;               // that are trained; 3: also on chroma
+  bool moves = false;             // the views are frames, possibly many: caches stay small
+  int64_t deformation_bytes = 0;  // of a deformation field in training
 };
 
 struct MemoryPlan {
@@ -38,7 +41,7 @@ struct MemoryPlan {
   std::string note;  // the reductions and their reason; empty if none
 };
 
-int64_t BytesPerGaussian(int sh_degree);
+int64_t BytesPerGaussian(int sh_degree, int channels = 1);
 
 // Peak memory of training geometry at this size with this many Gaussians and the smallest caches,
 // bytes.

@@ -29,6 +29,7 @@ TEST(MemoryPlan, ChangesNothingWithEnoughMemory) {
   EXPECT_LE(plan.estimated_bytes, 2048 * kMiB);
   EXPECT_EQ(BytesPerGaussian(2), 1008);
   EXPECT_EQ(BytesPerGaussian(3), 1316);
+  EXPECT_EQ(BytesPerGaussian(3, 3), 2724);
 }
 
 TEST(MemoryPlan, DynamicSceneMemoryIsIndependentOfFrames) {

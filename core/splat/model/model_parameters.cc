@@ -1,7 +1,6 @@
 #include "core/splat/model/model_parameters.h"
 
 #include "core/base/error.h"
-#include "core/color/lab.h"
 #include "core/splat/model/model_buffers.h"
 
 namespace color3d {
@@ -24,6 +23,9 @@ std::vector<float> FromPlanar(const ParameterBlock& from, int row, int width) {
 void CheckModel(const GaussianModel& model) {
   if (model.channels != 1 && model.channels != 3) {
     throw InvalidArgument("Gaussian model: {} channels; 1 or 3 are possible", model.channels);
+  }
+  if (model.color_space == ColorSpace::kSrgb && model.channels != 3) {
+    throw InvalidArgument("Gaussian model: {} channel in sRGB; 3 are needed", model.channels);
   }
   if (model.sh_degree < 0 || model.sh_degree > 3 || model.chroma_sh_degree < 0 ||
       model.chroma_sh_degree > 3) {
@@ -89,16 +91,14 @@ ParameterBlock ParametersFromModel(const GaussianModel& model) {
   return p;
 }
 
-GaussianModel ModelFromParameters(const ParameterBlock& parameters,
-                                  int channels,
-                                  int sh_degree,
-                                  int chroma_sh_degree) {
-  const int luminance = ShCoefficients(sh_degree);
-  const int chroma = channels == 3 ? ShCoefficients(chroma_sh_degree) : 0;
+GaussianModel ModelFromParameters(const ParameterBlock& parameters, const ColorLayout& layout) {
+  const int luminance = layout.Coefficients(0);
+  const int chroma = layout.channels == 3 ? layout.Coefficients(1) : 0;
   GaussianModel model;
-  model.channels = channels;
-  model.sh_degree = sh_degree;
-  model.chroma_sh_degree = chroma_sh_degree;
+  model.color_space = layout.space;
+  model.channels = layout.channels;
+  model.sh_degree = layout.sh_degree;
+  model.chroma_sh_degree = layout.chroma_sh_degree;
   model.position = FromPlanar(parameters, kPositionRow, 3);
   model.log_scale = FromPlanar(parameters, kLogScaleRow, 3);
   model.rotation = FromPlanar(parameters, kRotationRow, 4);
@@ -107,16 +107,6 @@ GaussianModel ModelFromParameters(const ParameterBlock& parameters,
   model.sh_a = FromPlanar(parameters, kColorRow + luminance, chroma);
   model.sh_b = FromPlanar(parameters, kColorRow + luminance + chroma, chroma);
   return model;
-}
-
-ColorSpec ColorSpecOf(int channels, int sh_degree, int chroma_sh_degree) {
-  const int luminance = ShCoefficients(sh_degree), chroma = ShCoefficients(chroma_sh_degree);
-  ColorSpec color;
-  color.channels = channels;
-  color.channel[0] = {kColorRow, luminance, 0.5f, true};
-  color.channel[1] = {kColorRow + luminance, chroma, kNeutralChroma, false};
-  color.channel[2] = {kColorRow + luminance + chroma, chroma, kNeutralChroma, false};
-  return color;
 }
 
 }  // namespace color3d

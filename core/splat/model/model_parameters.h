@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/splat/model/color_layout.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/model/parameter_block.h"
 
@@ -15,17 +16,11 @@ void CheckModel(const GaussianModel& model);
 // Rows: position, log scale, rotation, opacity, then sh_l, sh_a, sh_b.
 ParameterBlock ParametersFromModel(const GaussianModel& model);
 
-// The inverse. `channels` 1 or 3; degrees as in GaussianModel.
-GaussianModel ModelFromParameters(const ParameterBlock& parameters,
-                                  int channels,
-                                  int sh_degree,
-                                  int chroma_sh_degree);
+// The inverse.
+GaussianModel ModelFromParameters(const ParameterBlock& parameters, const ColorLayout& layout);
 
 // Copies a buffer of `width` numbers per Gaussian to or from the rows that begin at `row`.
 void ToPlanar(const std::vector<float>& from, int width, int row, ParameterBlock& to);
 std::vector<float> FromPlanar(const ParameterBlock& from, int row, int width);
-
-// L' alone (channels 1) or L', a', b' of ParametersFromModel's layout.
-ColorSpec ColorSpecOf(int channels, int sh_degree, int chroma_sh_degree);
 
 }  // namespace color3d

@@ -61,8 +61,7 @@ GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& poo
     if (parameters.Row(kOpacityRow)[i] > kUnseenLogit) seen.push_back(static_cast<uint32_t>(i));
   }
   parameters.Gather(seen);
-  GaussianModel at =
-      ModelFromParameters(parameters, model.channels, model.sh_degree, model.chroma_sh_degree);
+  GaussianModel at = ModelFromParameters(parameters, LayoutOf(model));
   for (const uint32_t i : seen) {
     if (!model.confidence.empty()) at.confidence.push_back(model.confidence[i]);
   }

@@ -1,5 +1,7 @@
 #include "core/splat/raster/render.h"
 
+#include <algorithm>
+
 #include "core/color/lab.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/motion/geometry_in_time.h"
@@ -16,9 +18,14 @@ RenderedView RenderView(const GaussianModel& model,
                         float background_l,
                         double time_s) {
   const ParameterBlock parameters = ParametersAt(model, time_s, pool);
-  const ColorSpec color = ColorSpecOf(model.channels, model.sh_degree, model.chroma_sh_degree);
+  const ColorSpec color = LayoutOf(model).Spec();
   const RasterCamera raster_camera = MakeRasterCamera(camera, cam_from_world);
-  const float background[3] = {background_l, kNeutralChroma, kNeutralChroma};
+  const bool srgb = model.color_space == ColorSpace::kSrgb;
+  float background[3] = {background_l, kNeutralChroma, kNeutralChroma};
+  if (srgb) {
+    const RgbColor gray = SrgbFromLab(LabColor{100.0 * background_l, 0.0, 0.0});
+    std::fill_n(background, 3, static_cast<float>(gray.g));
+  }
   SplatPipeline pipeline;
   pipeline.Forward({parameters, color, raster_camera}, background, true, pool);
   RenderedView view;
@@ -38,10 +45,17 @@ RenderedView RenderView(const GaussianModel& model,
     }
     for (int c = 0; c < model.channels; ++c) {
       const float* value = pipeline.color().Row(c, y);
+      if (srgb) {
+        for (int x = 0; x < camera.width; ++x) {
+          view.lab.At(c, y, x) = std::clamp(value[x], 0.0f, 1.0f);
+        }
+        continue;
+      }
       const float scale = c == 0 ? 100.0f : 255.0f, offset = c == 0 ? 0.0f : -128.0f;
       for (int x = 0; x < camera.width; ++x) view.lab.At(c, y, x) = scale * value[x] + offset;
     }
   }
+  if (srgb) view.lab = LabFromSrgb(view.lab);
   return view;
 }
 

@@ -16,12 +16,35 @@ namespace color3d {
 
 // What is trained, as in HexPlaneField; blocks of one row.
 struct HexPlaneState {
+  HexPlaneShape shape;
   ParameterBlock planes;
   ParameterBlock network;
   AdamMoments plane_moments;
   AdamMoments network_moments;
   int64_t steps = 0;  // done
+
+  bool empty() const { return network.count() == 0; }
 };
+
+// Visits all values in the order of checkpoints. `archive`: CheckpointWriter or CheckpointReader.
+template <class Archive, class State>
+void VisitHexPlaneState(Archive& archive, State& state) {
+  archive.Value(state.shape.begin_s);
+  archive.Value(state.shape.end_s);
+  archive.Value(state.shape.low);
+  archive.Value(state.shape.high);
+  archive.Value(state.shape.extent);
+  archive.Value(state.shape.features);
+  archive.Value(state.shape.width);
+  archive.Vector(state.shape.levels);
+  archive.Block(state.planes);
+  archive.Block(state.network);
+  archive.Block(state.plane_moments.first);
+  archive.Block(state.plane_moments.second);
+  archive.Block(state.network_moments.first);
+  archive.Block(state.network_moments.second);
+  archive.Value(state.steps);
+}
 
 // Times of a scene, seconds.
 struct HexPlaneTimes {
@@ -30,21 +53,26 @@ struct HexPlaneTimes {
   int steps = 1;
 };
 
-// The shape for canonical Gaussians that begin at these positions: its box holds 99 % of them along
-// each axis, and a tenth more.
-HexPlaneShape HexPlaneShapeFor(const ParameterBlock& canonical,
-                               const HexPlaneTimes& times,
-                               double extent,
-                               const HexPlaneTuning& tuning);
+// The first state for canonical Gaussians that begin at these positions. Nothing is deformed: the
+// last layer is zero. The box holds 99 % of the positions along each axis, and a tenth more.
+HexPlaneState FirstHexPlanes(const ParameterBlock& canonical,
+                             const HexPlaneTimes& times,
+                             double extent,
+                             const HexPlaneTuning& tuning,
+                             uint64_t seed);
+
+// Peak memory of training a deformation of so many time steps, bytes: parameters, moments, the last
+// good state, gradients, their partial sums and a checkpoint.
+int64_t HexPlaneBytes(const HexPlaneTuning& tuning, int time_steps);
+
+// Empty for an empty state.
+HexPlaneField FieldOf(const HexPlaneState& state);
 
 class HexPlaneTraining {
  public:
   // For reliefs, offsets that the one pose does not determine stay 0.
-  HexPlaneTraining(const HexPlaneShape& shape, const HexPlaneTuning& tuning, bool is_relief)
-      : shape_(shape), tuning_(tuning), is_relief_(is_relief) {}
-
-  // No deformation at any time: the last layer is zero.
-  HexPlaneState First(uint64_t seed) const;
+  HexPlaneTraining(const HexPlaneTuning& tuning, bool is_relief)
+      : tuning_(tuning), is_relief_(is_relief) {}
 
   // Returns true from the given fraction of the schedule on.
   bool IsActive(double fraction) const { return fraction >= tuning_.from; }
@@ -65,15 +93,7 @@ class HexPlaneTraining {
               ParameterBlock& gradient,
               HexPlaneState& state);
 
-  HexPlaneField Field(const HexPlaneState& state) const;
-
  private:
-  HexPlaneAt Deformation(const HexPlaneState& state, double time_s) const {
-    return {shape_, state.planes.Row(0), state.network.Row(0), shape_.UnitTime(time_s)};
-  }
-  void ClearUnobserved(float* d_network) const;
-
-  const HexPlaneShape shape_;
   const HexPlaneTuning tuning_;
   const bool is_relief_;
   ParameterBlock at_;

@@ -23,8 +23,8 @@ MoverFrames::MoverFrames(const GaussianModel& model, const ExportFrame& frame, T
 
 void MoverFrames::GoTo(double time_s) {
   if (always.empty()) return;
-  const ViewerGaussians at =
-      ForViewers(ModelFromParameters(in_time_.At(block_, time_s), 1, 0, 0), colors_, frame_, pool_);
+  const ViewerGaussians at = ForViewers(
+      ModelFromParameters(in_time_.At(block_, time_s), ColorLayout{}), colors_, frame_, pool_);
   CheckFinite(at);
   const std::vector<float> before = std::exchange(rotation, {});
   position = at.position;
