@@ -38,7 +38,7 @@ inline GaussianModel RandomModel(const RandomModelOptions& options) {
   return m;
 }
 
-// Times 1 s to 3 s, positions from -2 to 2, offsets of about a tenth.
+// Times 1 s to 3 s, positions from -2 to 2.
 inline HexPlaneField RandomHexPlanes() {
   Random random(6);
   HexPlaneField field;
@@ -54,8 +54,8 @@ inline HexPlaneField RandomHexPlanes() {
       numbers.push_back(static_cast<float>(random.NextUniform(low, high)));
     }
   };
-  fill(field.planes, shape.PlaneFloats(), 0.6, 1.4);
-  fill(field.network, shape.NetworkFloats(), -0.1, 0.1);
+  fill(field.planes, shape.PlaneFloats(), 0.5, 1.5);
+  fill(field.network, shape.NetworkFloats(), -0.4, 0.4);
   return field;
 }
 
