@@ -37,6 +37,26 @@ TEST_F(StageTest, ReconstructsWithoutPointsAndWithLittleMemory) {
   EXPECT_THROW(RunReconstructGeometry(options, 64, none), Error);
 }
 
+TEST_F(StageTest, WarnsOfFewerIterationsThanAsked) {
+  Scene scene = RampScene(scratch_.path(), 48, 32);
+  SparsePoint point;
+  point.position = {0.0, 0.0, 2.0};
+  point.views = {0, 1, 2};
+  scene.points = {point};
+  AddInput(artifact::kScene, SceneToJson(scene));
+  const auto warnings = [&](GeometryOptions options) {
+    observer_.text.clear();
+    options.time_limit_seconds = 1e-3;
+    StageContext context = MakeContext();
+    RunReconstructGeometry(options, 64, context);
+    return observer_.text;
+  };
+  EXPECT_EQ(warnings({}), "");
+  EXPECT_NE(warnings({.iterations = 5000}).find("1500 iterations are done of the 5000 asked for"),
+            std::string::npos);
+  EXPECT_EQ(warnings({.recipe = GeometryOptions::Recipe::kPaper, .iterations = 5000}), "");
+}
+
 // Training ignores the moving regions at first.
 TEST_F(StageTest, MovingRegionsAffectTraining) {
   Scene scene = RampScene(scratch_.path(), 48, 32);

@@ -71,5 +71,104 @@ TEST_F(ConfidenceTest, NeedsProvenance) {
   EXPECT_THROW(RunExport({.formats = {ExportFormat::kSplat}, .confidence = true}, context), Error);
 }
 
+// reconstruct_geometry and solve_chroma by the paper's recipe, in miniature.
+class JointSolveTest : public EvaluatedSceneTest {
+ protected:
+  void SetUp() override {
+    EvaluatedSceneTest::SetUp();
+    inputs_.erase(artifact::kModel);
+    AddInput(artifact::kKeyView, R"({"view": "p1.png"})");
+    AddInput(artifact::kKeyColor, EncodeAbPng(Image(48, 32, 2, 5.0f)));
+    for (int i = 0; i < 60; ++i) {
+      SparsePoint point;
+      point.position = {0.2 * (i % 10) - 0.9, 0.2 * (i / 10) - 0.5, 2.0};
+      point.views = {1, 2};
+      scene_.points.push_back(point);
+    }
+    AddInput(artifact::kScene, SceneToJson(scene_));
+    geometry_.recipe = GeometryOptions::Recipe::kPaper;
+    geometry_.iterations = 200;
+    geometry_.warm_up = 0.5;
+    chroma_.solver = ChromaOptions::Solver::kJoint;
+  }
+  void Reconstruct() {
+    RunForInputs([&](StageContext& context) { RunReconstructGeometry(geometry_, 64, context); });
+  }
+  GaussianModel Solve() {
+    StageContext context = MakeContext();
+    RunSolveChroma(chroma_, context);
+    return ParseGaussians(ReadFile(scratch_.path() / "out/model.c3g"));
+  }
+  std::string Facts() { return ReadFile(scratch_.path() / "out/joint_training.json"); }
+
+  GeometryOptions geometry_;
+  ChromaOptions chroma_;
+};
+
+TEST_F(JointSolveTest, GoesOnWithTrainingOfGeometry) {
+  Reconstruct();
+  const GaussianModel before = ParseGaussians(ReadFile(scratch_.path() / "out/geometry.c3g"));
+  chroma_.chroma_sh_degree = 1;
+  AddProvenance("p2.png", Halves({0.0f, 1.0f, 0.0f}, {1.0f, 0.0f, 0.0f}));
+  const GaussianModel model = Solve();
+  EXPECT_EQ(model.channels, 3);
+  EXPECT_EQ(model.chroma_sh_degree, 1);
+  EXPECT_EQ(model.size(), before.size());
+  EXPECT_NE(model.position, before.position);
+  EXPECT_EQ(model.confidence.size(), model.size());
+  EXPECT_THAT(Facts(), testing::HasSubstr("\"iterations\": 200"));
+  EXPECT_THAT(Facts(), testing::HasSubstr("\"warm_up_iterations\": 100"));
+  EXPECT_THAT(Facts(), testing::HasSubstr("\"gaussians\": 60"));
+  EXPECT_EQ(observer_.text, "");
+}
+
+TEST_F(JointSolveTest, TrainsRgbFromSparsePoints) {
+  Reconstruct();
+  chroma_.color_space = ColorSpace::kSrgb;
+  const GaussianModel model = Solve();
+  EXPECT_EQ(model.color_space, ColorSpace::kSrgb);
+  EXPECT_EQ(model.chroma_sh_degree, model.sh_degree);
+  EXPECT_THAT(Facts(), testing::HasSubstr("\"color_space\": \"rgb\""));
+  EXPECT_THAT(Facts(), testing::HasSubstr("\"warm_up_iterations\": 0"));
+  ThreadPool pool(1);
+  const View& view = scene_.views[1];
+  const Image lab = RenderView(model, view.camera, view.cam_from_world, pool).lab;
+  EXPECT_NEAR(lab.At(1, 16, 24), 5.0, 12.0);  // between the views' 5 and 25
+  EXPECT_GT(lab.At(1, 16, 24), 1.0);
+  chroma_.adjustment.saturation = 2.0;
+  EXPECT_THROW(Solve(), Error);
+}
+
+TEST_F(JointSolveTest, RefusesWithoutWarmUp) {
+  geometry_.warm_up = 1.0;
+  Reconstruct();
+  EXPECT_FALSE(inputs_.contains(artifact::kWarmUp));
+  try {
+    Solve();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ErrorCode::kFailedPrecondition);
+    EXPECT_THAT(error.what(), testing::HasSubstr("warm_up below 1"));
+  }
+  geometry_.warm_up = 0.5;
+  geometry_.recipe = GeometryOptions::Recipe::kColor3d;
+  EXPECT_THROW(Reconstruct(), Error);
+}
+
+// A splat as the scene: its Gaussians count as the result of the warm-up.
+TEST_F(JointSolveTest, StartsFromGivenGeometry) {
+  GaussianModel given = SmallModel();
+  given.channels = 1;
+  given.sh_a.clear();
+  given.sh_b.clear();
+  AddInput(artifact::kGivenGeometry, SerializeGaussians(given));
+  scene_.points.clear();
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  Reconstruct();
+  EXPECT_EQ(ReadFile(scratch_.path() / "out/geometry.c3g"), SerializeGaussians(given));
+  EXPECT_EQ(Solve().channels, 3);
+  EXPECT_THAT(Facts(), testing::HasSubstr("\"warm_up_iterations\": 100"));
+}
+
 }  // namespace
 }  // namespace color3d

@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <map>
 
 #include "server/base/service_error.h"
 #include "server/planning/planner.h"
+#include "server/planning/presets.h"
 #include "server/planning/spec_names.h"
 #include "server/planning/stage_key.h"
 
@@ -100,6 +102,45 @@ TEST(KeyColorSpec, RefusesOptionsOfOtherSources) {
                 *s->mutable_labels() = SomeDigest("l");
               }),
               HasSubstr("key_color.labels"));
+}
+
+// The refusal of the paper's preset with these options, or "accepted".
+std::string JointMessage(const std::function<void(v1::ColorizeSceneSpec*)>& change) {
+  v1::ColorizeSceneSpec scene;
+  scene.set_preset(v1::PRESET_PAPER);
+  change(&scene);
+  try {
+    CheckJointTraining(WithPreset(scene));
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+TEST(JointTrainingSpec, HasBothHalvesOrNeither) {
+  EXPECT_EQ(JointMessage([](auto*) {}), "accepted");
+  EXPECT_EQ(JointMessage([](auto* s) { s->set_preset(v1::PRESET_FAST); }), "accepted");
+  EXPECT_EQ(JointMessage([](auto* s) {
+              s->mutable_solve_chroma()->set_solver(v1::SolveChromaSpec::SOLVER_ADAM);
+              s->mutable_reconstruct_geometry()->set_warm_up(1.0);
+            }),
+            "accepted");
+  EXPECT_THAT(JointMessage([](auto* s) {
+                s->mutable_solve_chroma()->set_solver(v1::SolveChromaSpec::SOLVER_ADAM);
+              }),
+              HasSubstr("reconstruct_geometry.warm_up is 0.5"));
+  EXPECT_THAT(JointMessage([](auto* s) {
+                s->set_preset(v1::PRESET_FAST);
+                s->mutable_solve_chroma()->set_solver(v1::SolveChromaSpec::SOLVER_JOINT);
+              }),
+              HasSubstr("solve_chroma.solver is joint"));
+  EXPECT_THAT(
+      JointMessage([](auto* s) {
+        s->mutable_reconstruct_geometry()->set_recipe(v1::ReconstructGeometrySpec::RECIPE_COLOR3D);
+      }),
+      HasSubstr("needs recipe=paper"));
+  EXPECT_THAT(JointMessage([](auto* s) { s->mutable_reconstruct_geometry()->set_sh_degree(2); }),
+              HasSubstr("chroma_sh_degree is 3, above the degree 2"));
 }
 
 v1::JobSpec SpecWithNames() {

@@ -86,7 +86,6 @@ TEST(StagesTest, CatalogueHasEveryStageOfTheApi) {
   const auto* stages = v1::JobSpec::descriptor()->FindOneofByName("stage");
   for (int i = 0; i < stages->field_count(); ++i) {
     const std::string& name = stages->field(i)->name();
-    if (name == "reconstruct_dense") continue;  // not built
     EXPECT_NE(FindStage(name), nullptr) << name;
   }
 }
@@ -294,6 +293,25 @@ TEST(OptionDefaults, AreThoseOfProto) {
             google::protobuf::TextFormat::ParseFromString(field.name() + ": " + value, told.get()));
         EXPECT_TRUE(method.same(*told, unset)) << value;
       });
+}
+
+TEST(JointTrainingOptions, ReachTheMethod) {
+  const v1::ColorizeSceneSpec& paper = OptionsOf(v1::PRESET_PAPER);
+  const GeometryOptions geometry = GeometryOptionsFrom(paper.reconstruct_geometry(), 1);
+  EXPECT_EQ(geometry.recipe, GeometryOptions::Recipe::kPaper);
+  EXPECT_EQ(geometry.iterations, 30'000);
+  EXPECT_EQ(geometry.warm_up, 0.5);
+  EXPECT_EQ(geometry.sh_degree, 3);
+  EXPECT_EQ(geometry.ssim_weight, 0.2);
+  EXPECT_EQ(geometry.edge_weight, 1.0);
+  v1::SolveChromaSpec chroma = paper.solve_chroma();
+  EXPECT_EQ(ChromaOptionsFrom(chroma, 1).solver, ChromaOptions::Solver::kJoint);
+  EXPECT_EQ(ChromaOptionsFrom(chroma, 1).color_space, ColorSpace::kLab);
+  EXPECT_EQ(ChromaOptionsFrom(chroma, 1).chroma_sh_degree, 3);
+  chroma.set_color_space(v1::SolveChromaSpec::COLOR_SPACE_RGB);
+  EXPECT_EQ(ChromaOptionsFrom(chroma, 1).color_space, ColorSpace::kSrgb);
+  chroma.set_solver(v1::SolveChromaSpec::SOLVER_ADAM);
+  EXPECT_THROW(ChromaOptionsFrom(chroma, 1).Validate(), Error);
 }
 
 // The defaults of library and service are equal.
