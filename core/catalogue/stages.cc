@@ -68,7 +68,8 @@ const std::vector<Stage>& StageCatalogue() {
        .step = "view_colors",
        .purpose = "every view gets a colour at every pixel",
        .needs = {kScene, kColorizer},
-       .reads = {kCarried, kCarryFacts, kGeometry},
+       // the key view: for recolouring
+       .reads = {kKeyView, kKeyColor, kKeyViews, kCarried, kCarryFacts, kGeometry},
        .resumes = true},
       {.kind = kCorrectColors,
        .step = "corrections",

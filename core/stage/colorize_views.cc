@@ -1,3 +1,6 @@
+#include <atomic>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/colorizer/personal/train_colorizer.h"
@@ -7,6 +10,7 @@
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_facts.h"
 #include "core/stage/formats/views_checkpoint.h"
+#include "core/stage/recolor/recolored_views.h"
 #include "core/stage/run_stages.h"
 #include "core/stage/sources/view_positions.h"
 
@@ -58,16 +62,31 @@ void RunColorizeViews(int max_side_px, StageContext& context, const std::string&
     }
     return ColorFrames(scene, images, coloring, context);
   }
+  const auto recolorer = ViewRecolorer::Read(scene, images, positions, *colorizer, context);
+  std::atomic<int> gray_views = 0;
   context.pool().ForEach(total, [&](int64_t index, int) {
     context.ThrowIfCancelled();
     const auto number = static_cast<int>(index);
     if (done.WasDone(number)) return;
+    if (recolorer) {
+      if (const std::optional<FusedColor> color = recolorer->Recolor(number)) {
+        return done.Add(number, *color);
+      }
+      ++gray_views;
+    }
     const auto luminance = images.Luminance(number);
     const CarriedColor carried =
         ReadCarried(context, scene.views[index], luminance->width, luminance->height);
     ThreadPool one(1);
     done.Add(number, FuseViewColor(*luminance, carried, sources(number), one, context.cancel()));
   });
+  if (gray_views > 0) {
+    context.Warn(
+        "{} of {} photos are grey and have no colours of their own to keep beside the edit: they "
+        "get all colours from the edited key view. To keep theirs, give these photos in colour",
+        gray_views.load(),
+        total);
+  }
 }
 
 }  // namespace color3d

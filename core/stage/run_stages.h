@@ -56,8 +56,9 @@ void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
                     const std::string& encoder = "");
 
-// Colours every view, with the sources of the colour, at max_side_px (64..4096). `encoder`: the one
-// that the colorizer was trained with.
+// Colours every view, with the sources of the colour, at max_side_px (64..4096). After an edit of
+// the key photo of a static scene, colour photos keep their own colours outside the edit.
+// `encoder`: the one that the colorizer was trained with.
 void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
 // Sources of colour for views: the colorizer of the scene and the embedded automatic one.
 // `position` returns that of PictureFacts for a luminance. Requires: `colorizer` outlives the

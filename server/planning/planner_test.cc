@@ -37,7 +37,12 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
       InputKinds(graph, "carry_color"),
       ElementsAre("import_scene", "select_key_view", "colorize_key_view", "reconstruct_geometry"));
   EXPECT_THAT(InputKinds(graph, "colorize_views"),
-              ElementsAre("import_scene", "personalize", "carry_color", "reconstruct_geometry"));
+              ElementsAre("import_scene",
+                          "personalize",
+                          "select_key_view",
+                          "colorize_key_view",
+                          "carry_color",
+                          "reconstruct_geometry"));
   EXPECT_THAT(InputKinds(graph, "solve_chroma"),
               ElementsAre("import_scene",
                           "select_key_view",
