@@ -52,17 +52,18 @@ class SlowClientsTest : public ::testing::Test {
     }
     return request;
   }
-  // Retried after a connection that gRPC closed, like clients do.
+  // Retried with growing delays after a connection that gRPC closed, like clients do.
   void Try(const std::string& content) {
-    for (int tries = 0; tries < 3; ++tries) {
+    for (int tries = 0; tries < 5; ++tries) {
       try {
         EXPECT_EQ(good_.Download(good_.Upload(content)), content);
         return;
       } catch (const std::runtime_error& e) {
         std::printf("try %d: %s\n", tries, e.what());
+        SleepMs(100 << tries);
       }
     }
-    ADD_FAILURE() << "three times in vain";
+    ADD_FAILURE() << "five tries in vain";
   }
   // Returns the duration of the slowest of a few calls of a normal client.
   milliseconds SlowestOfOthers() {

@@ -35,7 +35,6 @@ constexpr auto kRows = std::to_array<Row>({
     {kModelChanged, "MODEL_CHANGED", kAborted},
     {kNoColor, "NO_COLOR", kInvalidArgument},
     {kNoInferenceWorker, "NO_INFERENCE_WORKER", kFailedPrecondition},
-    {kNotBuilt, "NOT_BUILT", kUnimplemented},
     {kOffsetBeyondEnd, "OFFSET_BEYOND_END", kOutOfRange},
     {kOffsetMismatch, "OFFSET_MISMATCH", kInvalidArgument},
     {kOtherScene, "OTHER_SCENE", kInvalidArgument},

@@ -25,7 +25,6 @@ enum class ErrorReason {
   kModelChanged,
   kNoColor,
   kNoInferenceWorker,
-  kNotBuilt,
   kOffsetBeyondEnd,
   kOffsetMismatch,
   kOtherScene,

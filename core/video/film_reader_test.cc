@@ -51,9 +51,8 @@ class FilmReaderTest : public testing::Test {
  protected:
   fs::path Film(int frames, double frames_per_second = 25.0) {
     const fs::path file = folder_.path() / "film.mp4";
-    Mp4Writer writer(
-        file,
-        {.width = kWidth, .height = kHeight, .frames_per_second = frames_per_second, .threads = 1});
+    Mp4Writer writer(file,
+                     {.width = kWidth, .height = kHeight, .frames_per_second = frames_per_second});
     for (int i = 0; i < frames; ++i) writer.Add(Step(i, frames), pool_);
     writer.Finish();
     return file;

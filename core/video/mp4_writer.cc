@@ -154,7 +154,6 @@ class Mp4Writer::Impl {
     check("height", options_.height, kMinMovieSidePx, kMaxMovieSidePx);
     check("frames_per_second", options_.frames_per_second, 1, 120);
     check("ticks_per_second", options_.ticks_per_second, 0, 65535);
-    check("threads", options_.threads, 1, 1024);
     if (options_.width % 2 != 0 || options_.height % 2 != 0) {
       throw InvalidArgument(
           "the sides of a movie must be even, not {} x {} px", options_.width, options_.height);
@@ -192,7 +191,9 @@ class Mp4Writer::Impl {
     codec_->sample_aspect_ratio = {1, 1};
     codec_->gop_size =
         std::max(1, static_cast<int>(std::lround(kKeyFrameSeconds * options_.frames_per_second)));
-    codec_->thread_count = options_.threads;
+    // With two threads, one movie of a thousand differed in bytes. A second one saves 10 ms a frame
+    // of 854 x 480 px.
+    codec_->thread_count = 1;
     codec_->color_range = AVCOL_RANGE_MPEG;
     codec_->color_primaries = AVCOL_PRI_BT709;
     codec_->color_trc = AVCOL_TRC_BT709;

@@ -31,13 +31,12 @@ struct Mp4Options {
   // 1..65535: pictures have their own times (AddAt), rounded to this number of ticks a second
   // (ticks.h). 0: constant frame rate.
   int ticks_per_second = 0;
-  int threads = 1;  // of the encoder
   std::optional<SoundPart> sound;
   const CancellationToken* cancel = nullptr;  // cancels reading the sound; must outlive the writer
   bool operator==(const Mp4Options&) const = default;
 };
 
-// Not thread-safe.
+// Equal pictures give equal bytes. Not thread-safe.
 class Mp4Writer {
  public:
   // The movie appears at `path` when Finish returns; without Finish no file is left. Throws

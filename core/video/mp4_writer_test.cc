@@ -44,8 +44,7 @@ class Mp4WriterTest : public testing::Test {
 
 TEST_F(Mp4WriterTest, DecodesToWrittenPictures) {
   constexpr int kWidth = 178, kHeight = 102, kFrames = 50;  // no multiples of 16
-  Mp4Writer writer(file_,
-                   {.width = kWidth, .height = kHeight, .frames_per_second = 25, .threads = 2});
+  Mp4Writer writer(file_, {.width = kWidth, .height = kHeight, .frames_per_second = 25});
   for (int i = 0; i < kFrames; ++i) writer.Add(Stripes(kWidth, kHeight, i), pool_);
   EXPECT_FALSE(std::filesystem::exists(file_)) << "before it is whole";
   writer.Finish();
@@ -92,12 +91,12 @@ TEST_F(Mp4WriterTest, PlainColorsRoundTripWithinTwoOf255) {
 TEST_F(Mp4WriterTest, EqualPicturesGiveEqualBytes) {
   std::string bytes[2];
   for (std::string& movie : bytes) {
-    Mp4Writer writer(file_, {.width = 64, .height = 48, .threads = 2});
+    Mp4Writer writer(file_, {.width = 64, .height = 48});
     for (int i = 0; i < 20; ++i) writer.Add(Stripes(64, 48, i), pool_);
     writer.Finish();
     movie = ReadFile(file_);
   }
-  EXPECT_EQ(bytes[0], bytes[1]);
+  EXPECT_TRUE(bytes[0] == bytes[1]);
 }
 
 TEST_F(Mp4WriterTest, UnfinishedMovieLeavesNoFile) {
@@ -116,8 +115,7 @@ TEST_F(Mp4WriterTest, RejectsInvalidMovies) {
                                     Mp4Options{.width = 1, .height = 1},
                                     Mp4Options{.width = 0, .height = 48},
                                     Mp4Options{.width = 64, .height = 100'000},
-                                    Mp4Options{.width = 64, .height = 48, .frames_per_second = 0},
-                                    Mp4Options{.width = 64, .height = 48, .threads = 0}}) {
+                                    Mp4Options{.width = 64, .height = 48, .frames_per_second = 0}}) {
     EXPECT_THROW(Mp4Writer(file_, options), Error) << options.width << " x " << options.height;
   }
   EXPECT_THROW(Mp4Writer(file_, {.width = 64, .height = 48, .frames_per_second = NAN}), Error);

@@ -77,7 +77,7 @@ TEST(SoundLevelsTest, MatchesFilm) {
   const ScratchFolder folder;
   ThreadPool pool(1);
   Mp4Writer writer(folder.path() / "silent.mp4",
-                   {.width = 64, .height = 48, .frames_per_second = 10, .threads = 1});
+                   {.width = 64, .height = 48, .frames_per_second = 10});
   for (int i = 0; i < 30; ++i) writer.Add(Image(64, 48, 3, 0.5f), pool);
   writer.Finish();
   GivenSound sound;

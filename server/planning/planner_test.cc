@@ -254,13 +254,6 @@ TEST(Planner, AugmentationOptionsAreChecked) {
   EXPECT_THAT(PlanError(spec).message, HasSubstr("0 to 64"));
 }
 
-TEST(Planner, RefusesStagesThatAreNotBuilt) {
-  v1::JobSpec spec;
-  spec.set_scene("scenes/test");
-  spec.mutable_reconstruct_dense();
-  EXPECT_THAT(PlanError(spec).message, HasSubstr("reconstruct_dense"));
-}
-
 TEST(Planner, KeyColorIsRequired) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");

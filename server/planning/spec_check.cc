@@ -312,11 +312,6 @@ std::string KindOf(const v1::JobSpec& spec) {
 
 void CheckSpec(const v1::JobSpec& spec) {
   const std::string kind = KindOf(spec);
-  if (FindStage(kind) == nullptr) {
-    throw ServiceError(
-        ErrorReason::kNotBuilt,
-        fmt::format("{} is not built yet; GetServerInfo lists the job kinds that are", kind));
-  }
   if (spec.ByteSizeLong() > kMaxSpecBytes) {
     Reject("spec",
            fmt::format(" has {} bytes; at most {} are allowed: give fewer entries or shorter texts",

@@ -17,8 +17,8 @@ constexpr size_t kMaxSpecBytes = 64 << 10;
 // Error{kInvalidArgument} if the spec has no stage.
 std::string KindOf(const v1::JobSpec& spec);
 
-// Throws Error: kInvalidArgument with field, value and range; kUnimplemented with the kind. Names
-// of models and backends are checked by CheckNames (spec_names.h).
+// Throws Error{kInvalidArgument} with field, value and range. Names of models and backends are
+// checked by CheckNames (spec_names.h).
 void CheckSpec(const v1::JobSpec& spec);
 
 // Returns the digests in the spec, without repetition.

@@ -237,11 +237,10 @@ class CoreStageRunner : public StageRunner {
         return RunReport(run.graph, context);
       case JobSpec::kPersonalizeScenes:
         return;  // all work is done by its children
-      case JobSpec::kReconstructDense:
       case JobSpec::STAGE_NOT_SET:
         break;
     }  // no default: the compiler warns of a stage without a case
-    throw Error(ErrorCode::kUnimplemented, "jobs of kind \"{}\" are not built yet", KindOf(spec));
+    throw Error(ErrorCode::kUnimplemented, "the job has no stage that this version knows");
   }
 
   Mutex mutex_;

@@ -122,6 +122,22 @@ void AddMatchingCases(std::vector<StabilityCase>& cases) {
     p->condition = 1e6;
   });
 
+  vote("temperature 1e-4", 1e-3, [](Problem* p) {
+    p->options.temperature = 1e-4;
+    p->condition = 1e4;
+  });
+  vote("temperature 1e4", 1e-4, [](Problem* p) { p->options.temperature = 1e4; });
+  vote("equal scores", 1e-4, [](Problem* p) {
+    p->bank.features.fill_(0.5);
+    p->queries.features.fill_(0.5);
+    p->options.position_weight = 0.0;
+  });
+  vote("scores of 1e30", 1e-4, [](Problem* p) {
+    p->bank.features.mul_(1e15);
+    p->queries.features.mul_(1e15);
+    p->condition = 1e30;
+  });
+
   const auto whitening = [&](const std::string& name, double condition, auto noise) {
     cases.push_back({"matching", name, false, [condition, noise](ThreadPool&) {
                        torch::manual_seed(12);

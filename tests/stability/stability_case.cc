@@ -27,6 +27,13 @@ std::vector<StabilityCase> StabilityCases() {
   AddChromaCases(cases);
   AddMatchingCases(cases);
   AddColorizerCases(cases);
+  AddGridCases(cases);
+  AddCarryCases(cases);
+  AddSoftmaxCases(cases);
+  AddColorCases(cases);
+  AddFilmCases(cases);
+  AddFormatCases(cases);
+  AddPoseCases(cases);
   return cases;
 }
 

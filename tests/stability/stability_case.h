@@ -1,6 +1,5 @@
-// The stiff and extreme cases of the splat engine and the colorizer (METHOD.md "Stability"), each
-// run through the real kernels and compared with float64. Used by stability_test and by
-// color3d-bench stability.
+// Stiff and extreme cases of all parts of the method (METHOD.md "Stability"), each run through the
+// real kernels and compared with float64. Used by stability_test and by color3d-bench stability.
 //
 // Errors are relative, per buffer: max |fast - reference| / max |reference|. Buffers of values are
 // the colour channels, opacity and depth; buffers of gradients are the rows of parameters, where
@@ -46,7 +45,7 @@ struct StabilityResult {
 };
 
 struct StabilityCase {
-  std::string group;  // raster, loss, adam, geometry, motion, chroma, matching, colorizer
+  std::string group;  // e.g. "raster"
   std::string name;   // unique in the group
   bool slow = false;  // for the benchmark only
   std::function<StabilityResult(ThreadPool&)> run;
@@ -69,5 +68,12 @@ void AddMotionCases(std::vector<StabilityCase>& cases);
 void AddChromaCases(std::vector<StabilityCase>& cases);
 void AddMatchingCases(std::vector<StabilityCase>& cases);
 void AddColorizerCases(std::vector<StabilityCase>& cases);
+void AddGridCases(std::vector<StabilityCase>& cases);
+void AddCarryCases(std::vector<StabilityCase>& cases);
+void AddSoftmaxCases(std::vector<StabilityCase>& cases);
+void AddColorCases(std::vector<StabilityCase>& cases);
+void AddFilmCases(std::vector<StabilityCase>& cases);
+void AddFormatCases(std::vector<StabilityCase>& cases);
+void AddPoseCases(std::vector<StabilityCase>& cases);
 
 }  // namespace color3d

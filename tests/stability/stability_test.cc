@@ -4,12 +4,20 @@
 #include <cctype>
 #include <cmath>
 
+#include "core/base/files.h"
 #include "core/base/random.h"
 #include "tests/stability/raster_compare.h"
 #include "tests/stability/stability_case.h"
+#include "tests/stability/stability_table.h"
 
 namespace color3d {
 namespace {
+
+std::string CommittedTable() {
+  return ReadFile(std::filesystem::path(COLOR3D_STABILITY_FOLDER) / kStabilityTable);
+}
+
+std::string FullName(const StabilityCase& c) { return c.group + ", " + c.name; }
 
 std::vector<StabilityCase> FastCases() {
   std::vector<StabilityCase> cases = StabilityCases();
@@ -27,6 +35,31 @@ TEST_P(StabilityTest, IsFiniteAndWithinBounds) {
   EXPECT_TRUE(result.Passed()) << "value " << result.value_error << " of " << result.value_bound
                                << ", gradient " << result.gradient_error << " of "
                                << result.gradient_bound;
+  EXPECT_EQ(BoundsOfCase(CommittedTable(), FullName(GetParam())), PrintedBounds(result))
+      << "make " << kStabilityTable << " again";
+}
+
+TEST(StabilityTableTest, CommittedTableHasEveryCaseAndItsDigest) {
+  const std::string table = CommittedTable();
+  std::vector<std::string> names;
+  for (const StabilityCase& c : StabilityCases()) names.push_back(FullName(c));
+  EXPECT_EQ(CasesOfMarkdown(table), names) << "make " << kStabilityTable << " again";
+  EXPECT_EQ(StatedDigest(table), DigestOfRows(table)) << "edited by hand";
+  EXPECT_EQ(table.find("FAILED"), std::string::npos);
+}
+
+TEST(StabilityTableTest, DigestChangesWithCasesAndBounds) {
+  StabilityRow row{{"raster", "needle", false, {}}, {}};
+  row.result.value_error = 1e-7;
+  row.result.value_bound = 1e-6;
+  const std::string before = DigestOfRows(StabilityMarkdown({row}));
+  EXPECT_EQ(StatedDigest(StabilityMarkdown({row})), before);
+  row.result.value_error = 2e-7;  // depends on the machine
+  row.result.outcome = "a|b";
+  EXPECT_EQ(DigestOfRows(StabilityMarkdown({row})), before);
+  row.result.value_bound = 1e-5;
+  EXPECT_NE(DigestOfRows(StabilityMarkdown({row})), before);
+  EXPECT_EQ(CasesOfMarkdown(StabilityMarkdown({row})), std::vector<std::string>{"raster, needle"});
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases,

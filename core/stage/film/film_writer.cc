@@ -101,7 +101,6 @@ void WriteColoredFilm(const Scene& scene,
                    .height = height,
                    .frames_per_second = clock.frames_per_second,
                    .ticks_per_second = clock.ticks_per_second,
-                   .threads = context.pool().thread_count(),
                    .sound = SoundFrom(
                        scene, frames.front(), scene.views[frames.front()].time_s(), clock, context),
                    .cancel = &context.cancel()});

@@ -260,7 +260,6 @@ Mp4Options MovieOf(const RenderOptions& options,
   Mp4Options movie{.width = frames[0].camera.width,
                    .height = frames[0].camera.height,
                    .frames_per_second = options.frames_per_second,
-                   .threads = context.pool().thread_count(),
                    .cancel = &context.cancel()};
   if (!clock) return movie;
   movie.frames_per_second = clock->frames_per_second;

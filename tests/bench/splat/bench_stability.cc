@@ -1,5 +1,5 @@
-// color3d-bench stability: stiff and extreme cases of the splat engine, compared with float64, and
-// of the colorizer.
+// color3d-bench stability: stiff and extreme cases of all parts of the method, compared with
+// float64.
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -8,12 +8,14 @@
 #include "core/base/files.h"
 #include "tests/bench/commands.h"
 #include "tests/stability/stability_case.h"
+#include "tests/stability/stability_table.h"
 
 namespace color3d {
 namespace {
 
 struct StabilityArguments {
   std::string json_file;
+  std::string markdown_file;
   std::string only;
   bool fast = false;
   int threads = 2;
@@ -70,6 +72,7 @@ nlohmann::ordered_json ToJson(const StabilityCase& c, const StabilityResult& r) 
 void RunStability(const StabilityArguments& args) {
   ThreadPool pool(args.threads);
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  std::vector<StabilityRow> table;
   int failed = 0;
   std::printf("%-9s %-38s %8s %-28s %8s %8s %8s %8s %4s %5s %6s\n",
               "group",
@@ -90,12 +93,14 @@ void RunStability(const StabilityArguments& args) {
     const StabilityResult r = RunStabilityCase(c, pool);
     PrintRow(c, r);
     rows.push_back(ToJson(c, r));
+    table.push_back({c, r});
     failed += r.Passed() ? 0 : 1;
   }
   if (!args.json_file.empty()) {
     WriteFileAtomic(args.json_file,
                     nlohmann::ordered_json{{"cases", rows}, {"failed", failed}}.dump(1) + "\n");
   }
+  if (!args.markdown_file.empty()) WriteFileAtomic(args.markdown_file, StabilityMarkdown(table));
   if (failed > 0) {
     throw Error(ErrorCode::kInternal, "{} stability cases failed", failed);
   }
@@ -105,13 +110,18 @@ void RunStability(const StabilityArguments& args) {
 
 void AddStabilityCommand(CLI::App& app) {
   auto args = std::make_shared<StabilityArguments>();
-  CLI::App* command = app.add_subcommand(
-      "stability", "Run stiff and extreme cases of the splat engine and the colorizer");
+  CLI::App* command =
+      app.add_subcommand("stability", "Run stiff and extreme cases of all parts of the method");
   command->add_option("--only", args->only, "Only cases whose \"group, name\" contains this");
   command->add_flag("--fast", args->fast, "Skip slow cases");
   command->add_option("--threads", args->threads, "Number of threads");
   command->add_option(
       "--json", args->json_file, "File for the result (JSON); default: standard output");
+  command
+      ->add_option(
+          "--markdown", args->markdown_file, "File for the table that is committed (Markdown)")
+      ->excludes("--only")
+      ->excludes("--fast");
   command->callback([args] { RunStability(*args); });
 }
 
