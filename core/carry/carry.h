@@ -38,7 +38,8 @@ struct CarriedColor {
   Image confidence;  // 1 channel, 0..1
 };
 
-// `ab` (2 channels or more) and `confidence` (1 channel, 0..1; empty: 1 everywhere) are the source view's.
+// `ab` (2 channels or more) and `confidence` (1 channel, 0..1; empty: 1 everywhere) are the source
+// view's.
 CarriedColor CarryColor(const SurfaceView& source,
                         const Image& ab,
                         const Image& confidence,

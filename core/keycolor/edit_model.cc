@@ -59,8 +59,7 @@ EditModel::EditModel(std::span<const EditedPicture> pictures)
       const float share = picture.edited.data[i];
       const float da = picture.ab.Plane(0)[i] - lab.Plane(1)[i];
       const float db = picture.ab.Plane(1)[i] - lab.Plane(2)[i];
-      const Sums pixel{
-          share, 1.0f - share, {share * da, share * db}, share * (da * da + db * db)};
+      const Sums pixel{share, 1.0f - share, {share * da, share * db}, share * (da * da + db * db)};
       ForBinsAround(lab.Plane(0)[i], lab.Plane(1)[i], lab.Plane(2)[i], [&](int bin, float weight) {
         bins_[bin].Add(pixel, weight);
       });
@@ -97,11 +96,10 @@ EditModel::Answer EditModel::At(float l, float a, float b) const {
     answer.change[c] = (sums.change[c] + prior * total_.change[c]) / count;
     squared_mean += answer.change[c] * answer.change[c];
   }
-  answer.variance =
-      std::max(0.0f, (sums.squares + prior * total_.squares) / count - squared_mean);
+  answer.variance = std::max(0.0f, (sums.squares + prior * total_.squares) / count - squared_mean);
   if (total_.outside > 0.0f) {
-    answer.likelihood_ratio = (sums.inside / total_.inside + kFloor) /
-                              (sums.outside / total_.outside + kFloor);
+    answer.likelihood_ratio =
+        (sums.inside / total_.inside + kFloor) / (sums.outside / total_.outside + kFloor);
   }
   return answer;
 }

@@ -78,7 +78,8 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
   }
   if (options.source == ColorizeKeyViewOptions::Source::kEdit) {
     AddEditedShare(photo, result.ab, key, images, &color);
-    if (color.confidence.Empty()) color.confidence = Image(color.ab.width, color.ab.height, 1, 1.0f);
+    if (color.confidence.Empty())
+      color.confidence = Image(color.ab.width, color.ab.height, 1, 1.0f);
   }
   context.WriteOutput(artifact::kKeyColor, EncodeCarriedPng(color));
   context.WriteOutput(artifact::kKeyViewColored,

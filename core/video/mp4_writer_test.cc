@@ -110,12 +110,13 @@ TEST_F(Mp4WriterTest, UnfinishedMovieLeavesNoFile) {
 }
 
 TEST_F(Mp4WriterTest, RejectsInvalidMovies) {
-  for (const Mp4Options& options : {Mp4Options{.width = 65, .height = 48},
-                                    Mp4Options{.width = 64, .height = 47},
-                                    Mp4Options{.width = 1, .height = 1},
-                                    Mp4Options{.width = 0, .height = 48},
-                                    Mp4Options{.width = 64, .height = 100'000},
-                                    Mp4Options{.width = 64, .height = 48, .frames_per_second = 0}}) {
+  for (const Mp4Options& options :
+       {Mp4Options{.width = 65, .height = 48},
+        Mp4Options{.width = 64, .height = 47},
+        Mp4Options{.width = 1, .height = 1},
+        Mp4Options{.width = 0, .height = 48},
+        Mp4Options{.width = 64, .height = 100'000},
+        Mp4Options{.width = 64, .height = 48, .frames_per_second = 0}}) {
     EXPECT_THROW(Mp4Writer(file_, options), Error) << options.width << " x " << options.height;
   }
   EXPECT_THROW(Mp4Writer(file_, {.width = 64, .height = 48, .frames_per_second = NAN}), Error);

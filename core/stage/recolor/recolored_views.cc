@@ -49,8 +49,8 @@ float CarriedWeight(float confidence) {
 
 // Share of the change at this colour that the change field proposes at this place.
 float ProposedShare(const EditModel::Answer& by_color, float a, float b) {
-  const float square = by_color.change[0] * by_color.change[0] +
-                       by_color.change[1] * by_color.change[1];
+  const float square =
+      by_color.change[0] * by_color.change[0] + by_color.change[1] * by_color.change[1];
   if (square < 1.0f) return 0.0f;
   return std::clamp((by_color.change[0] * a + by_color.change[1] * b) / square, 0.0f, 1.0f);
 }
@@ -119,8 +119,8 @@ ViewRecolorer::ViewRecolorer(const Scene& scene,
 
 PlacedPicture ViewRecolorer::OwnPicture(int view, const Image& lab) const {
   PlacedPicture picture{LuminanceOfLab(lab), ChromaOfLab(lab), {}, {}};
-  picture.position = positions_.Of(
-      view, images_.WorkingCamera(view), picture.luminance, images_.Mask(view).get());
+  picture.position =
+      positions_.Of(view, images_.WorkingCamera(view), picture.luminance, images_.Mask(view).get());
   return picture;
 }
 
@@ -158,15 +158,14 @@ FusedColor ViewRecolorer::OfOtherView(int view, const Image& lab) const {
     const float weight = CarriedWeight(carried.confidence.data[i]);
     const float prior = weight * share.data[i] + (1.0f - weight) * inferred;
     const float posterior = EditedPosterior(prior, by_color.likelihood_ratio);
-    const float edited =
-        std::clamp((posterior - kNotEdited) / (kEdited - kNotEdited), 0.0f, 1.0f);
+    const float edited = std::clamp((posterior - kNotEdited) / (kEdited - kNotEdited), 0.0f, 1.0f);
     // Inverse variances weight the change at this colour and the carried one.
     const float variance = kCarriedDeviation * kCarriedDeviation;
     const float of_carried = weight * by_color.variance / (by_color.variance + variance);
     for (int c = 0; c < 2; ++c) {
       const float carried_change = carried.ab.Plane(c)[i] - own[c];
-      color.ab.Plane(c)[i] += edited * (of_carried * carried_change +
-                                        (1.0f - of_carried) * by_color.change[c]);
+      color.ab.Plane(c)[i] +=
+          edited * (of_carried * carried_change + (1.0f - of_carried) * by_color.change[c]);
     }
     const float guess = edited * (1.0f - weight);
     color.provenance.Plane(kSeenPlane)[i] = 1.0f - guess;

@@ -73,9 +73,9 @@ class RecoloredViewsTest : public StageTest {
   }
   void WritePhoto(int view, bool gray) {
     const Image lab = Photo(view, false);
-    WriteFileAtomic(scratch_.path() / scene_.views[view].image_file,
-                    EncodePng16(gray ? SrgbFromLab(Image(kWidth, kHeight, 1, 50.0f))
-                                     : SrgbFromLab(lab)));
+    WriteFileAtomic(
+        scratch_.path() / scene_.views[view].image_file,
+        EncodePng16(gray ? SrgbFromLab(Image(kWidth, kHeight, 1, 50.0f)) : SrgbFromLab(lab)));
   }
   // Edits the key view and runs the stages up to the colours of the views.
   void Run(bool carry) {
@@ -109,8 +109,8 @@ class RecoloredViewsTest : public StageTest {
         continue;
       }
       for (int y = 0; y < kHeight; ++y) {
-        const double e = std::hypot(ab.At(0, y, x) - truth.At(1, y, x),
-                                    ab.At(1, y, x) - truth.At(2, y, x));
+        const double e =
+            std::hypot(ab.At(0, y, x) - truth.At(1, y, x), ab.At(1, y, x) - truth.At(2, y, x));
         errors.mean += e;
         errors.max = std::max(errors.max, e);
         ++count;
