@@ -90,7 +90,7 @@ class RecoloredViewsTest : public StageTest {
       RunForInputs([&](StageContext& context) { RunCarryColor(options, context); });
     }
     RunForInputs([](StageContext& context) { RunPersonalize({.iterations = 0}, context); });
-    RunForInputs([](StageContext& context) { RunColorizeViews(kWidth, context); });
+    RunForInputs([](StageContext& context) { RunColorizeViews({.max_side_px = kWidth}, context); });
   }
   // Mean and largest difference of chroma to the edited photo, of the red stripes or the others.
   // Two pixels at borders of stripes are left out.

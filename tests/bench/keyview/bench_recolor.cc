@@ -126,7 +126,8 @@ void Colorize(const Arguments& args, const Image& edited, bool keep, LocalPipeli
     });
   }
   pipeline->Run(kind::kPersonalize, [](StageContext& c) { RunPersonalize({}, c); });
-  pipeline->Run(kind::kColorizeViews, [&](StageContext& c) { RunColorizeViews(args.side_px, c); });
+  pipeline->Run(kind::kColorizeViews,
+                [&](StageContext& c) { RunColorizeViews({.max_side_px = args.side_px}, c); });
 }
 
 void Run(const Arguments& args) {
