@@ -80,7 +80,7 @@ for part in model neighbors training personal; do
   allow "core/colorizer/$part" "core/($colorizer)"
 done
 lower=
-for part in model motion raster training geometry chroma export import; do
+for part in model hexplane motion raster training geometry chroma export import; do
   lower="$lower${lower:+|}$part"
   allow "core/splat/$part" "core/(base|zip|simd|color|image|scene|splat/($lower))"
 done
@@ -163,9 +163,10 @@ public core/report contact_sheet curves report_page scene_plan
 public core/scene camera frame_numbers frame_times import_options key_photo photo_masks relief scene \
   view_images formats/camera_file formats/camera_films import/hold_out import/import \
   masks/masked_points masks/still_regions
-public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/motion raster/render \
-  geometry/geometry_options geometry/geometry_trainer chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
-  export/export export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene
+public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/geometry_in_time raster/render \
+  geometry/geometry_options geometry/geometry_trainer geometry/warm_up chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
+  export/export export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene \
+  training/hexplane_training
 public core/stage idle_stages run_stages film_import/import_film formats/artifact_io options/[a-z_]+
 public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path

@@ -7,8 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "core/carry/fusion.h"
 #include "core/image/codec.h"
-#include "core/image/fill_holes.h"
 #include "core/image/flow_agreement.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
@@ -18,6 +18,9 @@ namespace {
 
 // Cost of a step to a neighbouring frame, as that of an overlap of 98 %.
 constexpr double kFrameStepCost = 0.02;
+// Weight of grey where no colour was found, as FusionOptions::inferred_weight: colours fade within
+// about 30 px.
+constexpr double kFading = 1e-3;
 
 struct Step {
   int to = 0;
@@ -115,7 +118,8 @@ PropagationPlan PlanPropagation(const Scene& scene,
 
 CarriedColor PropagateByFlow(const CarriedColor& color,
                              const Image& luminance,
-                             const Image& target) {
+                             const Image& target,
+                             const CancellationToken& cancel) {
   const Image source = ResizedTo(luminance, target);
   const Image ab = ResizedTo(color.ab, target);
   const Image confidence = ResizedTo(color.confidence, target);
@@ -137,7 +141,15 @@ CarriedColor PropagateByFlow(const CarriedColor& color,
       out.confidence.At(0, y, x) = SampleBilinear(confidence, 0, sx, sy);
     }
   }
-  FillHoles(matched, &out.ab);
+  // Known colours spread between the edges of the luminance, and fade.
+  FusionOptions spread;
+  spread.inferred_weight = kFading;
+  ThreadPool one(1);
+  out.ab = FuseColors({target, {std::move(out.ab), matched}, Image(width, height, 2), {}, {}},
+                      spread,
+                      one,
+                      cancel)
+               .ab;
   return out;
 }
 

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "core/base/cancellation.h"
 #include "core/base/image.h"
 #include "core/carry/carry.h"
 #include "core/scene/scene.h"
@@ -28,11 +29,13 @@ PropagationPlan PlanPropagation(const Scene& scene,
                                 bool along_shots);
 
 // Returns the colours of a view at the places that optical flow finds in it for the pixels of
-// another view. Pixels whose flow there and back disagrees continue the colours around them, with
-// confidence 0; all are grey if no pixel's flow agrees. `luminance`: 1 channel, L 0..100, of the
-// size of `color`; if `target`, 1 channel, has another size, the source is resized to it.
+// another view. Where the flow there and back disagrees, colours spread from around, between the
+// edges of `target`, and fade; the confidence is 0. `luminance`: 1 channel, L 0..100, of the size
+// of `color`; if `target`, 1 channel, has another size, the source is resized to it. Throws
+// Error{kCancelled}.
 CarriedColor PropagateByFlow(const CarriedColor& color,
                              const Image& luminance,
-                             const Image& target);
+                             const Image& target,
+                             const CancellationToken& cancel);
 
 }  // namespace color3d

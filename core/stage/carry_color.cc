@@ -30,7 +30,7 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
     return CarryFilm({options, scene, key_views, GaussianModel()}, context);
   }
   const GaussianModel geometry = ParseGaussians(context.ReadInput(artifact::kGeometry));
-  if (geometry.motion.size() > 0) {
+  if (geometry.IsDynamic()) {
     return CarryDynamic({options, scene, key_views, geometry}, context);
   }
   // Frames of a static scene are photos of it.

@@ -127,7 +127,7 @@ std::optional<SceneMotion> MotionOf(const PlanFacts& facts,
   const char* name = context.HasInput(artifact::kModel) ? artifact::kModel : artifact::kGeometry;
   if (facts.time_steps == 0 || !context.HasInput(name)) return std::nullopt;
   SceneMotion motion;
-  motion.moves = ParseGaussians(context.ReadInput(name)).motion.size() > 0;
+  motion.moves = ParseGaussians(context.ReadInput(name)).IsDynamic();
   for (const CurvePoint& point : curves) {
     if (point.stage == kind::kReconstructGeometry && point.error_name == "moving_share") {
       motion.share = point.value;

@@ -13,7 +13,7 @@
 #include "core/splat/export/sog/sog.h"
 #include "core/splat/export/splat4d/splat4d.h"
 #include "core/splat/export/spz/spz.h"
-#include "core/splat/motion/motion.h"
+#include "core/splat/motion/geometry_in_time.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
 #include "core/stage/write_view_page.h"
@@ -73,14 +73,14 @@ class Exporter {
     for (const ExportFormatInfo& info : kExportFormats) {
       if (!options_.formats.contains(info.format)) continue;
       context_.ThrowIfCancelled();
-      if (!info.needs_motion || in_time_.motion.size() > 0) {
+      if (!info.needs_motion || in_time_.IsDynamic()) {
         Write(info.format);
       } else if (info.by_default == ExportDefault::kOff || options_.formats.size() == 1) {
         context_.Warn("nothing moves in this scene: {} is not written", info.artifact);
       }
     }
     if (context_.HasInput(artifact::kKeyView)) {
-      WriteViewPage(scene_, shown_, model_, in_time_.motion.size() > 0, page_file_, context_);
+      WriteViewPage(scene_, shown_, model_, in_time_.IsDynamic(), page_file_, context_);
     }
     context_.WriteOutput(artifact::kExportScores, scores_.dump(1) + "\n");
   }
@@ -162,13 +162,13 @@ class Exporter {
   }
 
   void WriteMoments() {
-    const double span = in_time_.motion.end_s - in_time_.motion.begin_s;
+    const double span = in_time_.end_s() - in_time_.begin_s();
     for (int i = 0; i < options_.moments; ++i) {
       context_.ThrowIfCancelled();
       const double share =
           options_.moments > 1 ? static_cast<double>(i) / (options_.moments - 1) : 0.5;
       const GaussianModel at =
-          ModelAt(in_time_, in_time_.motion.begin_s + share * span, context_.pool());
+          ModelAt(in_time_, in_time_.begin_s() + share * span, context_.pool());
       context_.WriteOutput(
           fmt::format("{}{:05}.ply", artifact::kMoments, i + 1),
           EncodeGaussianPly(at, FitRgbHarmonics(at, context_.pool()), frame_, context_.pool()));

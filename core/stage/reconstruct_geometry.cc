@@ -14,6 +14,7 @@
 #include "core/splat/geometry/warm_up.h"
 #include "core/splat/model/gaussian_cap.h"
 #include "core/splat/model/memory_plan.h"
+#include "core/splat/training/hexplane_training.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
 
@@ -40,6 +41,11 @@ MemoryPlan PlanMemory(const GeometryOptions& options,
   demand.sh_degree = options.sh_degree;
   demand.channels = options.warm_up < 1.0 ? 3 : 1;
   demand.moves = scene.HasTimes();
+  if (demand.moves && options.motion == GeometryOptions::Motion::kAuto &&
+      options.deformation == GeometryOptions::Deformation::kHexPlane) {
+    demand.deformation_bytes =
+        HexPlaneBytes(TuningOf(options).hexplane, static_cast<int>(scene.Times().size()));
+  }
   return PlanGeometryMemory(demand, budget_bytes);
 }
 

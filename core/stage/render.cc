@@ -76,7 +76,7 @@ void RunRender(const RenderOptions& options, StageContext& context) {
     return RenderMovie(options, scene, model, context);
   }
   const std::vector<int> views = ViewsToRender(options, scene);
-  if (model.motion.size() > 0) {  // seen by the camera of the key view
+  if (model.IsDynamic()) {  // seen by the camera of the key view
     RenderOptions movie = options;
     movie.views.clear();
     movie.path = RenderOptions::Path::kPhotos;

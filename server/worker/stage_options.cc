@@ -229,6 +229,9 @@ GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uin
   }
   if (spec.has_dense_start()) options.dense_start = spec.dense_start();
   if (spec.still()) options.motion = GeometryOptions::Motion::kStill;
+  if (spec.deformation() == v1::ReconstructGeometrySpec::DEFORMATION_HEXPLANE) {
+    options.deformation = GeometryOptions::Deformation::kHexPlane;
+  }
   if (spec.has_warm_up()) options.warm_up = spec.warm_up();
   return options;
 }

@@ -37,6 +37,10 @@ GeometryTuning PaperTuning(int iterations) {
   tuning.rotation_rate = 1e-3;
   tuning.sh_from = 1000.0 / n;
   tuning.sh_step = 1000.0 / n;
+  // Wu et al. 2024.
+  tuning.hexplane.from = 3.0 / 17.0;
+  tuning.hexplane.plane_rate = 1.6e-3;
+  tuning.hexplane.network_rate = 1.6e-4;
   return tuning;
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "core/splat/hexplane/hexplane_tuning.h"
+
 namespace color3d {
 
 // Schedule of a training; times are fractions of it. The defaults are those of Recipe::kColor3d,
@@ -47,6 +49,7 @@ struct GeometryTuning {
   int motion_neighbors = 24;
   int mover_sh_degree = 0;  // of moving Gaussians, which few views see
   double last_rate = 0.2;  // all rates but the position's fall to this multiple after densification
+  HexPlaneTuning hexplane;
 
   bool operator==(const GeometryTuning&) const = default;
 };
@@ -85,6 +88,7 @@ void VisitFields(Tuning& tuning, Visit&& visit) {
   visit("motion_neighbors", tuning.motion_neighbors);
   visit("mover_sh_degree", tuning.mover_sh_degree);
   visit("last_rate", tuning.last_rate);
+  VisitHexPlaneFields(tuning.hexplane, visit);
 }
 
 struct GeometryOptions {
@@ -94,6 +98,10 @@ struct GeometryOptions {
   // kAuto: motion is detected if views have times. kStill: the scene is static.
   enum class Motion { kAuto, kStill };
   Motion motion = Motion::kAuto;
+  // Of dynamic scenes. kWindows: a foreground moves along parabolas. kHexPlane: a field deforms all
+  // Gaussians, as in 4D Gaussian splatting.
+  enum class Deformation { kWindows, kHexPlane };
+  Deformation deformation = Deformation::kWindows;
   bool dense_start = true;  // kColor3d: also start from points of plane sweeps
   int iterations = 1500;    // 0..100000
   // Seconds of training, 0: none, at most 86400. The whole schedule fits into this time or the

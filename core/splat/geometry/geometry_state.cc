@@ -14,9 +14,10 @@ std::string GeometryFingerprint(const GeometryProblem& problem,
   for (const PosedCamera& view : problem.training) {
     pixels += int64_t{view.camera.width} * view.camera.height;
   }
-  std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
+  std::string text = fmt::format("geometry {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}",
                                  problem.colors ? 3 : 1,
                                  moments,
+                                 static_cast<int>(options.deformation),
                                  options.iterations,
                                  options.max_gaussians,
                                  options.sh_degree,

@@ -7,6 +7,7 @@
 #include "core/splat/geometry/exposure.h"
 #include "core/splat/geometry/moving_part.h"
 #include "core/splat/raster/projection.h"
+#include "core/splat/training/hexplane_training.h"
 #include "core/splat/training/training_state.h"
 
 namespace color3d {
@@ -14,6 +15,7 @@ namespace color3d {
 struct GeometryState : TrainingState {
   DensifyStatistics statistics;  // of the static part, then of the moving part
   MovingPart moving;
+  HexPlaneState hexplane;    // empty unless it is trained
   int64_t densified_at = 0;  // iteration
   Exposures exposures;       // of the training views, in their order; empty: not fitted
 };
@@ -28,6 +30,7 @@ void VisitGeometryState(Archive& archive, State& state) {
   archive.Block(state.moving.parameters);
   archive.Block(state.moving.moments.first);
   archive.Block(state.moving.moments.second);
+  VisitHexPlaneState(archive, state.hexplane);
   archive.Value(state.densified_at);
   archive.Vector(state.exposures);
 }

@@ -19,6 +19,7 @@
 #include "core/splat/motion/shared_motion.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
+#include "core/splat/training/hexplane_training.h"
 #include "core/splat/training/training_guard.h"
 #include "core/splat/training/training_targets.h"
 
@@ -51,6 +52,7 @@ class GeometryTrainer {
                  problem.picture_cache_bytes),
         masks_(problem.mask, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask),
         still_(problem.still, 1, 1.0f, problem.picture_cache_bytes / 4, ResizeMask),
+        hexplanes_(schedule_.tuning().hexplane, problem.is_relief),
         state_(FirstState(problem, options, layout_)),
         loss_(options, layout_) {
     initial_count_ = state_.parameters.count();
@@ -87,7 +89,9 @@ class GeometryTrainer {
     }
     FinishTrace();
     state_.elapsed_seconds = earlier_seconds_ + clock_.TrainingSeconds();
-    return ModelOfParts(state_.parameters, state_.moving, times_, layout_);
+    GaussianModel model = ModelOfParts(state_.parameters, state_.moving, times_, layout_);
+    model.hexplane = FieldOf(state_.hexplane);
+    return model;
   }
 
   // The state at the end of Train().
@@ -99,7 +103,7 @@ class GeometryTrainer {
   }
 
   std::string Fingerprint() const {
-    return GeometryFingerprint(problem_, options_, MayMove() ? times_.steps : 1, initial_count_);
+    return GeometryFingerprint(problem_, options_, IsAuto() ? times_.steps : 1, initial_count_);
   }
 
   void Resume() {
@@ -129,6 +133,9 @@ class GeometryTrainer {
 
   // All Gaussians at the view's time.
   const ParameterBlock& At(const PosedCamera& view, float hidden = 0.0f) {
+    if (DeformsNow()) {
+      return hexplanes_.At(state_.hexplane, state_.parameters, view.time_s, run_.pool);
+    }
     if (state_.moving.parameters.count() == 0) return state_.parameters;
     ComposeAt(state_.parameters, state_.moving, UnitTime(view), run_.pool, composed_, hidden);
     return composed_;
@@ -136,9 +143,9 @@ class GeometryTrainer {
 
   int64_t Count() const { return state_.parameters.count() + state_.moving.parameters.count(); }
 
-  bool MayMove() const {
-    return options_.motion == GeometryOptions::Motion::kAuto && times_.steps > 1;
-  }
+  bool IsAuto() const { return options_.motion == GeometryOptions::Motion::kAuto; }
+  bool MayMove() const { return IsAuto() && times_.steps > 1 && state_.hexplane.empty(); }
+  bool DeformsNow() const { return !state_.hexplane.empty() && hexplanes_.IsActive(fraction_); }
 
   void FindMovers() {
     if (!MayMove()) return;
@@ -219,7 +226,14 @@ class GeometryTrainer {
     clock_.Enter(Phase::kAdam);
     std::vector<float> rates = schedule_.LearningRates(fraction_, layout_);
     MovingPart& moving = state_.moving;
-    bool finite = true;
+    bool finite =
+        !DeformsNow() || hexplanes_.Update(state_.parameters,
+                                           view.time_s,
+                                           fraction_,
+                                           options_.learning_rate_scale * state_.rate_scale,
+                                           run_.pool,
+                                           gradient_,
+                                           state_.hexplane);
     if (moving.parameters.count() > 0) {
       DecomposeGradient(state_.parameters,
                         moving,
@@ -318,7 +332,7 @@ class GeometryTrainer {
       const int level = schedule_.Level(fraction_, camera);
       run_.progress.OnProgress(
           state_.iteration,
-          std::llround(static_cast<double>(state_.iteration) / std::max(fraction_, 1e-9)),
+          std::llround(end_ * static_cast<double>(state_.iteration) / std::max(fraction_, 1e-9)),
           fmt::format("geometry, {} Gaussians at {}x{} px",
                       Count(),
                       SizeAtLevel(camera.width, level),
@@ -397,6 +411,7 @@ class GeometryTrainer {
   TrainingTargets targets_;
   TrainingTargets masks_;
   TrainingTargets still_;
+  HexPlaneTraining hexplanes_;
   GeometryState state_;
   int64_t initial_count_ = 0;     // Gaussians
   double fraction_ = 0.0;         // completed fraction of the schedule

@@ -20,6 +20,7 @@ void VisitWarmUp(Archive& archive, WarmUpOrConst& warm_up) {
   auto& options = warm_up.options;
   archive.Value(options.recipe);
   archive.Value(options.motion);
+  archive.Value(options.deformation);
   archive.Value(options.iterations);
   archive.Value(options.time_limit_seconds);
   archive.Value(options.max_gaussians);
@@ -71,6 +72,24 @@ GeometryState UntrainedState(const GaussianModel& from,
   return state;
 }
 
+// Adds the deformation, unless the state has one or needs none.
+GeometryState WithHexPlanes(GeometryState state,
+                            const GeometryProblem& problem,
+                            const GeometryOptions& options) {
+  const TimeSpan times = TimeSpanOf(problem);
+  if (options.deformation != GeometryOptions::Deformation::kHexPlane ||
+      options.motion != GeometryOptions::Motion::kAuto || times.steps < 2 ||
+      !state.hexplane.empty()) {
+    return state;
+  }
+  state.hexplane = FirstHexPlanes(state.parameters,
+                                  {times.begin_s, times.end_s, times.steps},
+                                  problem.extent,
+                                  TuningOf(options).hexplane,
+                                  options.seed);
+  return state;
+}
+
 }  // namespace
 
 std::string SerializeWarmUp(const WarmUp& warm_up) {
@@ -104,7 +123,7 @@ GeometryState FirstState(const GeometryProblem& problem,
   if (problem.start == nullptr) {
     GeometryState state = UntrainedState(problem.initial, layout.channels, options);
     if (TuningOf(options).exposure_rate > 0.0) state.exposures.resize(problem.training.size());
-    return state;
+    return WithHexPlanes(std::move(state), problem, options);
   }
   const GeometryState& start = *problem.start;
   const ColorLayout luminance{ColorSpace::kLab, 1, options.sh_degree, 0};
@@ -119,7 +138,10 @@ GeometryState FirstState(const GeometryProblem& problem,
         problem.training.size(),
         luminance.rows());
   }
-  return layout.channels == 1 ? start : WithChromaFromLuminance(start, options.sh_degree, layout);
+  return WithHexPlanes(
+      layout.channels == 1 ? start : WithChromaFromLuminance(start, options.sh_degree, layout),
+      problem,
+      options);
 }
 
 GeometryState StateOf(const GaussianModel& geometry, const GeometryOptions& options) {

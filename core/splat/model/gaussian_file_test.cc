@@ -80,6 +80,30 @@ TEST(GaussianFileTest, OpensFileOfVersion1) {
   EXPECT_EQ(m.sh_b, std::vector<float>{3.25f});
 }
 
+TEST(GaussianFileTest, KeepsDeformationField) {
+  GaussianModel m = RandomModel({9, 3, 2, 1});
+  const std::string plain = SerializeGaussians(m);
+  m.hexplane = RandomHexPlanes();
+  for (const bool confident : {false, true}) {
+    if (confident) m.confidence.assign(9, 0.5f);
+    const std::string bytes = SerializeGaussians(m);
+    EXPECT_EQ(bytes[8], 5) << "programs without fields refuse it by its version";
+    EXPECT_GT(bytes.size(), plain.size());
+    const GaussianModel back = ParseGaussians(bytes);
+    EXPECT_EQ(back.hexplane.shape, m.hexplane.shape);
+    EXPECT_EQ(back.hexplane.planes, m.hexplane.planes);
+    EXPECT_EQ(back.hexplane.network, m.hexplane.network);
+    EXPECT_EQ(back.position, m.position);
+    EXPECT_EQ(back.sh_b, m.sh_b);
+    EXPECT_EQ(back.confidence, m.confidence);
+    EXPECT_EQ(SerializeGaussians(back), bytes);
+  }
+  m.color_space = ColorSpace::kSrgb;
+  EXPECT_EQ(ParseGaussians(SerializeGaussians(m)).color_space, ColorSpace::kSrgb);
+  m.hexplane = {};
+  EXPECT_TRUE(ParseGaussians(plain).hexplane.empty());
+}
+
 void ExpectRefused(const std::string& bytes, const std::string& why) {
   try {
     ParseGaussians(bytes);
@@ -91,6 +115,36 @@ void ExpectRefused(const std::string& bytes, const std::string& why) {
 }
 
 std::string Signed(std::string content) { return content + Sha256Hex(content); }
+
+TEST(GaussianFileTest, RejectsDamagedDeformationField) {
+  GaussianModel m = RandomModel({9, 1, 0, 0});
+  m.hexplane = RandomHexPlanes();
+  const std::string good = SerializeGaussians(m);
+  const std::string content = good.substr(0, good.size() - 64);
+  for (size_t n = 0; n < good.size(); n += 401) {
+    EXPECT_THROW(ParseGaussians(std::string_view(good).substr(0, n)), Error);
+  }
+  const auto with = [&](size_t at, uint32_t value) {
+    std::string bytes = content;
+    std::memcpy(bytes.data() + at, &value, sizeof(value));
+    return Signed(bytes);
+  };
+  constexpr size_t kFeatures = 32 + 44, kLevels = kFeatures + 8, kSpace = kLevels + 4;
+  ExpectRefused(with(kFeatures, 17), "features must be a multiple of 16");
+  ExpectRefused(with(kFeatures, 32), "claims");
+  ExpectRefused(with(kLevels, 9), "too many levels");
+  ExpectRefused(with(kSpace, 1), "2 to 1024 samples");
+  ExpectRefused(with(kSpace, 0x7fffffff), "2 to 1024 samples");
+  std::string bytes = content;
+  const float nan = std::nanf("");
+  std::memcpy(bytes.data() + bytes.size() - 4, &nan, 4);
+  ExpectRefused(Signed(bytes), "deformation network number");
+  m.hexplane.planes.pop_back();
+  EXPECT_THROW(SerializeGaussians(m), Error);
+  m.hexplane = RandomHexPlanes();
+  m.hexplane.shape.high[1] = m.hexplane.shape.low[1];
+  EXPECT_THROW(SerializeGaussians(m), Error);
+}
 
 TEST(GaussianFileTest, RejectsHostileBytes) {
   const std::string good = SerializeGaussians(RandomModel({13, 3, 1, 0}));

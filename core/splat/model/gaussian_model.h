@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/scene/scene.h"
+#include "core/splat/model/hexplane_field.h"
 
 namespace color3d {
 
@@ -52,10 +53,18 @@ struct GaussianModel {
   // 1: confidence of the colour, 0..1 (1: seen in a key view, 0.5: inferred, 0: guessed). Empty if
   // unknown; no kernel uses it.
   std::vector<float> confidence;
-  // Motion of the last motion.size() Gaussians; those before are static.
+  // At most one of the two deformations: motion of the last motion.size() Gaussians, those before
+  // are static; or a field that deforms all of them.
   GaussianMotion motion;
+  HexPlaneField hexplane;
 
   size_t size() const { return opacity_logit.size(); }
+  bool IsDynamic() const { return MovingCount() > 0; }
+  // Number of Gaussians that depend on time: the last ones.
+  size_t MovingCount() const { return hexplane.empty() ? motion.size() : size(); }
+  // Time span of the deformation, seconds of the scene.
+  double begin_s() const { return hexplane.empty() ? motion.begin_s : hexplane.shape.begin_s; }
+  double end_s() const { return hexplane.empty() ? motion.end_s : hexplane.shape.end_s; }
 };
 
 // One Gaussian per sparse point: scale from the mean distance to its 3 nearest neighbours, opacity
@@ -64,7 +73,7 @@ GaussianModel InitialGaussians(const Scene& scene);
 
 // Native file with a versioned header and a checksum: the whole model, bit for bit. Version 1 has
 // no confidence, version 2 has it, version 3 (with or without it) has motion, version 4 is in
-// kSrgb.
+// kSrgb, version 5 (with or without confidence) has a field.
 std::string SerializeGaussians(const GaussianModel& model);
 // Throws Error{kInvalidArgument} on anything else (wrong magic, newer version, truncated, NaN).
 GaussianModel ParseGaussians(std::string_view bytes);

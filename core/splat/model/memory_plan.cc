@@ -63,7 +63,7 @@ int64_t FixedBytes(const MemoryDemand& demand, int side) {
   // The trainer keeps pictures at two sizes (4 + 1 bytes a pixel) within its own budget.
   return kProgramBytes + PhotoBytes(demand) + demand.channels * kWorkBytesPerPixel * px.largest +
          std::min(TargetCacheBytes(demand), (4 * demand.channels + 1) * px.all) +
-         (demand.moves ? kSurveyBytes : 0) +
+         (demand.moves ? kSurveyBytes : 0) + demand.deformation_bytes +
          kBytesPerPair * kPairsPerTile * (px.largest / kTilePx + 1);
 }
 

@@ -22,12 +22,13 @@ struct MemoryDemand {
     Camera captured;  // at full size: determines the memory of decoding
     Camera camera;    // undistorted, at full size: determines the working size
   };
-  std::vector<View> views;  // views that are trained on or measured
-  int max_side_px = 0;      // wanted working size
-  int max_gaussians = 0;    // wanted cap
-  int sh_degree = 0;        // of every channel, 0..3
-  int channels = 1;         // that are trained; 3: also on chroma
-  bool moves = false;       // the views are frames, possibly many: caches stay small
+  std::vector<View> views;        // views that are trained on or measured
+  int max_side_px = 0;            // wanted working size
+  int max_gaussians = 0;          // wanted cap
+  int sh_degree = 0;              // of every channel, 0..3
+  int channels = 1;               // that are trained; 3: also on chroma
+  bool moves = false;             // the views are frames, possibly many: caches stay small
+  int64_t deformation_bytes = 0;  // of a deformation field in training
 };
 
 struct MemoryPlan {

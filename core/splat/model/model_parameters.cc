@@ -43,6 +43,24 @@ void CheckModel(const GaussianModel& model) {
         motion.begin_s,
         motion.end_s);
   }
+  const HexPlaneField& field = model.hexplane;
+  if (!field.empty()) {
+    const std::string complaint =
+        motion.size() > 0 ? "there is motion, too" : field.shape.Complaint();
+    if (!complaint.empty()) {
+      throw InvalidArgument("Gaussian model: the deformation field is invalid: {}", complaint);
+    }
+    if (field.planes.size() != field.shape.PlaneFloats() ||
+        field.network.size() != field.shape.NetworkFloats()) {
+      throw InvalidArgument(
+          "Gaussian model: the deformation field has {} numbers of planes and {} of the network, "
+          "{} and {} are needed",
+          field.planes.size(),
+          field.network.size(),
+          field.shape.PlaneFloats(),
+          field.shape.NetworkFloats());
+    }
+  }
   const auto check = [](const char* name, const auto& buffer, int width, size_t count) {
     const size_t needed = count * static_cast<size_t>(width);
     if (buffer.size() == needed) return;

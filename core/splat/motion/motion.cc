@@ -45,28 +45,4 @@ void LimitWindows(float least, int row, ParameterBlock& moving) {
   for (int64_t i = 0; i < moving.count(); ++i) width[i] = std::max(width[i], least);
 }
 
-ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPool& pool) {
-  ParameterBlock at = ParametersFromModel(model);
-  if (model.motion.size() > 0) {
-    const auto still = static_cast<int64_t>(model.size() - model.motion.size());
-    ApplyMotion({MotionFromModel(model), 0, model.motion.UnitTime(time_s), still}, pool, at);
-  }
-  return at;
-}
-
-GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool) {
-  if (model.motion.size() == 0) return model;
-  ParameterBlock parameters = ParametersAt(model, time_s, pool);
-  std::vector<uint32_t> seen;
-  for (int64_t i = 0; i < parameters.count(); ++i) {
-    if (parameters.Row(kOpacityRow)[i] > kUnseenLogit) seen.push_back(static_cast<uint32_t>(i));
-  }
-  parameters.Gather(seen);
-  GaussianModel at = ModelFromParameters(parameters, LayoutOf(model));
-  for (const uint32_t i : seen) {
-    if (!model.confidence.empty()) at.confidence.push_back(model.confidence[i]);
-  }
-  return at;
-}
-
 }  // namespace color3d

@@ -52,9 +52,4 @@ void ApplyMotionBackward(const MotionAt& motion,
 // Widens windows in time that are narrower than exp(least).
 void LimitWindows(float least, int row, ParameterBlock& moving);
 
-// Returns the model's parameters at a time of the scene.
-ParameterBlock ParametersAt(const GaussianModel& model, double time_s, ThreadPool& pool);
-// Returns the Gaussians that are seen at that time, as a model without motion.
-GaussianModel ModelAt(const GaussianModel& model, double time_s, ThreadPool& pool);
-
 }  // namespace color3d

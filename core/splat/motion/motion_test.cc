@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/splat/model/model_parameters.h"
+#include "core/splat/motion/geometry_in_time.h"
 
 namespace color3d {
 namespace {

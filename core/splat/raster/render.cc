@@ -4,7 +4,7 @@
 
 #include "core/color/lab.h"
 #include "core/splat/model/model_parameters.h"
-#include "core/splat/motion/motion.h"
+#include "core/splat/motion/geometry_in_time.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/raster/raster_constants.h"

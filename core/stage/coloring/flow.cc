@@ -13,7 +13,7 @@
 namespace color3d {
 namespace {
 
-// Traced colours count as seen, continued ones as inferred.
+// Traced colours count as seen, spread ones as inferred.
 FusedColor AsFused(const CarriedColor& color) {
   FusedColor fused{color.ab, Image(color.ab.width, color.ab.height, kProvenancePlanes)};
   for (size_t i = 0; i < color.confidence.data.size(); ++i) {
@@ -66,7 +66,8 @@ void ColorByFlow(const ViewColoring& coloring, StageContext& context) {
       colors[i] = source < 0 ? GivenColor(coloring, view, context)
                              : PropagateByFlow(last.at(source),
                                                *coloring.images.Luminance(source),
-                                               *coloring.images.Luminance(view));
+                                               *coloring.images.Luminance(view),
+                                               context.cancel());
       if (!coloring.done.WasDone(view)) coloring.done.Add(view, AsFused(colors[i]));
     });
     last.clear();

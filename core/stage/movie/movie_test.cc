@@ -5,7 +5,7 @@
 
 #include "core/base/error.h"
 #include "core/color/lab.h"
-#include "core/splat/motion/motion.h"
+#include "core/splat/motion/geometry_in_time.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
 #include "tests/support/formats/movie_reader.h"

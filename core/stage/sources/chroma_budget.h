@@ -19,7 +19,7 @@ inline ChromaOptions ChromaWithinMemory(ChromaOptions options,
                                         const Scene& scene,
                                         const GaussianModel& geometry,
                                         int64_t memory_bytes) {
-  const bool as_photos = geometry.motion.size() == 0 && scene.views.size() <= kFramesLikePhotos;
+  const bool as_photos = !geometry.IsDynamic() && scene.views.size() <= kFramesLikePhotos;
   if (scene.HasTimes() && !as_photos) options = ForManyFrames(options);
   options.memory_budget_bytes = std::min(options.memory_budget_bytes, memory_bytes / 2);
   options.target_budget_bytes = std::min(options.target_budget_bytes, memory_bytes / 8);

@@ -17,7 +17,7 @@ class ViewPositions {
   ViewPositions(const Scene& scene, const StageContext& context);
 
   // True if the geometry is static, so that frames are like photos.
-  bool IsStatic() const { return geometry_ && geometry_->motion.size() == 0; }
+  bool IsStatic() const { return geometry_ && !geometry_->IsDynamic(); }
 
   // Returns PictureFacts::position of the size of `luminance`, which is the view's as taken by
   // `camera`. Known where the rendered geometry agrees with `luminance` and `mask` (of the same

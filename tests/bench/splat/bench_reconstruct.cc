@@ -61,6 +61,9 @@ void UsePreset(const std::string& name, ReconstructArguments& args) {
   if (geometry.recipe() == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
     args.geometry.recipe = GeometryOptions::Recipe::kPaper;
   }
+  if (geometry.deformation() == v1::ReconstructGeometrySpec::DEFORMATION_HEXPLANE) {
+    args.geometry.deformation = GeometryOptions::Deformation::kHexPlane;
+  }
 }
 
 // Sets "name=value" of a schedule other than the default.
@@ -356,6 +359,13 @@ void AddReconstructCommand(CLI::App& app) {
       "--still",
       [args] { args->geometry.motion = GeometryOptions::Motion::kStill; },
       "Treat the scene as static");
+  command
+      ->add_option("--deformation",
+                   args->geometry.deformation,
+                   "Deformation of dynamic scenes: windows (the default) or hexplane")
+      ->transform(CLI::Transformer(std::map<std::string, GeometryOptions::Deformation>{
+          {"windows", GeometryOptions::Deformation::kWindows},
+          {"hexplane", GeometryOptions::Deformation::kHexPlane}}));
   command
       ->add_option("--colors,--colours",
                    args->colors,

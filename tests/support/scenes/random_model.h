@@ -38,4 +38,25 @@ inline GaussianModel RandomModel(const RandomModelOptions& options) {
   return m;
 }
 
+// Times 1 s to 3 s, positions from -2 to 2.
+inline HexPlaneField RandomHexPlanes() {
+  Random random(6);
+  HexPlaneField field;
+  HexPlaneShape& shape = field.shape;
+  shape.begin_s = 1.0;
+  shape.end_s = 3.0;
+  shape.low = {-2.0f, -2.0f, -2.0f};
+  shape.high = {2.0f, 2.0f, 2.0f};
+  shape.width = 16;
+  shape.levels = {{3, 4}, {5, 4}};
+  const auto fill = [&](std::vector<float>& numbers, size_t count, double low, double high) {
+    for (size_t i = 0; i < count; ++i) {
+      numbers.push_back(static_cast<float>(random.NextUniform(low, high)));
+    }
+  };
+  fill(field.planes, shape.PlaneFloats(), 0.5, 1.5);
+  fill(field.network, shape.NetworkFloats(), -0.4, 0.4);
+  return field;
+}
+
 }  // namespace color3d

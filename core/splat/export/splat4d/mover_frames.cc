@@ -9,10 +9,10 @@
 namespace color3d {
 
 MoverFrames::MoverFrames(const GaussianModel& model, const ExportFrame& frame, ThreadPool& pool)
-    : always(model.motion.size(), 1),
+    : always(model.MovingCount(), 1),
       in_time_(model, pool),
-      block_(kColorRow + 1, static_cast<int64_t>(model.motion.size())),
-      colors_{0, std::vector<float>(3 * model.motion.size(), 0.0f)},
+      block_(kColorRow + 1, static_cast<int64_t>(model.MovingCount())),
+      colors_{0, std::vector<float>(3 * model.MovingCount(), 0.0f)},
       frame_(frame),
       pool_(pool) {
   const ParameterBlock all = ParametersFromModel(model);
@@ -28,6 +28,7 @@ void MoverFrames::GoTo(double time_s) {
   CheckFinite(at);
   const std::vector<float> before = std::exchange(rotation, {});
   position = at.position;
+  log_scale = at.log_scale;
   opacity.clear();
   seen.clear();
   for (size_t i = 0; i < at.size(); ++i) {

@@ -19,11 +19,12 @@ class MoverFrames {
   // finite.
   void GoTo(double time_s);
 
-  std::vector<float> position;  // 3
-  std::vector<float> rotation;  // 4: -128..127, of the sign closer to the previous time
-  std::vector<float> opacity;   // 1: 0..255
-  std::vector<char> seen;       // opacity > 0
-  std::vector<char> always;     // all ones
+  std::vector<float> position;   // 3
+  std::vector<float> rotation;   // 4: -128..127, of the sign closer to the previous time
+  std::vector<float> opacity;    // 1: 0..255
+  std::vector<float> log_scale;  // 3
+  std::vector<char> seen;        // opacity > 0
+  std::vector<char> always;      // all ones
 
  private:
   void AddRotation(const float* unit, const float* before);

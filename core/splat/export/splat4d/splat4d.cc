@@ -43,6 +43,15 @@ Quantizer IntegerQuantizer(int channels, int bound) {
 
 constexpr std::array<const char*, kAttributes> kNames = {"pos", "rot", "rgb", "alpha", "scale"};
 
+// Attributes that may change over time.
+constexpr int kTracks = 4;
+constexpr std::array<Attribute, kTracks> kTracked = {kPosition, kRotation, kOpacity, kScale};
+
+Quantizer ScaleQuantizer() {
+  const double bound = std::log1p(kScaleBound);
+  return {3, bound, 2.0 * bound, bound};
+}
+
 class Encoder {
  public:
   Encoder(const GaussianModel& model,
@@ -52,13 +61,14 @@ class Encoder {
           ThreadPool& pool)
       : g_(ForViewers(model, rgb, frame, pool)),
         movers_(model, frame, pool),
-        begin_s_(model.motion.begin_s),
-        span_s_(model.motion.end_s - model.motion.begin_s),
+        begin_s_(model.begin_s()),
+        span_s_(model.end_s() - model.begin_s()),
         frames_(frames),
-        first_mover_(model.size() - model.motion.size()),
-        tracks_{HeldTrack(PositionQuantizer(g_), model.motion.size()),
-                HeldTrack(IntegerQuantizer(4, 0), model.motion.size()),
-                HeldTrack(IntegerQuantizer(1, kOpacityBound), model.motion.size())} {
+        first_mover_(model.size() - model.MovingCount()),
+        tracks_{HeldTrack(PositionQuantizer(g_), model.MovingCount()),
+                HeldTrack(IntegerQuantizer(4, 0), model.MovingCount()),
+                HeldTrack(IntegerQuantizer(1, kOpacityBound), model.MovingCount()),
+                HeldTrack(ScaleQuantizer(), model.MovingCount())} {
     CheckFinite(g_);
   }
 
@@ -79,6 +89,7 @@ class Encoder {
   HeldTrack& positions() { return tracks_[0]; }
   HeldTrack& rotations() { return tracks_[1]; }
   HeldTrack& opacities() { return tracks_[2]; }
+  HeldTrack& scales() { return tracks_[3]; }
 
   void GoToFrame(int frame) {
     const double share = frames_ > 1 ? static_cast<double>(frame) / (frames_ - 1) : 0.5;
@@ -92,6 +103,7 @@ class Encoder {
       positions().Observe(movers_.position, movers_.seen);
       rotations().Observe(movers_.rotation, movers_.seen);
       opacities().Observe(movers_.opacity, movers_.always);
+      scales().Observe(movers_.log_scale, movers_.seen);
       for (size_t i = 0; i < ever_seen_.size(); ++i) ever_seen_[i] |= movers_.seen[i];
     }
     for (HeldTrack& track : tracks_) track.Close();
@@ -103,7 +115,8 @@ class Encoder {
     const size_t i = gaussian - first_mover_;
     return (tracks_[0].IsStill(i) ? 0u : 1u << kPosition) |
            (tracks_[1].IsStill(i) ? 0u : 1u << kRotation) |
-           (tracks_[2].IsStill(i) ? 0u : 1u << kOpacity);
+           (tracks_[2].IsStill(i) ? 0u : 1u << kOpacity) |
+           (tracks_[3].IsStill(i) ? 0u : 1u << kScale);
   }
 
   // Groups Gaussians that change in the same attributes, and sorts them by spatial neighbourhood.
@@ -170,6 +183,7 @@ class Encoder {
       return static_cast<int32_t>(std::lround(g_.position[3 * i + k] / position_step));
     }));
     streams.push_back(Differences(kScale, [&](uint32_t i, int k) {
+      if (i >= first_mover_) return scales().Base(i - first_mover_, k);
       return static_cast<int32_t>(std::lround(g_.log_scale[3 * i + k] / std::log1p(kScaleBound)));
     }));
     streams.push_back(Bytes(kColor, 3, [&](uint32_t i, int k) {
@@ -192,21 +206,21 @@ class Encoder {
   }
 
   std::string Group(int first, int end) {
-    const std::array<Attribute, 3> attributes = {kPosition, kRotation, kOpacity};
-    std::array<std::vector<size_t>, 3> movers;
-    std::array<std::vector<int32_t>, 3> before;
+    std::array<std::vector<size_t>, kTracks> movers;
+    std::array<std::vector<int32_t>, kTracks> before;
     std::vector<Stream> keys, deltas;
-    for (int a = 0; a < 3; ++a) {
-      movers[a] = MovingGaussians(attributes[a]);
-      keys.push_back({attributes[a], kKey, {}});
-      deltas.push_back({attributes[a], kDelta, {}});
+    for (int a = 0; a < kTracks; ++a) {
+      movers[a] = MovingGaussians(kTracked[a]);
+      keys.push_back({kTracked[a], kKey, {}});
+      deltas.push_back({kTracked[a], kDelta, {}});
     }
     for (int frame = first; frame < end; ++frame) {
       GoToFrame(frame);
       positions().Hold(movers_.position, movers_.seen);
       rotations().Hold(movers_.rotation, movers_.seen);
       opacities().Hold(movers_.opacity, movers_.always);
-      for (int a = 0; a < 3; ++a) {
+      scales().Hold(movers_.log_scale, movers_.seen);
+      for (int a = 0; a < kTracks; ++a) {
         std::vector<int32_t> held;
         for (const size_t i : movers[a]) {
           for (int k = 0; k < tracks_[a].quantizer().channels; ++k) {
@@ -316,7 +330,7 @@ class Encoder {
   double begin_s_, span_s_;
   int frames_;
   size_t first_mover_;
-  std::array<HeldTrack, 3> tracks_;  // of positions, rotations, opacities
+  std::array<HeldTrack, kTracks> tracks_;  // of kTracked
   std::vector<char> ever_seen_;
   std::vector<uint32_t> order_;
 };

@@ -7,7 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/random.h"
-#include "core/splat/motion/motion.h"
+#include "core/splat/motion/geometry_in_time.h"
 #include "tests/support/formats/splat4d_reader.h"
 #include "tests/support/scenes/random_model.h"
 
@@ -102,6 +102,33 @@ TEST_F(Splat4dTest, RoundTripsWithinErrorBounds) {
       }
     }
   }
+}
+
+TEST_F(Splat4dTest, SamplesDeformationField) {
+  GaussianModel model = RandomModel({kCount, 3, 0, 0, /*chroma_size=*/0.03});
+  model.hexplane = RandomHexPlanes();
+  const int frames = 7;
+  const Splat4dFile file = ReadSplat4d(Encode(model, frames));
+  ASSERT_EQ(file.frames.size(), static_cast<size_t>(frames));
+  double moved = 0.0, grown = 0.0;
+  for (int f = 0; f < frames; ++f) {
+    const GaussianModel at = ModelAt(model, 1.0 + 2.0 * f / (frames - 1), pool_);
+    const ViewerGaussians truth = ForViewers(at, FitRgbHarmonics(at, pool_), frame_, pool_);
+    const Splat4dFrame& frame = file.frames[f];
+    for (size_t i = 0; i < kCount; ++i) {
+      const size_t j = PartnerOf(truth, i, frame);
+      for (int k = 0; k < 3; ++k) {
+        const double x = truth.position[3 * i + k], s = truth.log_scale[3 * i + k];
+        EXPECT_NEAR(frame.position[3 * j + k], x, file.position_bound + 1e-5) << f << ' ' << i;
+        EXPECT_NEAR(frame.log_scale[3 * j + k], s, std::log(1.01) + 1e-5) << f << ' ' << i;
+        const Splat4dFrame& first = file.frames.front();
+        moved = std::max(moved, std::abs(frame.position[3 * j + k] - first.position[3 * j + k]));
+        grown = std::max(grown, std::abs(frame.log_scale[3 * j + k] - first.log_scale[3 * j + k]));
+      }
+    }
+  }
+  EXPECT_GT(moved, 0.01);
+  EXPECT_GT(grown, 0.01);
 }
 
 TEST_F(Splat4dTest, StaticGaussiansAreStoredOnce) {
