@@ -97,6 +97,7 @@ TEST(ColorizerTest, RestoresSameColorizerFromFile) {
   paper.elastic.alpha_px = 34.0;
   ColorizerOptions old_paper;  // of files of earlier versions
   old_paper.recipe = ColorizerOptions::Recipe::kPaper;
+  old_paper.instance_norm = true;
   for (ColorizerOptions options : {ColorizerOptions(), paper, old_paper}) {
     options.iterations = 3;
     options.crop_px = 64;
