@@ -2,7 +2,7 @@
 # Which folder may include which, from bottom to top:
 #   core:   base <- {catalogue, simd, grid, color, image, zip <- weights} <- {scene, encoder}
 #           <- {keyview, augment, carry <- film, splat, metrics, report, video, view, matching <- {keycolor, colorizer}}
-#           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- {recolor, report} <- stages
+#           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- coloring <- {recolor, report} <- stages
 #   colorizer: colorizer <- model <- neighbors <- training <- personal
 #   scene:  scene <- {masks, formats} <- sfm <- import
 #   server: base <- store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
@@ -93,7 +93,7 @@ allow core/view/path 'core/(base|scene|view(/path)?)'
 # share. Other folders of core do not depend on stages.
 below='core/([a-rt-z][a-z]*|scene|simd|splat)(/[a-z]+)?'
 parts=
-for part in context options formats sources movie film_import film recolor report; do
+for part in context options formats sources movie film_import film coloring recolor report; do
   parts="$parts${parts:+|}$part"
   case "$part" in
     context) allow core/stage/context "$below|core/stage/context" ;;
@@ -145,8 +145,8 @@ public() {
   [ -z "$bad" ] || complain "headers private to $folder:" "$bad"
 }
 
-public core/augment augment outpaint surrogates
-public core/carry carry carry_views confidence dense_points plane_sweep view_color
+public core/augment augment elastic_options outpaint surrogates
+public core/carry carry carry_views confidence dense_points plane_sweep view_color view_propagation
 public core/colorizer colorizer corrector scene_batch personal/scene_colorizers personal/train_colorizer
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \

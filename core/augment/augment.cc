@@ -4,11 +4,13 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "core/augment/elastic_field.h"
+#include "core/augment/elastic_noise.h"
 #include "core/base/error.h"
 
 namespace color3d {
@@ -32,10 +34,10 @@ void Check(const Image& luminance, const Image& ab, const AugmentOptions& option
         ab.height);
   }
   if (options.crop_px < 1 || options.shuffle_grid < 1 || !(options.min_scale > 0.0) ||
-      !(options.max_scale >= options.min_scale) || !(options.elastic_sigma_px > 0.0)) {
+      !(options.max_scale >= options.min_scale) || !(options.elastic.sigma_px > 0.0)) {
     throw InvalidArgument(
         "augmentation needs crop_px >= 1, shuffle_grid >= 1, 0 < min_scale <= max_scale and "
-        "elastic_sigma_px > 0");
+        "elastic.sigma_px > 0");
   }
 }
 
@@ -78,7 +80,7 @@ class SamplingMap {
         random.NextUniform(std::log(options.min_scale), std::log(options.max_scale));
     step_ = std::exp(-log_scale);
     if (random.NextUniform() < options.elastic_probability) {
-      elastic_.emplace_back(crop_, options.elastic_alpha_px, options.elastic_sigma_px, random);
+      DrawElastic(options.elastic, random);
     }
     if (random.NextUniform() < options.perspective_probability) {
       perspective_ = Perspective::Draw(random);
@@ -98,11 +100,8 @@ class SamplingMap {
     const double half = 0.5 * crop_;
     // From here on continuous coordinates: a pixel covers [i, i + 1].
     Point p = perspective_.Apply(x + 0.5 - half, y + 0.5 - half, half);
-    if (!elastic_.empty()) {
-      const Point offset = elastic_[0].At(x + 0.5, y + 0.5);
-      p.x += offset.x;
-      p.y += offset.y;
-    }
+    if (spline_) p = p + spline_->At(x + 0.5, y + 0.5);
+    if (noise_) p = noise_->Affine(p + noise_->At(x, y));
     p = {center_.x + p.x * step_, center_.y + p.y * step_};
     Source source;
     source.inside = p.x >= 0.0 && p.y >= 0.0 && p.x <= width_ && p.y <= height_;
@@ -121,6 +120,14 @@ class SamplingMap {
     const double half = 0.5 * crop_ * step_;
     const double u = random.NextUniform();
     return side > 2.0 * half ? half + u * (side - 2.0 * half) : 0.5 * side;
+  }
+
+  void DrawElastic(const ElasticOptions& options, Random& random) {
+    if (options.kind == ElasticOptions::Kind::kSpline) {
+      spline_.emplace(crop_, options.alpha_px, options.sigma_px, random);
+    } else {
+      noise_.emplace(crop_, std::min(width_, height_), options, random);
+    }
   }
 
   void DrawShuffle(const AugmentOptions& options, Random& random) {
@@ -184,7 +191,8 @@ class SamplingMap {
   std::vector<int> cells_;  // cells_[place] = cell of the rotated picture at that place
   double step_ = 1.0;       // source px per crop px
   Point center_;
-  std::vector<ElasticField> elastic_;  // none or one
+  std::optional<ElasticField> spline_;
+  std::optional<ElasticNoise> noise_;
   Perspective perspective_;
 };
 
@@ -219,8 +227,21 @@ AugmentOptions AugmentOptions::Paper() {
   options.min_scale = 1.0;
   options.max_scale = 1.0;
   options.luminance_jitter = 0.0;
-  options.rot90_probability = 0.5;
+  options.perspective_probability = 0.0;
+  options.elastic.kind = ElasticOptions::Kind::kNoise;
+  options.rot90_probability = 1.0;
   options.shuffle_probability = 0.7;
+  return options;
+}
+
+AugmentOptions AugmentOptions::CropsOnly() {
+  AugmentOptions options;
+  options.min_scale = 1.0;
+  options.max_scale = 1.0;
+  options.flip_probability = 0.0;
+  options.elastic_probability = 0.0;
+  options.perspective_probability = 0.0;
+  options.luminance_jitter = 0.0;
   return options;
 }
 

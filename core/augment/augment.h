@@ -3,6 +3,7 @@
 // sampling there). Pure functions of the generator; thread-safe.
 #pragma once
 
+#include "core/augment/elastic_options.h"
 #include "core/base/image.h"
 #include "core/base/random.h"
 
@@ -15,8 +16,7 @@ struct AugmentOptions {
   double max_scale = 1.4;
   double flip_probability = 0.5;
   double elastic_probability = 0.7;
-  double elastic_alpha_px = 15.0;
-  double elastic_sigma_px = 50.0;
+  ElasticOptions elastic;
   double perspective_probability = 0.5;
   double luminance_jitter = 2.0;  // maximum offset of L, and maximum change of contrast in %
   // The paper's additions: rotations by 90 degrees with flips, and an 8x8 grid shuffle.
@@ -24,6 +24,7 @@ struct AugmentOptions {
   double shuffle_probability = 0.0;
   int shuffle_grid = 8;
   static AugmentOptions Paper();
+  static AugmentOptions CropsOnly();
 };
 
 struct AugmentedSample {

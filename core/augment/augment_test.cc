@@ -70,6 +70,28 @@ TEST(AugmentTest, KeepsChromaWithItsLuminance) {
   }
 }
 
+TEST(AugmentTest, CropsOnlyTakesPicturesAsTheyAre) {
+  const Picture picture = MakePicture(97, 61);
+  AugmentOptions options = AugmentOptions::CropsOnly();
+  options.crop_px = 48;
+  Random random(7);
+  for (int i = 0; i < 5; ++i) {
+    const AugmentedSample sample = Augment(picture.luminance, picture.ab, {}, options, random);
+    int places = 0;  // where the picture has the sample
+    for (int dy = 0; dy + 48 <= 61; ++dy) {
+      for (int dx = 0; dx + 48 <= 97; ++dx) {
+        bool equal = true;
+        for (int y = 0; equal && y < 48; ++y) {
+          const float* row = picture.luminance.Plane(0) + (dy + y) * 97 + dx;
+          equal = std::equal(row, row + 48, sample.luminance.Plane(0) + y * 48);
+        }
+        places += equal ? 1 : 0;
+      }
+    }
+    EXPECT_EQ(places, 1);
+  }
+}
+
 TEST(AugmentTest, LuminanceJitterLeavesChromaAlone) {
   const Picture picture = MakePicture(64, 64);
   AugmentOptions options = Identity(64);
@@ -95,8 +117,8 @@ TEST(AugmentTest, ShuffleMovesWholeCellsWithoutMixing) {
   options.shuffle_probability = 1.0;
   options.shuffle_grid = 4;
   options.elastic_probability = 1.0;  // positions between pixels, too
-  options.elastic_alpha_px = 3.0;
-  options.elastic_sigma_px = 20.0;
+  options.elastic.alpha_px = 3.0;
+  options.elastic.sigma_px = 20.0;
   Random random(5);
   const AugmentedSample sample = Augment(luminance, ab, {}, options, random);
   for (float value : sample.ab.data) ASSERT_EQ(value, std::round(value));

@@ -14,6 +14,9 @@ struct PlanePoint {
   double x = 0.0;
   double y = 0.0;
 };
+inline PlanePoint operator+(const PlanePoint& a, const PlanePoint& b) {
+  return {a.x + b.x, a.y + b.y};
+}
 
 // Reflects a coordinate at 0 and `side` as often as needed to lie between them.
 inline double Reflected(double value, double side) {

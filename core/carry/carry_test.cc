@@ -294,6 +294,7 @@ TEST(StereoViewsTest, PrefersSomeParallaxAndOverlap) {
   EXPECT_LT(plan.nearest, kWallDepth);
   EXPECT_GT(plan.farthest, kWallDepth);
   EXPECT_TRUE(PlanStereo(scene, 0, {}, {1, 2}, 4).sources.empty());
+  EXPECT_TRUE(PlanStereo(scene, 0, wall, {0, 1, 2, 3}, 0).sources.empty());
 }
 
 class FusionTest : public testing::Test {
@@ -329,6 +330,17 @@ TEST_F(FusionTest, FillsGapsFromCarriedNeighbors) {
   EXPECT_GT(fused.ab.At(0, 11, 15), 30.0f);
   EXPECT_EQ(fused.provenance.At(1, 11, 15), 0.0f) << "filled, but not seen";
   EXPECT_GT(fused.provenance.At(1, 2, 2), 0.85f);
+}
+
+TEST_F(FusionTest, EachPixelHasItsOwnColorsWithoutSpread) {
+  for (int x = 0; x < 16; ++x) carried_.confidence.At(0, 12, x) = 1.0f;
+  FusionOptions options;
+  options.spread = false;
+  const FusedColor fused =
+      FuseColors({luminance_, carried_, inferred_, {}, {}}, options, pool_, {});
+  EXPECT_NEAR(fused.ab.At(0, 12, 15), 40.0f, 0.1);
+  EXPECT_NEAR(fused.ab.At(0, 12, 16), -20.0f, 0.1);
+  EXPECT_NEAR(fused.ab.At(0, 11, 15), -20.0f, 0.1);
 }
 
 TEST_F(FusionTest, KeepsColorsApartAtEdges) {

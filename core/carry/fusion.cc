@@ -113,11 +113,15 @@ FusedColor FuseColors(const FusionSources& sources,
     out.provenance.Plane(kInferredPlane)[i] =
         static_cast<float>((1.0 - share_seen) * (1.0 - guess.share));
   }
-  GridSolveOptions solve;
-  solve.tolerance = kTolerance;
-  const auto ignore = [](int, double) {};
-  GridSolution solved = SolveGridSystem(std::move(system), target, solve, pool, ignore, cancel);
-  out.ab.data = std::move(solved.u);
+  if (options.spread) {
+    GridSolveOptions solve;
+    solve.tolerance = kTolerance;
+    const auto ignore = [](int, double) {};
+    GridSolution solved = SolveGridSystem(std::move(system), target, solve, pool, ignore, cancel);
+    out.ab.data = std::move(solved.u);
+  } else {
+    out.ab.data = std::move(target);
+  }
   out.ab = FromRelative(options.relative_chroma, luminance, std::move(out.ab));
   return out;
 }

@@ -34,6 +34,8 @@ struct FusionOptions {
   double bold_distance_ends = 3.0;
   double bold_chroma_begins = 15.0;
   double bold_chroma_ends = 25.0;
+  // Solve the system; if not, each pixel has the weighted mean of its own sources.
+  bool spread = true;
   // The system is solved for chroma relative to luminance.
   RelativeChroma relative_chroma;
   void Validate() const;

@@ -47,6 +47,7 @@ FusedColor FuseViewColor(const Image& luminance,
                          const CancellationToken& cancel) {
   FusionOptions options;
   options.relative_chroma = sources.relative_chroma;
+  options.spread = sources.spread;
   const Image known = DecisivelyCarried(carried);
   InferredColor inferred = sources.infer(luminance, known);
   CopyKnown(carried, known, &inferred.ab);

@@ -21,6 +21,7 @@ struct ColorSources {
   // pictures.
   std::function<Image(const Image& luminance)> guess;
   RelativeChroma relative_chroma;  // of the scene
+  bool spread = true;              // as FusionOptions::spread
 };
 
 // `luminance`: 1 channel, L 0..100. `carried`: of the same size; confidence 0 where nothing was

@@ -61,7 +61,7 @@ std::vector<Artifact> MakeCatalogue() {
                                         {kFilmFrames, kRender, kPng, true, "coloured frames"},
                                         {kMovie, kRender, kMp4, true, "rendered movie"},
                                         {kFrames, kRender, kPng},
-                                        {kScores, kEvaluate, kJson},
+                                        {kScores, kEvaluate, kJson, true},
                                         {kTruths, kEvaluate, kJpeg},
                                         {kColored2d, kEvaluate, kJpeg},
                                         {kReport, kColorizeScene, kHtml, true, "report"},

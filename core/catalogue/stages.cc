@@ -60,7 +60,7 @@ const std::vector<Stage>& StageCatalogue() {
        .step = "personalization",
        .purpose = "surfaces that no key view shows get the colours of similar ones",
        .needs = {kScene, kKeyView, kKeyColor},
-       .reads = {kAugmentationFacts, kAugmentations, kCarried, kGeometry},
+       .reads = {kAugmentationFacts, kAugmentations, kCarried, kGeometry, kKeyViews},
        .runs_in_batch = true,
        .resumes = true,
        .keeps_time_limit = true},
@@ -68,7 +68,8 @@ const std::vector<Stage>& StageCatalogue() {
        .step = "view_colors",
        .purpose = "every view gets a colour at every pixel",
        .needs = {kScene, kColorizer},
-       .reads = {kCarried, kCarryFacts, kGeometry},
+       // The last three: methods without carried colours.
+       .reads = {kCarried, kCarryFacts, kGeometry, kKeyView, kKeyColor, kKeyViews},
        .resumes = true},
       {.kind = kCorrectColors,
        .step = "corrections",

@@ -4,10 +4,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/augment/elastic_options.h"
 #include "core/base/image.h"
 #include "core/color/relative_chroma.h"
 
@@ -23,7 +25,7 @@ inline constexpr int kMaxAdapterStages = 8;
 struct ColorizerOptions {
   enum class Recipe {
     kColor3d,  // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
-    kPaper,    // instance norm, rot90 + grid shuffle + elastic, lr 1e-4 -> 1e-6
+    kPaper,    // instance norm, adapters, rot90 + grid shuffle, lr 1e-4 -> 1e-6
   };
   // Precision of matrix products and convolutions in training. All else is float32.
   enum class Precision {
@@ -37,7 +39,7 @@ struct ColorizerOptions {
   // Limit of computing time, 0..86400; the schedule is shortened to fit. 0: no limit. Time spent
   // waiting for a turn in a batch does not count.
   double time_limit_seconds = 0.0;
-  int max_side_px = 400;            // of the key view during training, 64..2048
+  int max_side_px = 400;            // of the pictures during training, 64..4096
   int crop_px = 256;                // side of the training crops, 64..1024, clipped to the picture
   double learning_rate = 0.0;       // at the start of the schedule, 0..1; 0: recipe's default
   double consistency_weight = 0.0;  // the paper's A4 term, 0..1000; 0 = off
@@ -50,9 +52,21 @@ struct ColorizerOptions {
   // Number of the encoder's deepest stages with Conv-Adapters, 0..8; -1: the recipe's default
   // (kColor3d: none, kPaper: all).
   int adapter_stages = -1;
+  // Norm by each picture's statistics, else by those of the key view; unset: the recipe's default
+  // (kColor3d: false, kPaper: true).
+  std::optional<bool> instance_norm;
+  double max_gradient_norm = 1.0;  // gradients above it are scaled down to it, 0..1e6; 0: never
+  bool equal_draws = false;        // ignore TrainingPicture::share
+  // The decoder ends in a pixel shuffle to the size of the picture. If not, its output has the
+  // stride of the encoder's stem and is upsampled, guided by L.
+  bool full_resolution = false;
+  ElasticOptions elastic;
   double decoder_width = 1.0;  // factor of the decoder's channels, 0.25..4
+  bool augment = true;         // transform the training pictures; false: crop them only
+  bool neighbors = true;       // kColor3d: feature neighbors; false: the decoder alone
   uint64_t seed = 1;
-  // Sets the recipe and its crop of 320 px.
+  // Sets the recipe with its crop, sampling, resolution and elastic transform, without averaging
+  // and clipping (PAPER.md).
   void UsePaperRecipe();
   void Validate() const;
   bool operator==(const ColorizerOptions&) const = default;

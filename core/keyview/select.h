@@ -10,7 +10,7 @@
 
 namespace color3d {
 
-enum class KeyViewStrategy { kEntropy, kCoverage, kTracks, kManual };
+enum class KeyViewStrategy { kEntropy, kCoverage, kTracks, kManual, kRandom };
 
 struct KeyViewOptions {
   KeyViewStrategy strategy = KeyViewStrategy::kCoverage;

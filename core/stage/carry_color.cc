@@ -11,7 +11,7 @@ void CarryColorOptions::Validate() const {
   CheckMaxSide(max_side_px);
   const RangeCheck check("carry option");
   check("depth_side_px", depth_side_px, 64, 2048);
-  check("depth_sources", depth_sources, 1, kMaxSweepSources);
+  check("depth_sources", depth_sources, 0, kMaxSweepSources);
   if (additional_key_views.size() > size_t{kMaxAdditionalKeyViews}) {
     throw InvalidArgument("{} additional key views were given; at most {} are taken",
                           additional_key_views.size(),

@@ -15,6 +15,7 @@
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/key_view_ranking.h"
+#include "core/stage/formats/key_views.h"
 #include "core/stage/report/color_sections.h"
 #include "core/stage/report/key_view_section.h"
 #include "core/stage/report/repeat_section.h"
@@ -268,7 +269,10 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   std::optional<int> key;
   if (context.HasInput(artifact::kKeyView)) key = ReadKeyView(context, scene);
   std::vector<std::string> keys = ReadCarryFacts(context).key_views;
-  if (keys.empty() && key) keys = {scene.views[*key].name};
+  if (keys.empty() && key) {
+    keys = AdditionalKeyViewNames(context);
+    keys.insert(keys.begin(), scene.views[*key].name);
+  }
   const auto next = keys.empty() ? std::nullopt : AdviseNextKeyView(scene, keys, context);
   const ColorFacts colors(scene, context, next);
   const std::vector<CurvePoint> curves = CollectCurves(context);

@@ -28,7 +28,7 @@ class ColorizeViewsTest : public StageTest {
     AddInput(artifact::kGeometry, SerializeGaussians(geometry));
     std::filesystem::remove_all(scratch_.path() / "out");
     StageContext context = MakeContext();
-    RunColorizeViews(kWidth, context);
+    RunColorizeViews({.max_side_px = kWidth}, context);
     std::vector<std::string> files;
     for (const View& view : scene_.views) {
       files.push_back(ReadFile(scratch_.path() / "out" / ViewArtifact(artifact::kViewsAb, view)));

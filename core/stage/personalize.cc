@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "core/base/evenly.h"
 #include "core/carry/confidence.h"
@@ -13,6 +14,7 @@
 #include "core/scene/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/key_views.h"
 #include "core/stage/formats/training_pictures.h"
 #include "core/stage/run_stages.h"
 #include "core/stage/sources/view_positions.h"
@@ -33,7 +35,25 @@ void ExpectShapeOf(const Image& luminance, StageContext& context) {
       SizeText(luminance));
 }
 
-// Returns the coloured key view. Unpainted and masked pixels have weight 0.
+// Unpainted and masked pixels get weight 0.
+TrainingPicture PictureOf(const std::string& name, const Image& luminance, CarriedColor color) {
+  TrainingPicture picture{name, luminance, std::move(color.ab)};
+  const auto unpainted = [](float confidence) { return confidence == 0.0f; };
+  if (std::ranges::all_of(color.confidence.data, unpainted)) {
+    throw InvalidArgument(
+        "the painted (and unmasked) parts of {} are too fine at {} px; "
+        "paint areas, or give the picture as strokes, which spread",
+        name,
+        SizeText(luminance));
+  }
+  if (std::ranges::any_of(color.confidence.data, unpainted)) {
+    for (float& value : color.confidence.data) value = unpainted(value) ? 0.0f : 1.0f;
+    picture.weight = std::move(color.confidence);
+  }
+  return picture;
+}
+
+// Returns the coloured key view.
 TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageContext& context) {
   ExpectShapeOf(luminance, context);
   CarriedColor color = ReadKeyColor(context, luminance.width, luminance.height);
@@ -45,19 +65,21 @@ TrainingPicture KeyPicture(const Image& luminance, const Image* mask, StageConte
         "the scene will stay grey; colour it with hints or a picture",
         chroma.mean);
   }
-  TrainingPicture picture{"the key view", luminance, std::move(color.ab)};
-  const auto unpainted = [](float confidence) { return confidence == 0.0f; };
-  if (std::ranges::all_of(color.confidence.data, unpainted)) {
-    throw InvalidArgument(
-        "the painted (and unmasked) parts of the key view are too fine at {} px; "
-        "paint areas, or give the picture as strokes, which spread",
-        SizeText(luminance));
+  return PictureOf("the key view", luminance, std::move(color));
+}
+
+// Additional key views among the inputs: the colorizer is trained on all key views jointly.
+std::vector<TrainingPicture> AdditionalKeyPictures(const Scene& scene,
+                                                   const ViewImages& images,
+                                                   const StageContext& context) {
+  std::vector<TrainingPicture> pictures;
+  const std::vector<int> keys = ReadKeyViews(context, scene, AdditionalKeyViewNames(context));
+  for (size_t i = 1; i < keys.size(); ++i) {
+    CarriedColor color = ReadAdditionalKeyColor(context, scene, keys[i], images);
+    const std::string& name = scene.views[static_cast<size_t>(keys[i])].name;
+    pictures.push_back(PictureOf(name, *images.Luminance(keys[i]), std::move(color)));
   }
-  if (std::ranges::any_of(color.confidence.data, unpainted)) {
-    for (float& value : color.confidence.data) value = unpainted(value) ? 0.0f : 1.0f;
-    picture.weight = std::move(color.confidence);
-  }
-  return picture;
+  return pictures;
 }
 
 // Views with carried colours for training: those of highest coverage, without the key view.
@@ -123,7 +145,9 @@ void RunPersonalize(const ColorizerOptions& options,
       pictures.push_back(std::move(picture));
     }
   }
-  for (TrainingPicture& picture : CarriedPictures(scene, key, images, context)) {
+  std::vector<TrainingPicture> views = AdditionalKeyPictures(scene, images, context);
+  std::ranges::move(CarriedPictures(scene, key, images, context), std::back_inserter(views));
+  for (TrainingPicture& picture : views) {
     const int view = scene.FindView(picture.name);
     picture.position =
         positions.Of(view, images.WorkingCamera(view), picture.luminance, images.Mask(view).get());

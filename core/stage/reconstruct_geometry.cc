@@ -157,7 +157,7 @@ void RunReconstructGeometry(const GeometryOptions& options,
   const PictureSource still = StillRegionsOf(scene, images, context);
   // One place shows no surface from two sides.
   const Scene start =
-      options.recipe == GeometryOptions::Recipe::kPaper || scene.relief
+      options.recipe == GeometryOptions::Recipe::kPaper || !options.dense_start || scene.relief
           ? unmasked
           : WithDensePoints(unmasked, images, still, planned.max_gaussians, context.control());
   GeometryProblem problem = GeometryProblemOf(start, images);

@@ -3,11 +3,9 @@
 // file.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "core/carry/view_color.h"
 #include "core/catalogue/stage_summary.h"
 #include "core/colorizer/colorizer.h"
 #include "core/scene/import_options.h"
@@ -17,6 +15,7 @@
 #include "core/stage/context/stage_context.h"
 #include "core/stage/options/augmentation_options.h"
 #include "core/stage/options/carry_color_options.h"
+#include "core/stage/options/colorize_views_options.h"
 #include "core/stage/options/correct_colors_options.h"
 #include "core/stage/options/evaluate_options.h"
 #include "core/stage/options/export_options.h"
@@ -56,14 +55,11 @@ void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
                     const std::string& encoder = "");
 
-// Colours every view, with the sources of the colour, at max_side_px (64..4096). `encoder`: the one
-// that the colorizer was trained with.
-void RunColorizeViews(int max_side_px, StageContext& context, const std::string& encoder = "");
-// Sources of colour for views: the colorizer of the scene and the embedded automatic one.
-// `position` returns that of PictureFacts for a luminance. Requires: `colorizer` outlives the
-// result.
-ColorSources SourcesOf(const Colorizer& colorizer,
-                       std::function<Image(const Image& luminance)> position = {});
+// Colours every view, with the sources of the colour. `encoder`: the one that the colorizer was
+// trained with.
+void RunColorizeViews(const ColorizeViewsOptions& options,
+                      StageContext& context,
+                      const std::string& encoder = "");
 
 // Corrects the colours of every view where the user painted and in similar places near that
 // (STILL.md "Corrections"), or recolours ranges of time of a film. `encoder`: as in

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/base/random.h"
 #include "core/color/lab.h"
 #include "core/encoder/encoder.h"
 #include "core/image/codec.h"
@@ -27,6 +28,8 @@ const char* StrategyName(KeyViewStrategy strategy) {
       return "tracks";
     case KeyViewStrategy::kManual:
       return "manual";
+    case KeyViewStrategy::kRandom:
+      return "random";
     case KeyViewStrategy::kCoverage:
       break;
   }
@@ -58,6 +61,14 @@ std::vector<double> CoverageScores(const std::vector<ViewFeatures>& features,
                                    StageContext& context) {
   std::vector<double> scores = MeanFeatureDistances(features, kept, context.control());
   for (double& score : scores) score = -score;
+  return scores;
+}
+
+// A uniform number for each candidate, by the seed of the run.
+std::vector<double> RandomScores(size_t candidates, uint64_t seed) {
+  Random random(seed);
+  std::vector<double> scores(candidates);
+  for (double& score : scores) score = random.NextUniform();
   return scores;
 }
 
@@ -168,6 +179,8 @@ void ChooseByScore(const SelectKeyViewOptions& stage_options,
     scores = SoftmaxEntropies(descriptors, kept, options, context.pool());
   } else if (strategy == KeyViewStrategy::kCoverage) {
     scores = CoverageScores(ranking->features, kept, context);
+  } else if (strategy == KeyViewStrategy::kRandom) {
+    scores = RandomScores(candidates.size(), context.seed());
   }
   ranking->strategy = StrategyName(strategy);
   ranking->selection = RankViews(std::move(guarded), scores);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
@@ -23,6 +24,28 @@ TEST_F(StageTest, RefusesHeldOutManualKeyView) {
   RunSelectKeyView(options, context);
   const auto key = nlohmann::json::parse(ReadFile(scratch_.path() / "out/key_view.json"));
   EXPECT_EQ(key.at("view"), "p2.png");
+}
+
+TEST_F(StageTest, RandomKeyViewDependsOnSeedAlone) {
+  Scene scene = RampScene(scratch_.path(), 48, 32);
+  AddInput(artifact::kScene, SceneToJson(scene));
+  SelectKeyViewOptions options;
+  options.selection.strategy = KeyViewStrategy::kRandom;
+  options.selection.outlier_guard = false;
+  const auto select = [&](uint64_t seed) {
+    seed_ = seed;
+    StageContext context = MakeContext();
+    RunSelectKeyView(options, context);
+    const auto key = nlohmann::json::parse(ReadFile(scratch_.path() / "out/key_view.json"));
+    EXPECT_EQ(key.at("strategy"), "random");
+    return key.at("view").get<std::string>();
+  };
+  std::set<std::string> chosen;
+  for (uint64_t seed = 1; seed <= 8; ++seed) {
+    chosen.insert(select(seed));
+    EXPECT_EQ(select(seed), select(seed));
+  }
+  EXPECT_EQ(chosen, (std::set<std::string>{"p1.png", "p2.png"})) << "p0 is held out";
 }
 
 }  // namespace

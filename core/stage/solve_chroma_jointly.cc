@@ -20,11 +20,10 @@ constexpr double kMaxLimitSeconds = 86'400.0;  // GeometryOptions::Validate
 
 WarmUp ReadWarmUp(const StageContext& context) {
   if (!context.HasInput(artifact::kWarmUp)) {
-    throw Error(
-        ErrorCode::kFailedPrecondition,
-        "solve_chroma.solver is joint, but reconstruct_geometry left no training to go on "
-        "with; give reconstruct_geometry.recipe=paper and warm_up below 1 (the paper: 0.5), "
-        "or choose another solver");
+    throw Error(ErrorCode::kFailedPrecondition,
+                "solve_chroma.solver is joint, but reconstruct_geometry trained to the end; give "
+                "reconstruct_geometry.recipe=paper and warm_up below 1 (the paper: 0.5), "
+                "or choose another solver");
   }
   return ParseWarmUp(context.ReadInput(artifact::kWarmUp));
 }

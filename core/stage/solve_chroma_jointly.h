@@ -9,9 +9,9 @@
 
 namespace color3d {
 
-// Goes on with the training that reconstruct_geometry left (kWarmUp), on the colours of the views;
-// in RGB from the sparse points, by the same options. Writes kJointTraining. The model has no
-// confidence. Throws Error{kFailedPrecondition} if there is nothing to go on with.
+// Continues the training of reconstruct_geometry (kWarmUp) on the colours of the views. In RGB:
+// trains from the sparse points, by the same options. Writes kJointTraining. The model has no
+// confidence. Throws Error{kFailedPrecondition} without kWarmUp.
 GaussianModel SolveChromaJointly(const ChromaOptions& options,
                                  const Scene& scene,
                                  int key_view,

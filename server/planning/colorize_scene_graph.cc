@@ -124,6 +124,72 @@ std::string NoCarryReason(const ColorizeSceneSpec& given, const ColorizeSceneSpe
                                         : "the preset carries no colour";
 }
 
+bool TrainsJointly(const ColorizeSceneSpec& scene) {
+  return scene.carry_color().skip() && scene.carry_color().train_jointly();
+}
+
+struct MethodInputs {
+  bool colorizer = false;  // of the scene
+  bool carried = false;    // colours, also for training the colorizer
+};
+
+MethodInputs InputsOf(v1::ColorizeViewsSpec::Method method) {
+  switch (method) {
+    case v1::ColorizeViewsSpec::METHOD_CARRIED:
+      return {.carried = true};
+    case v1::ColorizeViewsSpec::METHOD_AUTOMATIC:
+    case v1::ColorizeViewsSpec::METHOD_FLOW:
+    case v1::ColorizeViewsSpec::METHOD_GRAY:
+      return {};
+    default:
+      return {.colorizer = true, .carried = true};
+  }
+}
+
+const std::string& NameOf(v1::ColorizeViewsSpec::Method method) {
+  return v1::ColorizeViewsSpec::Method_Name(method);
+}
+
+// Reason why the method of colorize_views leaves out a stage before it; empty if it does not.
+// Additional key views are carried in any case; corrections need the colorizer.
+std::string UnusedReason(const std::string& kind,
+                         const ColorizeSceneSpec& given,
+                         const ColorizeSceneSpec& scene) {
+  const auto method = scene.colorize_views().method();
+  const MethodInputs inputs = InputsOf(method);
+  const bool corrects = given.has_correct_colors() || !scene.correct_colors().corrections().empty();
+  const bool trains = kind == kind::kPersonalize || kind == kind::kGenerateAugmentations;
+  if (trains && !inputs.colorizer && !corrects) {
+    return "colorize_views.method is " + NameOf(method) + ", which uses no colorizer";
+  }
+  if (kind == kind::kCarryColor && !inputs.carried && !corrects &&
+      scene.carry_color().further_key_views().empty()) {
+    return "colorize_views.method is " + NameOf(method) + ", which uses no carried colours";
+  }
+  return "";
+}
+
+void CheckMethod(const ColorizeSceneSpec& scene) {
+  const auto method = scene.colorize_views().method();
+  const std::string is = "colorize_views.method is " + NameOf(method);
+  if (method == v1::ColorizeViewsSpec::METHOD_CARRIED && scene.carry_color().skip()) {
+    throw InvalidArgument("{}, but no colours are carried; set carry_color.skip to false", is);
+  }
+  const v1::PersonalizeSpec& training = scene.personalize();
+  if (method == v1::ColorizeViewsSpec::METHOD_NEAREST_NEIGHBORS &&
+      (training.recipe() == v1::PersonalizeSpec::RECIPE_PAPER ||
+       (training.has_neighbors() && !training.neighbors()))) {
+    throw InvalidArgument(
+        "{}, but the colorizer has no neighbours; set personalize.recipe to RECIPE_COLOR3D and "
+        "personalize.neighbors to true",
+        is);
+  }
+  if (method == v1::ColorizeViewsSpec::METHOD_DECODER && training.iterations() == 0) {
+    throw InvalidArgument(
+        "{}, but personalize.iterations is 0, so that the decoder is not trained; give some", is);
+  }
+}
+
 // Reason for generating no pictures; empty if they are generated. Files in augment/ are used on
 // request only.
 std::string NoAugmentationsReason(const ColorizeSceneSpec& scene, const SceneFacts& facts) {
@@ -190,6 +256,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
   if (submitted.inputs_size() > 0) CheckGiven(builder->given(), given);
   const bool is_film = !InfoOf(InfoOf(facts.layout).kind).is_reconstructed;
   CheckCorrections(scene, facts, is_film);
+  CheckMethod(scene);
   for (const Stage& stage : StageCatalogue()) {
     const std::string kind = stage.kind;
     if (kind == kind::kColorizeScene || kind == kind::kPersonalizeScenes) continue;
@@ -200,12 +267,18 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
       TrainAtFrameSize(scene.max_side_px(), spec.mutable_personalize());
     }
     std::string skip_reason;
-    if (kind == kind::kCarryColor) skip_reason = NoCarryReason(given, scene);
+    if (kind == kind::kCarryColor) {
+      skip_reason = NoCarryReason(given, scene);
+      if (TrainsJointly(scene)) {
+        builder->AddJointKeyViews(scene.carry_color().further_key_views());
+      }
+    }
     if (kind == kind::kCorrectColors && !given.has_correct_colors() &&
         scene.correct_colors().corrections().empty()) {
       skip_reason = "no corrections were given";
     }
     if (kind == kind::kGenerateAugmentations) skip_reason = NoAugmentationsReason(scene, facts);
+    if (skip_reason.empty()) skip_reason = UnusedReason(kind, given, scene);
     if (skip_reason.empty()) skip_reason = IdleReason(kind, facts, scene);
     builder->Add(std::move(spec), skip_reason);
   }

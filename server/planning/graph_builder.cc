@@ -129,6 +129,11 @@ int GraphBuilder::AddKeyView(const v1::FurtherKeyView& view) {
   return Append(std::move(job), spec);
 }
 
+void GraphBuilder::AddJointKeyViews(
+    const google::protobuf::RepeatedPtrField<v1::FurtherKeyView>& views) {
+  for (const v1::FurtherKeyView& view : views) joint_key_views_.push_back(AddKeyView(view));
+}
+
 void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   NewJob job;
   job.kind = KindOf(spec);
@@ -142,6 +147,9 @@ void GraphBuilder::Add(v1::JobSpec spec, const std::string& skip_reason) {
   for (const char* artifact : stage.reads) {
     const std::string provider = ProviderOf(artifact);
     if (linked.insert(provider).second) LinkIfThere(provider, &job);
+  }
+  if (job.kind == kind::kPersonalize || job.kind == kind::kColorizeViews) {
+    job.inputs.insert(job.inputs.end(), joint_key_views_.begin(), joint_key_views_.end());
   }
   fill_unset_(&spec);
   if (skip_reason.empty()) {

@@ -38,6 +38,10 @@ class GraphBuilder {
   // artifact that nothing provides.
   void Add(v1::JobSpec spec, const std::string& skip_reason = "");
 
+  // Appends a job that colours each of these additional key views. The jobs that train the
+  // colorizer and that colour the views, if added later, depend on them.
+  void AddJointKeyViews(const google::protobuf::RepeatedPtrField<v1::FurtherKeyView>& views);
+
   // Appends the submitted job as the parent of all others. It depends on them and on the inputs.
   void AddParent();
 
@@ -56,6 +60,7 @@ class GraphBuilder {
   const FillUnset fill_unset_;
   std::map<std::string, JobRecord> given_;  // by kind
   std::map<std::string, int> planned_;      // by kind: positions in graph_.jobs
+  std::vector<int> joint_key_views_;        // positions in graph_.jobs
   NewGraph graph_;
 };
 

@@ -54,7 +54,8 @@ TEST(Planner, TrainsAtTheSizeOfFrames) {
   EXPECT_EQ(size(true), 320);
   spec.mutable_colorize_scene()->clear_personalize();
   spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
-  EXPECT_EQ(size(true), 0);
+  EXPECT_EQ(size(true), 1200) << "the paper's: that of the scene";
+  EXPECT_EQ(size(false), 1200);
 }
 
 // As `color3d key accept` leaves it for `colorize --scene`.

@@ -69,6 +69,40 @@ TEST(Planner, EachAdditionalKeyViewIsAJob) {
   EXPECT_THAT(PlanError(spec).message, HasSubstr("colorize_key_view.view is set"));
 }
 
+TEST(Planner, JointTrainingReadsAllKeyViews) {
+  v1::JobSpec spec = SceneSpec();
+  v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
+  AddKeyView("b", scene->mutable_carry_color());
+  AddKeyView("a", scene->mutable_carry_color());
+  const auto read = [&](const char* kind) {
+    std::vector<std::string> views;
+    for (const auto& key : KeyViewsRead(PlanJob(spec, {}, kTwentyPhotos), kind)) {
+      views.push_back(key.view());
+    }
+    return views;
+  };
+  EXPECT_THAT(read(kind::kPersonalize), ElementsAre("")) << "carried by default";
+  for (const bool paper : {true, false}) {
+    scene->set_preset(paper ? v1::PRESET_PAPER : v1::PRESET_FAST);
+    if (!paper) scene->mutable_carry_color()->set_train_jointly(true);
+    EXPECT_THAT(read(kind::kPersonalize), ElementsAre("", "b", "a"));
+    EXPECT_THAT(read(kind::kColorizeViews), ElementsAre("", "b", "a"));
+    const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+    EXPECT_NE(graph.jobs[IndexOf(graph, kind::kCarryColor)].skip_reason, "");
+    EXPECT_EQ(graph.jobs.size(), 16u);
+  }
+  scene->mutable_carry_color()->set_skip(false);
+  EXPECT_THAT(read(kind::kCarryColor), ElementsAre("", "b", "a"));
+  EXPECT_THAT(read(kind::kPersonalize), ElementsAre(""));
+}
+
+TEST(Planner, RefusesJointTrainingInACarryJob) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/test");
+  spec.mutable_carry_color()->set_train_jointly(true);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("carry_color.train_jointly is set"));
+}
+
 TEST(Planner, AdditionalKeyViewsOfACarryJobAreColoredFirst) {
   v1::JobSpec spec;
   spec.set_scene("scenes/test");

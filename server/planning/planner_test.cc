@@ -37,7 +37,12 @@ TEST(Planner, ColorizeSceneExpandsToTheWholeGraph) {
       InputKinds(graph, "carry_color"),
       ElementsAre("import_scene", "select_key_view", "colorize_key_view", "reconstruct_geometry"));
   EXPECT_THAT(InputKinds(graph, "colorize_views"),
-              ElementsAre("import_scene", "personalize", "carry_color", "reconstruct_geometry"));
+              ElementsAre("import_scene",
+                          "personalize",
+                          "carry_color",
+                          "reconstruct_geometry",
+                          "select_key_view",
+                          "colorize_key_view"));
   EXPECT_THAT(InputKinds(graph, "solve_chroma"),
               ElementsAre("import_scene",
                           "select_key_view",
@@ -77,6 +82,59 @@ TEST(Planner, CorrectionsPrecedeChroma) {
   EXPECT_THAT(InputKinds(corrects, "evaluate"), Contains("correct_colors"));
   stroke->mutable_color()->set_automatic(true);
   EXPECT_THROW(PlanJob(spec, {}, kTwentyPhotos), Error);
+}
+
+TEST(Planner, BaselinesSkipStagesThatTheyDoNotUse) {
+  v1::JobSpec spec = SceneSpec();
+  v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
+  const auto reason = [&](const char* kind) {
+    const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+    return graph.jobs[IndexOf(graph, kind)].skip_reason;
+  };
+  EXPECT_EQ(reason("personalize"), "");
+  EXPECT_EQ(reason("carry_color"), "");
+  scene->mutable_colorize_views()->set_method(v1::ColorizeViewsSpec::METHOD_FLOW);
+  EXPECT_THAT(reason("personalize"), HasSubstr("METHOD_FLOW, which uses no colorizer"));
+  EXPECT_THAT(reason("carry_color"), HasSubstr("METHOD_FLOW, which uses no carried colours"));
+  EXPECT_THAT(InputKinds(PlanJob(spec, {}, kTwentyPhotos), "colorize_views"),
+              Not(Contains("personalize")));
+  scene->mutable_colorize_views()->set_method(v1::ColorizeViewsSpec::METHOD_CARRIED);
+  EXPECT_THAT(reason("personalize"), HasSubstr("uses no colorizer"));
+  EXPECT_EQ(reason("carry_color"), "");
+  EXPECT_EQ(SpecOf(PlanJob(spec, {}, kTwentyPhotos), "colorize_views").colorize_views().method(),
+            v1::ColorizeViewsSpec::METHOD_CARRIED);
+  scene->mutable_colorize_views()->set_method(v1::ColorizeViewsSpec::METHOD_GRAY);
+  scene->mutable_correct_colors();
+  EXPECT_EQ(reason("personalize"), "") << "corrections use it";
+}
+
+TEST(Planner, AdditionalKeyViewsOfBaselinesAreCarried) {
+  v1::JobSpec spec = SceneSpec();
+  v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
+  scene->mutable_colorize_views()->set_method(v1::ColorizeViewsSpec::METHOD_FLOW);
+  v1::FurtherKeyView* key = scene->mutable_carry_color()->add_further_key_views();
+  key->set_view("a");
+  *key->mutable_color() = scene->key_color();
+  const NewGraph graph = PlanJob(spec, {}, kTwentyPhotos);
+  EXPECT_EQ(graph.jobs[IndexOf(graph, "carry_color")].skip_reason, "");
+}
+
+TEST(Planner, RefusesMethodsWithoutTheirInput) {
+  v1::JobSpec spec = SceneSpec();
+  v1::ColorizeSceneSpec* scene = spec.mutable_colorize_scene();
+  scene->mutable_colorize_views()->set_method(v1::ColorizeViewsSpec::METHOD_CARRIED);
+  scene->mutable_carry_color()->set_skip(true);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("METHOD_CARRIED, but no colours are carried"));
+  scene->mutable_colorize_views()->set_method(v1::ColorizeViewsSpec::METHOD_DECODER);
+  scene->mutable_personalize()->set_iterations(0);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("personalize.iterations is 0"));
+  scene->mutable_colorize_views()->set_method(v1::ColorizeViewsSpec::METHOD_NEAREST_NEIGHBORS);
+  EXPECT_NO_THROW(PlanJob(spec, {}, kTwentyPhotos));
+  scene->mutable_personalize()->set_recipe(v1::PersonalizeSpec::RECIPE_PAPER);
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("the colorizer has no neighbours"));
+  scene->mutable_colorize_views()->clear_method();
+  scene->mutable_colorize_views()->set_encoder("tiny");
+  EXPECT_THAT(PlanError(spec).message, HasSubstr("name it in personalize.encoder"));
 }
 
 TEST(Planner, ExplicitFieldsWinOverThePreset) {

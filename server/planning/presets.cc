@@ -92,25 +92,28 @@ v1::ColorizeSceneSpec WithPreset(const v1::ColorizeSceneSpec& given) {
   v1::ColorizeSceneSpec merged = OptionsOf(given.preset());
   MergeOver(given, &merged);
   MoveRangesToCorrections(&merged);
-  // Additional key views need carry_color, even if the preset skips it.
-  if (!merged.carry_color().further_key_views().empty()) {
-    merged.mutable_carry_color()->clear_skip();
+  // Additional key views are carried, even if the preset skips that, or trained on jointly.
+  v1::CarryColorSpec* carry = merged.mutable_carry_color();
+  if (carry->train_jointly()) {
+    if (!given.carry_color().has_skip()) carry->set_skip(true);
+  } else if (!carry->further_key_views().empty()) {
+    carry->clear_skip();
   }
   const auto take_size = [&](auto* stage) {
     if (!stage->has_max_side_px()) stage->set_max_side_px(merged.max_side_px());
   };
   take_size(merged.mutable_carry_color());
+  take_size(merged.mutable_colorize_views());
   take_size(merged.mutable_reconstruct_geometry());
   take_size(merged.mutable_render());
+  if (merged.personalize().recipe() == v1::PersonalizeSpec::RECIPE_PAPER) {
+    take_size(merged.mutable_personalize());
+    if (merged.has_generate_augmentations()) take_size(merged.mutable_generate_augmentations());
+  }
   return merged;
 }
 
 void FillStage(const v1::ColorizeSceneSpec& scene, v1::JobSpec* spec) {
-  if (spec->has_colorize_views()) {  // not a field of ColorizeSceneSpec
-    auto* views = spec->mutable_colorize_views();
-    if (!views->has_max_side_px()) views->set_max_side_px(scene.max_side_px());
-    return;
-  }
   const std::string kind = KindOf(*spec);
   const FieldDescriptor* options = scene.GetDescriptor()->FindFieldByName(kind);
   if (options == nullptr) return;

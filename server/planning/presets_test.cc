@@ -96,10 +96,25 @@ TEST(WithPreset, SizeOfAStageWinsOverThatOfTheScene) {
   EXPECT_EQ(merged.render().max_side_px(), 100);
 }
 
-TEST(WithPreset, AdditionalKeyViewsAreCarriedInEveryPreset) {
+TEST(WithPreset, PaperTrainsAtTheSizeOfTheScene) {
+  v1::ColorizeSceneSpec given = Given(v1::PRESET_PAPER);
+  given.set_max_side_px(640);
+  EXPECT_EQ(WithPreset(given).personalize().max_side_px(), 640);
+  EXPECT_EQ(WithPreset(given).generate_augmentations().max_side_px(), 640);
+  given.mutable_personalize()->set_max_side_px(400);
+  EXPECT_EQ(WithPreset(given).personalize().max_side_px(), 400);
+  EXPECT_FALSE(WithPreset({}).personalize().has_max_side_px());
+}
+
+TEST(WithPreset, AdditionalKeyViewsAreCarriedUnlessTrainedJointly) {
   v1::ColorizeSceneSpec given = Given(v1::PRESET_PAPER);
   given.mutable_carry_color()->add_further_key_views()->set_view("a");
+  EXPECT_TRUE(WithPreset(given).carry_color().skip());
+  given.mutable_carry_color()->set_train_jointly(false);
   EXPECT_FALSE(WithPreset(given).carry_color().skip());
+  given.set_preset(v1::PRESET_FAST);
+  given.mutable_carry_color()->set_train_jointly(true);
+  EXPECT_TRUE(WithPreset(given).carry_color().skip());
   given = Given(v1::PRESET_PAPER);
   given.mutable_carry_color()->set_skip(false);
   EXPECT_FALSE(WithPreset(given).carry_color().skip());

@@ -217,10 +217,17 @@ void CheckCarryColor(const v1::CarryColorSpec& spec, bool of_whole_scene, const 
              fmt::format(" has a range of time: it corrects a coloured film and belongs to {}",
                          kind::kCorrectColors));
     }
-    if (!HasRange(key) && spec.skip()) {
+    if (!HasRange(key) && spec.skip() && !spec.train_jointly()) {
       Reject(path + ".skip",
-             " is set, but further_key_views need the stage; leave one of them out");
+             " is set, but further_key_views need the stage; leave one of them out, or set "
+             "train_jointly");
     }
+  }
+  if (spec.train_jointly() && !of_whole_scene) {
+    Reject(path + ".train_jointly",
+           fmt::format(" is set, but it is an option of {}, for it concerns other stages; leave it "
+                       "out",
+                       kind::kColorizeScene));
   }
 }
 
@@ -290,6 +297,11 @@ void CheckColorizeScene(const v1::ColorizeSceneSpec& spec, bool has_inputs) {
     Reject(fmt::format("{}.view", kind::kColorizeKeyView),
            " is set, but a whole scene names its key view in key_view and additional ones in "
            "carry_color.further_key_views");
+  }
+  if (!spec.colorize_views().encoder().empty()) {
+    Reject(fmt::format("{}.encoder", kind::kColorizeViews),
+           " is set, but a whole scene is coloured with the encoder that its colorizer is trained "
+           "with; name it in personalize.encoder");
   }
   if (spec.key_view().empty()) CheckStrategy(spec.select_key_view(), kind::kSelectKeyView);
   CheckCarryColor(spec.carry_color(), /*of_whole_scene=*/true, kind::kCarryColor);

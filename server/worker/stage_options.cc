@@ -18,6 +18,39 @@ ColorizerOptions::Precision PrecisionFrom(v1::PersonalizeSpec::Precision precisi
   }
 }
 
+ColorizeViewsOptions::Method MethodFrom(v1::ColorizeViewsSpec::Method method) {
+  using Method = ColorizeViewsOptions::Method;
+  switch (method) {
+    case v1::ColorizeViewsSpec::METHOD_PERSONALIZED:
+      return Method::kPersonalized;
+    case v1::ColorizeViewsSpec::METHOD_NEAREST_NEIGHBORS:
+      return Method::kNearestNeighbors;
+    case v1::ColorizeViewsSpec::METHOD_DECODER:
+      return Method::kDecoder;
+    case v1::ColorizeViewsSpec::METHOD_CARRIED:
+      return Method::kCarried;
+    case v1::ColorizeViewsSpec::METHOD_AUTOMATIC:
+      return Method::kAutomatic;
+    case v1::ColorizeViewsSpec::METHOD_FLOW:
+      return Method::kFlow;
+    case v1::ColorizeViewsSpec::METHOD_GRAY:
+      return Method::kGray;
+    default:
+      return Method::kFusion;
+  }
+}
+
+void SetElastic(const v1::PersonalizeSpec& spec, ElasticOptions* elastic) {
+  if (spec.elastic() != v1::PersonalizeSpec::ELASTIC_UNSPECIFIED) {
+    elastic->kind = spec.elastic() == v1::PersonalizeSpec::ELASTIC_NOISE
+                        ? ElasticOptions::Kind::kNoise
+                        : ElasticOptions::Kind::kSpline;
+  }
+  if (spec.has_elastic_alpha_px()) elastic->alpha_px = spec.elastic_alpha_px();
+  if (spec.has_elastic_sigma_px()) elastic->sigma_px = spec.elastic_sigma_px();
+  if (spec.has_elastic_affine_px()) elastic->affine_px = spec.elastic_affine_px();
+}
+
 // Throws if the job was planned by a version whose stages coloured additional key views themselves.
 void RequireColoredBefore(const v1::FurtherKeyView& key) {
   if (!key.has_color()) return;
@@ -78,6 +111,9 @@ SelectKeyViewOptions SelectOptionsFrom(const v1::SelectKeyViewSpec& spec) {
     case v1::SelectKeyViewSpec::STRATEGY_TRACKS:
       options.selection.strategy = KeyViewStrategy::kTracks;
       break;
+    case v1::SelectKeyViewSpec::STRATEGY_RANDOM:
+      options.selection.strategy = KeyViewStrategy::kRandom;
+      break;
     case v1::SelectKeyViewSpec::STRATEGY_MANUAL:
       options.selection.strategy = KeyViewStrategy::kManual;
       break;
@@ -118,6 +154,12 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
   ColorizerOptions options;
   options.seed = seed;
   if (spec.recipe() == v1::PersonalizeSpec::RECIPE_PAPER) options.UsePaperRecipe();
+  SetElastic(spec, &options.elastic);
+  if (spec.has_max_gradient_norm()) options.max_gradient_norm = spec.max_gradient_norm();
+  if (spec.has_equal_draws()) options.equal_draws = spec.equal_draws();
+  if (spec.has_full_resolution()) options.full_resolution = spec.full_resolution();
+  if (spec.has_adapter_stages()) options.adapter_stages = spec.adapter_stages();
+  if (spec.has_instance_norm()) options.instance_norm = spec.instance_norm();
   if (spec.has_iterations()) options.iterations = spec.iterations();
   if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
@@ -126,6 +168,8 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
   options.precision = PrecisionFrom(spec.precision());
   if (spec.has_average_decay()) options.average_decay = spec.average_decay();
   if (spec.has_min_improvement()) options.min_improvement = spec.min_improvement();
+  if (spec.has_augment()) options.augment = spec.augment();
+  if (spec.has_neighbors()) options.neighbors = spec.neighbors();
   return options;
 }
 
@@ -138,10 +182,21 @@ CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec) {
     options.carry.luminance_tolerance = spec.luminance_tolerance();
   if (spec.has_depth_side_px()) options.depth_side_px = spec.depth_side_px();
   if (spec.has_depth_sources()) options.depth_sources = spec.depth_sources();
+  if (spec.has_flow_check() && !spec.flow_check()) options.carry.flow_tolerance_px = 0.0;
   for (const v1::FurtherKeyView& key : spec.further_key_views()) {
     RequireColoredBefore(key);
     options.additional_key_views.push_back(key.view());
   }
+  return options;
+}
+
+ColorizeViewsOptions ColorizeViewsOptionsFrom(const v1::ColorizeViewsSpec& spec) {
+  ColorizeViewsOptions options;
+  if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();
+  options.method = MethodFrom(spec.method());
+  if (spec.has_guess()) options.guess = spec.guess();
+  if (spec.has_spread()) options.spread = spec.spread();
+  options.full_size = spec.full_size();
   return options;
 }
 
@@ -172,6 +227,7 @@ GeometryOptions GeometryOptionsFrom(const v1::ReconstructGeometrySpec& spec, uin
   if (spec.recipe() == v1::ReconstructGeometrySpec::RECIPE_PAPER) {
     options.recipe = GeometryOptions::Recipe::kPaper;
   }
+  if (spec.has_dense_start()) options.dense_start = spec.dense_start();
   if (spec.still()) options.motion = GeometryOptions::Motion::kStill;
   if (spec.deformation() == v1::ReconstructGeometrySpec::DEFORMATION_HEXPLANE) {
     options.deformation = GeometryOptions::Deformation::kHexPlane;

@@ -18,6 +18,7 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
 // Throws Error{kFailedPrecondition} for jobs of a version that did not plan jobs for additional key
 // views.
 CarryColorOptions CarryOptionsFrom(const v1::CarryColorSpec& spec);
+ColorizeViewsOptions ColorizeViewsOptionsFrom(const v1::ColorizeViewsSpec& spec);
 // The caller, which has the blobs, sets corrections without a time range. Throws like
 // CarryOptionsFrom.
 CorrectColorsOptions CorrectOptionsFrom(const v1::CorrectColorsSpec& spec);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "core/base/error.h"
 #include "core/catalogue/stages.h"
@@ -119,6 +120,25 @@ TEST(ColorizerOptionsFromTest, ConvertsSetFields) {
   EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kAuto);
 }
 
+TEST(ColorizeViewsOptionsFromTest, ConvertsEveryMethod) {
+  const auto* methods = v1::ColorizeViewsSpec::Method_descriptor();
+  std::set<ColorizeViewsOptions::Method> converted;
+  for (int i = 1; i < methods->value_count(); ++i) {  // 0: unspecified
+    v1::ColorizeViewsSpec spec;
+    spec.set_method(static_cast<v1::ColorizeViewsSpec::Method>(methods->value(i)->number()));
+    converted.insert(ColorizeViewsOptionsFrom(spec).method);
+  }
+  EXPECT_EQ(static_cast<int>(converted.size()), methods->value_count() - 1);
+}
+
+TEST(CarryOptionsFromTest, FlowCheckIsFlowTolerance) {
+  v1::CarryColorSpec spec;
+  spec.set_flow_tolerance_px(2.0);
+  EXPECT_EQ(CarryOptionsFrom(spec).carry.flow_tolerance_px, 2.0);
+  spec.set_flow_check(false);
+  EXPECT_EQ(CarryOptionsFrom(spec).carry.flow_tolerance_px, 0.0);
+}
+
 // Conversion and validation of the options of a stage in the method library.
 struct Method {
   std::function<void(const Message&)> validate;
@@ -183,8 +203,9 @@ const std::map<std::string, Method>& Methods() {
        })},
       {"personalize",
        MakeMethod<v1::PersonalizeSpec>([](const auto& s) { return ColorizerOptionsFrom(s, 1); })},
-      {"colorize_views",
-       MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) { return MaxSideFrom(s); })},
+      {"colorize_views", MakeMethod<v1::ColorizeViewsSpec>([](const auto& s) {
+         return ColorizeViewsOptionsFrom(s);
+       })},
       {"carry_color",
        MakeMethod<v1::CarryColorSpec>([](const auto& s) { return CarryOptionsFrom(s); })},
       {"correct_colors",

@@ -213,9 +213,7 @@ class CoreStageRunner : public StageRunner {
         return RunCorrectColors(
             CorrectOptions(spec.correct_colors(), blobs), context, spec.correct_colors().encoder());
       case JobSpec::kColorizeViews:
-        return RunColorizeViews(spec.colorize_views().has_max_side_px()
-                                    ? spec.colorize_views().max_side_px()
-                                    : kDefaultMaxSidePx,
+        return RunColorizeViews(ColorizeViewsOptionsFrom(spec.colorize_views()),
                                 context,
                                 spec.colorize_views().encoder());
       case JobSpec::kReconstructGeometry:

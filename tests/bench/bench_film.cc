@@ -168,8 +168,9 @@ class FilmBench {
       RunPersonalize(options, context);
     });
     const double trained = Seconds();
-    pipeline_.Run(kind::kColorizeViews,
-                  [&](StageContext& context) { RunColorizeViews(args_.max_side_px, context); });
+    pipeline_.Run(kind::kColorizeViews, [&](StageContext& context) {
+      RunColorizeViews({.max_side_px = args_.max_side_px}, context);
+    });
     const double colored = Seconds();
     pipeline_.Run(kind::kEvaluate, [&](StageContext& context) {
       const Scene scene = ReadScene(context);

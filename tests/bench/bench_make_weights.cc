@@ -7,6 +7,7 @@
 #include "core/base/files.h"
 #include "core/weights/safetensors.h"
 #include "tests/bench/commands.h"
+#include "tests/support/networks/random_features.h"
 #include "tests/support/networks/synthetic_networks.h"
 
 namespace color3d {
@@ -23,6 +24,13 @@ WeightMap Make(const MakeWeightsArguments& args) {
   if (args.kind == "ddcolor-tiny") return SyntheticDdcolorWeights({}, args.seed);
   if (args.kind == "ddcolor-mini") {
     return SyntheticDdcolorWeights(SyntheticDdcolor::Mini(), args.seed);
+  }
+  if (args.kind == "encoder") {
+    WeightMap weights;
+    for (auto& [name, array] : RandomFeatureWeights(ConvNextConfig(), args.seed)) {
+      weights["encoder." + name] = array;
+    }
+    return weights;
   }
   if (args.kind == "clip-mini") return SyntheticClipWeights({}, args.seed);
   SyntheticClip base;  // ViT-B/32
@@ -58,7 +66,7 @@ void AddMakeWeightsCommand(CLI::App& app) {
       "make-weights", "Write a safetensors file with random weights in a published layout");
   command->add_option("file", args->file, "File to write")->required();
   command->add_option("--kind", args->kind, "Network")
-      ->check(CLI::IsMember({"ddcolor-tiny", "ddcolor-mini", "clip-b32", "clip-mini"}));
+      ->check(CLI::IsMember({"ddcolor-tiny", "ddcolor-mini", "clip-b32", "clip-mini", "encoder"}));
   command->add_flag("--half", args->half, "Write float16");
   command->add_option("--seed", args->seed, "Seed");
   command->callback([args] { RunMakeWeights(*args); });

@@ -112,7 +112,8 @@ void RunPipeline(const PipelineArguments& args) {
   ColorizerOptions colorizer = args.colorizer;
   if (args.paper) colorizer.UsePaperRecipe();
   run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
-  run(kind::kColorizeViews, [&](StageContext& c) { RunColorizeViews(args.max_side_px, c); });
+  run(kind::kColorizeViews,
+      [&](StageContext& c) { RunColorizeViews({.max_side_px = args.max_side_px}, c); });
   run(kind::kSolveChroma, [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
   if (args.score_training) {
     pipeline.Run("score_training", [&](StageContext& c) {

@@ -1,135 +1,96 @@
-// color3d-bench suite: runs scenes x variants of `color3d-bench pipeline`, each in its own process,
-// so that a crash costs one run. Resumable. Prints a table at the end.
-#include <algorithm>
+// color3d-bench suite: scenes x presets x seeds through the real client and a private server, which
+// never sees a colour of held-out views. Resumable. Writes a table, a page and all rows.
 #include <cstdio>
 #include <set>
-#include <sstream>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/process/subprocess.h"
-#include "core/stage/formats/artifact_io.h"
 #include "tests/bench/commands.h"
-#include "tests/bench/suite_results.h"
+#include "tests/bench/suite/suite_page.h"
+#include "tests/bench/suite/suite_plan.h"
+#include "tests/bench/suite/suite_rows.h"
+#include "tests/bench/suite/suite_runner.h"
+#include "tests/bench/suite/suite_table.h"
 
 namespace color3d {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct SuiteArguments {
-  std::vector<std::string> scenes;
-  std::vector<std::string> variants;  // NAME or NAME=ARGUMENTS
-  std::string common;
-  std::string out_folder;
-  std::string baseline;
-  int timeout_seconds = 3600;
+  std::string manifest, data, table, out, commit;
+  std::vector<std::string> scenes, presets, server_options;
+  int seeds = 1;
+  SuiteLimits limits;
   bool table_only = false;
 };
 
-std::vector<std::string> Words(const std::string& text) {
-  std::istringstream stream(text);
-  std::vector<std::string> words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
-}
-
-// "{scene}" stands for the scene's name.
-std::string WithScene(std::string word, const std::string& scene_name) {
-  constexpr std::string_view kPlace = "{scene}";
-  for (size_t at = 0; (at = word.find(kPlace, at)) != std::string::npos; at += scene_name.size()) {
-    word.replace(at, kPlace.size(), scene_name);
+// Adds commit and machine to every row.
+class LabelledRunner : public TaskRunner {
+ public:
+  LabelledRunner(std::unique_ptr<TaskRunner> runner, std::string commit)
+      : runner_(std::move(runner)), commit_(std::move(commit)), machine_(MachineName()) {}
+  SuiteRow Run(const SuiteTask& task, double limit_seconds) override {
+    SuiteRow row = runner_->Run(task, limit_seconds);
+    row.commit = commit_;
+    row.machine = machine_;
+    return row;
   }
-  return word;
-}
 
-std::vector<SuiteRun> PlannedRuns(const SuiteArguments& args) {
-  std::vector<SuiteRun> runs;
-  std::set<std::string> names;
-  for (const std::string& scene : args.scenes) {
-    if (const SuiteRun named{scene}; !names.insert(named.SceneName()).second) {
-      throw InvalidArgument("two scenes are named " + named.SceneName() +
-                            "; their results would overwrite each other: rename a folder");
-    }
-    for (const std::string& text : args.variants) {
-      SuiteRun run;
-      run.scene = scene;
-      const size_t end = text.find('=');
-      run.variant = text.substr(0, end);
-      if (!IsSafeRelativePath(run.variant) || run.variant.find('/') != std::string::npos) {
-        throw InvalidArgument("\"" + text + "\" is not a variant; give NAME or NAME=OPTIONS");
-      }
-      run.arguments = Words(args.common);
-      if (end != std::string::npos) {
-        for (std::string& word : Words(text.substr(end + 1))) {
-          run.arguments.push_back(std::move(word));
-        }
-      }
-      for (std::string& word : run.arguments) word = WithScene(word, run.SceneName());
-      runs.push_back(std::move(run));
-    }
-  }
-  return runs;
-}
+ private:
+  std::unique_ptr<TaskRunner> runner_;
+  std::string commit_, machine_;
+};
 
-// Returns false if the run failed; its log has the reason.
-bool RunOne(const SuiteArguments& args, SuiteRun* run) {
-  const std::filesystem::path folder =
-      std::filesystem::path(args.out_folder) / run->SceneName() / run->variant;
-  std::filesystem::create_directories(folder);
-  std::filesystem::remove(folder / artifact::kMetrics);  // of an earlier run
-  SubprocessOptions child;
-  child.arguments = {std::filesystem::read_symlink("/proc/self/exe").string(),
-                     "pipeline",
-                     "--scene",
-                     run->scene,
-                     "--out",
-                     folder.string()};
-  child.arguments.insert(child.arguments.end(), run->arguments.begin(), run->arguments.end());
-  child.log_path = folder / "log.txt";
-  child.timeout = std::chrono::seconds(args.timeout_seconds);
-  const SubprocessResult result = RunSubprocess(child, CancellationToken());
-  run->seconds = result.seconds;
-  if (result.exit_code != 0 || !std::filesystem::exists(folder / artifact::kMetrics)) {
-    std::fprintf(stderr,
-                 "%s, %s: failed with code %d after %.0f s, see %s\n",
-                 run->scene.c_str(),
-                 run->variant.c_str(),
-                 result.exit_code,
-                 result.seconds,
-                 child.log_path.c_str());
-    return false;
+void WriteTables(const SuiteArguments& args,
+                 const std::vector<SuiteRow>& rows,
+                 const std::vector<SuitePreset>& presets) {
+  const fs::path out = args.out;
+  const std::vector<SceneResults> scenes = SummarizeScenes(rows, presets);
+  const std::vector<PresetSummary> summaries = SummarizePresets(scenes, presets);
+  const std::vector<ClaimResult> claims = TestClaims(scenes);
+  std::set<std::string> machines, commits;
+  for (const SuiteRow& row : rows) {
+    machines.insert(row.machine);
+    if (!row.commit.empty()) commits.insert(row.commit);
   }
-  run->metrics = nlohmann::ordered_json::parse(ReadFile(folder / artifact::kMetrics));
-  std::fprintf(
-      stderr, "%s, %s: %.0f s\n", run->scene.c_str(), run->variant.c_str(), result.seconds);
-  return true;
+  std::string note = std::to_string(rows.size()) + " runs";
+  for (const std::string& machine : machines) note += "; " + machine;
+  for (const std::string& commit : commits) note += "; commit " + commit;
+  const std::string markdown = SuiteMarkdown(scenes, summaries, claims);
+  WriteFileAtomic(out / "results.csv", SuiteCsv(rows));
+  WriteFileAtomic(out / "table.md", note + ".\n\n" + markdown);
+  WriteFileAtomic(out / "index.html", SuitePage(scenes, summaries, claims, note + "."));
+  std::printf("%s", markdown.c_str());
 }
 
 void RunSuite(const SuiteArguments& args) {
-  std::filesystem::create_directories(args.out_folder);
-  const std::filesystem::path jsonl = std::filesystem::path(args.out_folder) / "results.jsonl";
-  const std::vector<SuiteRun> finished = ReadSuiteResults(jsonl);
-  std::vector<SuiteRun> shown;
-  int failed = 0;
-  for (SuiteRun& run : PlannedRuns(args)) {
-    const auto earlier = std::find_if(
-        finished.begin(), finished.end(), [&](const SuiteRun& f) { return f.SameWork(run); });
-    if (earlier != finished.end()) {
-      shown.push_back(*earlier);
-    } else if (args.table_only) {
-      continue;
-    } else if (RunOne(args, &run)) {
-      AppendSuiteResult(jsonl, run);
-      shown.push_back(std::move(run));
-    } else {
-      ++failed;
-    }
+  const SuiteScenes scenes = ReadManifest(args.manifest, args.data);
+  for (const std::string& name : scenes.missing) {
+    std::fprintf(stderr, "%s: not in %s, left out\n", name.c_str(), args.data.c_str());
   }
-  const std::string table = SuiteTable(shown, args.baseline);
-  WriteFileAtomic(std::filesystem::path(args.out_folder) / "table.md", table);
-  std::printf("%s", table.c_str());
-  if (failed > 0) {
-    throw Error(ErrorCode::kAborted,
-                std::to_string(failed) + " runs failed; repeat the command to retry them");
+  const std::vector<SuitePreset> table = ReadPresetTable(args.table);
+  const std::vector<SuiteTask> tasks =
+      PlanSuite(SelectScenes(scenes, args.scenes), SelectPresets(table, args.presets), args.seeds);
+  if (tasks.empty()) {
+    throw InvalidArgument(
+        "there is nothing to run: no scene of {} is in {}", args.manifest, args.data);
+  }
+  fs::create_directories(args.out);
+  const fs::path jsonl = fs::path(args.out) / "results.jsonl";
+  int left = 0;
+  if (!args.table_only) {
+    const CancellationToken never;
+    left = RunTasks(tasks, args.limits, jsonl, [&]() -> std::unique_ptr<TaskRunner> {
+      const fs::path programs = fs::read_symlink("/proc/self/exe").parent_path();
+      return std::make_unique<LabelledRunner>(
+          std::make_unique<ClientRunner>(programs, args.out, args.server_options, never),
+          args.commit);
+    });
+  }
+  WriteTables(args, NewestRows(ReadRows(jsonl)), table);
+  if (left > 0) {
+    std::fprintf(stderr, "%d runs are left; repeat the command to go on\n", left);
   }
 }
 
@@ -138,23 +99,42 @@ void RunSuite(const SuiteArguments& args) {
 void AddSuiteCommand(CLI::App& app) {
   auto args = std::make_shared<SuiteArguments>();
   CLI::App* command = app.add_subcommand(
-      "suite", "Run variants of `pipeline` on several scenes, resumable, and tabulate the results");
-  command->add_option("--scene", args->scenes, "Folders of photos")->required();
+      "suite", "Run presets and baselines on several scenes, resumable, and tabulate the results");
+  command->add_option("--manifest", args->manifest, "Scenes (JSON), e.g. tests/bench/suite.json")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("--data", args->data, "Folder that the paths of the manifest begin in")
+      ->required()
+      ->check(CLI::ExistingDirectory);
   command
-      ->add_option("--variant",
-                   args->variants,
-                   "Variant: NAME or NAME=OPTIONS of `pipeline`, e.g. \"paper=--paper\"; {scene} "
-                   "in it stands for the name of the scene. May be repeated")
-      ->required();
-  command->add_option("--common", args->common, "Options of all variants, e.g. \"--bound\"");
+      ->add_option("--table",
+                   args->table,
+                   "Table of presets (Markdown), e.g. tests/bench/baselines/README.md")
+      ->required()
+      ->check(CLI::ExistingFile);
   command
-      ->add_option(
-          "--out", args->out_folder, "Folder for results.jsonl, table.md and SCENE/VARIANT/")
+      ->add_option("--out",
+                   args->out,
+                   "Folder for results.jsonl, results.csv, table.md, index.html and the runs")
       ->required();
-  command->add_option("--baseline", args->baseline, "Variant that ratios refer to");
-  command->add_option("--timeout", args->timeout_seconds, "Time limit of a run, s")
+  command->add_option("--scenes", args->scenes, "Names of scenes; default: all of the manifest");
+  command->add_option("--presets", args->presets, "Names of presets; default: all of the table");
+  command->add_option("--seeds", args->seeds, "Number of seeds")
+      ->check(CLI::Range(1, 100))
       ->capture_default_str();
-  command->add_flag("--table-only", args->table_only, "Only print the table of existing results");
+  command
+      ->add_option("--budget",
+                   args->limits.budget_seconds,
+                   "Time for all runs, e.g. 90s, 30m, 2h; default: no limit")
+      ->transform(
+          CLI::AsNumberWithUnit(std::map<std::string, double>{{"s", 1}, {"m", 60}, {"h", 3600}}));
+  command->add_option("--timeout", args->limits.run_seconds, "Time limit of a run, s")
+      ->capture_default_str();
+  command->add_flag("--retry-failed", args->limits.retry_failed, "Repeat the runs that failed");
+  command->add_option(
+      "--server", args->server_options, "Further options of `color3d-server serve`, e.g. --model");
+  command->add_option("--commit", args->commit, "Commit that the rows state");
+  command->add_flag("--table-only", args->table_only, "Only write the tables of existing rows");
   command->callback([args] { RunSuite(*args); });
 }
 

@@ -71,7 +71,7 @@ class FilmTest : public ServiceTest {
   fs::path WriteVideo() {
     ThreadPool pool(1);
     Mp4Writer writer(Path("walk.mp4"),
-                     {.width = kWidth, .height = kHeight, .frames_per_second = 12, .threads = 1});
+                     {.width = kWidth, .height = kHeight, .frames_per_second = 12});
     for (int i = 0; i < kFrames; ++i) writer.Add(FrameOf(i), pool);
     writer.Finish();
     return Path("walk.mp4");

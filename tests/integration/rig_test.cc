@@ -32,7 +32,7 @@ class RigTest : public ServiceTest {
     for (int camera = 0; camera < made_.cameras(); ++camera) {
       const std::string name = "cam0" + std::to_string(camera);
       Mp4Writer writer(Path("rig") / (name + ".mp4"),
-                       {.width = 128, .height = 96, .frames_per_second = 8, .threads = 1});
+                       {.width = 128, .height = 96, .frames_per_second = 8});
       for (int time = 0; time < made_.times(); ++time) {
         writer.Add(made_.RenderSrgb(made_.ViewOf(camera, time)), pool);
       }

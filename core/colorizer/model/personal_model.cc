@@ -53,10 +53,12 @@ PersonalModel::PersonalModel(const TapEncoder& encoder,
     AddLevel("decoder." + std::to_string(i) + ".", in, width(i), random);
   }
   // A small head: the first predictions stay near the mean colour of the key view.
-  head_ = NewParameter("head.weight", {2, width(0), 3, 3}, 0.1 * HeDeviation(9 * width(0)), random);
-  head_bias_ = NewConstant("head.bias", {2}, 0.0f);
-  head_bias_[0] = mean_ab[0];
-  head_bias_[1] = mean_ab[1];
+  const int stride = encoder.config().stem_stride;
+  const int64_t pixels = config.full_resolution ? stride * stride : 1;  // outputs per channel
+  head_ = NewParameter(
+      "head.weight", {2 * pixels, width(0), 3, 3}, 0.1 * HeDeviation(9 * width(0)), random);
+  head_bias_ = NewConstant("head.bias", {2 * pixels}, 0.0f);
+  for (int64_t i = 0; i < 2 * pixels; ++i) head_bias_[i] = mean_ab[i / pixels];
   if (config.HasAdapters()) AddAdapters(random);
 }
 
@@ -257,7 +259,8 @@ torch::Tensor PersonalModel::Decode(const std::vector<torch::Tensor>& taps,
     x = LeakyRelu(Fuse(level, taps[i], x, l));
     for (const ResidualBlock& block : level.blocks) x = RunBlock(block, x);
   }
-  return Conv(x, head_, head_bias_).to(torch::kFloat32);
+  const torch::Tensor ab = Conv(x, head_, head_bias_).to(torch::kFloat32);
+  return config_.full_resolution ? torch::pixel_shuffle(ab, encoder_.config().stem_stride) : ab;
 }
 
 torch::Tensor PersonalModel::Forward(const torch::Tensor& luminance) const {

@@ -21,6 +21,8 @@ struct PersonalModelConfig {
   int adapter_kernel = 7;
   int adapter_reduction = 8;   // gamma
   double decoder_width = 1.0;  // factor on DecoderWidth()
+  // The head has an output for each pixel of the stride, which a pixel shuffle puts in its place.
+  bool full_resolution = false;
   // Matrix products and convolutions in bfloat16 (parameters, sums and statistics stay float32):
   // several times faster on processors with instructions for it. For training only.
   bool half_products = false;
@@ -42,9 +44,10 @@ class PersonalModel {
 
   const PersonalModelConfig& config() const { return config_; }
   const std::string& EncoderDigest() const { return encoder_.digest(); }
-  int OutputStride() const { return encoder_.config().stem_stride; }
+  // 1 at full resolution, else the stride of the first tap.
+  int OutputStride() const { return config_.full_resolution ? 1 : encoder_.config().stem_stride; }
 
-  // Returns ab / kAbScale at the first tap's stride, [B,2,H/s,W/s], for L [B,1,H,W] (0..100).
+  // Returns ab / kAbScale at the output's stride, [B,2,H/s,W/s], for L [B,1,H,W] (0..100).
   // Requires: H and W are multiples of the last tap's stride.
   torch::Tensor Forward(const torch::Tensor& luminance) const;
   // Forward from given taps. Requires: no adapters.

@@ -37,5 +37,17 @@ TEST_F(PersonalModelTest, FreezesStatisticsOfKeyView) {
   EXPECT_GT((u - v).abs().max().item<double>(), 1e-5);
 }
 
+TEST_F(PersonalModelTest, AnswersEachPixelAtFullResolution) {
+  torch::NoGradGuard no_grad;
+  const torch::Tensor luminance = torch::rand({1, 1, 64, 96}) * 100.0;
+  const PersonalModel coarse = MakeModel();
+  EXPECT_EQ(coarse.Forward(luminance).size(3) * coarse.OutputStride(), 96);
+  EXPECT_GT(coarse.OutputStride(), 1);
+  recipe_.model.full_resolution = true;
+  const PersonalModel fine = MakeModel();
+  EXPECT_EQ(fine.OutputStride(), 1);
+  EXPECT_EQ(fine.Forward(luminance).sizes(), torch::IntArrayRef({1, 2, 64, 96}));
+}
+
 }  // namespace
 }  // namespace color3d

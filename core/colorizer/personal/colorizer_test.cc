@@ -92,15 +92,61 @@ TEST(ColorizerTest, LearnsTheKeyView) {
 
 TEST(ColorizerTest, RestoresSameColorizerFromFile) {
   const Key key = MakeKey(96, 80);
-  for (auto recipe : {ColorizerOptions::Recipe::kColor3d, ColorizerOptions::Recipe::kPaper}) {
-    ColorizerOptions options = Quick(3);
-    options.recipe = recipe;
+  ColorizerOptions paper;
+  paper.UsePaperRecipe();
+  paper.elastic.alpha_px = 34.0;
+  ColorizerOptions old_paper;  // of files of earlier versions
+  old_paper.recipe = ColorizerOptions::Recipe::kPaper;
+  for (ColorizerOptions options : {ColorizerOptions(), paper, old_paper}) {
+    options.iterations = 3;
+    options.crop_px = 64;
     const auto trained = Train(key, options);
     const std::string bytes = trained->Serialize();
     const auto loaded = LoadColorizer(bytes, TheEncoder(), 1);
     EXPECT_EQ(loaded->Colorize(key.luminance).data, trained->Colorize(key.luminance).data);
     EXPECT_EQ(loaded->Serialize(), bytes);
   }
+}
+
+TEST(ColorizerTest, DefaultFileHasNoLaterOptions) {
+  const std::string bytes = Train(MakeKey(64, 64), Quick(0))->Serialize();
+  for (const char* name : {"elastic", "equal_draws", "full_resolution", "max_gradient_norm"}) {
+    EXPECT_EQ(bytes.find(name), std::string::npos) << name;
+  }
+}
+
+TEST(ColorizerTest, EqualDrawsIgnoreShares) {
+  const Key key = MakeKey(96, 80);
+  TrainingPicture other{"other", key.luminance, Image(96, 80, 2, 20.0f)};
+  other.share = 0.0;
+  ColorizerOptions options = Quick(20);
+  options.neighbors = false;
+  const auto trained = [&](bool equal_draws) {
+    options.equal_draws = equal_draws;
+    ThreadPool pool(1);
+    NoCheckpoints checkpoints;
+    NullObserver progress;
+    return TrainColorizer(TheEncoder(),
+                          {{"key", key.luminance, key.ab}, other},
+                          options,
+                          {pool, checkpoints, progress, {}})
+        ->Colorize(key.luminance);
+  };
+  const double without = MeanError(key.luminance, key.ab, trained(false));
+  EXPECT_GT(MeanError(key.luminance, key.ab, trained(true)), 1.1 * without);
+}
+
+TEST(ColorizerTest, FullSizeDoesNotReducePictures) {
+  ColorizerOptions options = Quick(3);
+  options.max_side_px = 96;
+  const std::string bytes = Train(MakeKey(96, 80), options)->Serialize();
+  const auto answer = [&](const Image& luminance, bool full_size) {
+    const PredictionOptions prediction{.full_size = full_size};
+    return LoadColorizer(bytes, TheEncoder(), 1, prediction)->Colorize(luminance).data;
+  };
+  const Image small = MakeKey(64, 96).luminance, large = MakeKey(192, 160).luminance;
+  EXPECT_EQ(answer(small, true), answer(small, false));
+  EXPECT_NE(answer(large, true), answer(large, false));
 }
 
 TEST(ColorizerTest, FileKeepsNetworkSize) {

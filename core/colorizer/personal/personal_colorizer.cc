@@ -38,7 +38,7 @@ PersonalColorizer::PersonalColorizer(Parts parts)
     : parts_(std::move(parts)), recipe_(RecipeFor(parts_.options)) {
   const double trained =
       parts_.curve.empty() ? 0.0 : static_cast<double>(parts_.curve.back().iteration);
-  trust_ = 1.0 - std::exp(-trained / recipe_.trust_iterations);
+  if (parts_.decodes) trust_ = 1.0 - std::exp(-trained / recipe_.trust_iterations);
   torch::NoGradGuard no_grad;
   parts_.model->RequireGradients(false);
   parts_.model->set_half_products(false);
@@ -105,8 +105,8 @@ torch::Tensor PersonalColorizer::Padded(const Image& small) {
 
 void PersonalColorizer::SetThreads() const { SetTorchThreads(parts_.threads); }
 
-Image PersonalColorizer::AtTrainingSize(const Image& luminance) const {
-  return FitWithin(luminance, parts_.options.max_side_px);
+Image PersonalColorizer::AtInferenceSize(const Image& luminance) const {
+  return parts_.full_size ? luminance : FitWithin(luminance, parts_.options.max_side_px);
 }
 
 ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tensor>& taps,
@@ -118,7 +118,9 @@ ColorPrediction PersonalColorizer::PredictFromTaps(const std::vector<torch::Tens
                               padded,
                               WantedCells(facts.known, small),
                               FitTo(facts.position, small.width, small.height));
-  const Image fine = UpsampleGuided(ImageFromTensor(answer.ab), ImageFromTensor(padded));
+  const Image coarse_ab = ImageFromTensor(answer.ab);
+  const bool is_fine = parts_.model->OutputStride() == 1;
+  const Image fine = is_fine ? coarse_ab : UpsampleGuided(coarse_ab, ImageFromTensor(padded));
   ColorPrediction prediction;
   prediction.ab = Crop(fine, 0, 0, small.width, small.height);
   if (answer.distance.defined()) {
@@ -155,7 +157,7 @@ ColorPrediction PersonalColorizer::Predict(const Image& luminance,
   return WithTorchErrors("colorizer", [&] {
     torch::NoGradGuard no_grad;
     SetThreads();
-    const Image small = AtTrainingSize(luminance);
+    const Image small = AtInferenceSize(luminance);
     const torch::Tensor padded = Padded(small);
     return PredictFromTaps(parts_.model->Taps(padded), padded, small, luminance, facts);
   });
@@ -197,7 +199,10 @@ std::string PersonalColorizer::Serialize() const {
 }
 
 std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
-    std::string_view bytes, std::shared_ptr<const TapEncoder> encoder, int threads) {
+    std::string_view bytes,
+    std::shared_ptr<const TapEncoder> encoder,
+    int threads,
+    const PredictionOptions& use) {
   TensorFile file = ReadTensorFile(bytes, kColorizerFormat, kWhat);
   Parts parts;
   bool has_neighbors = false;
@@ -231,6 +236,13 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
   if (!file.arrays.empty()) {
     throw InvalidArgument(
         "{} has an unknown array {}", kWhat, QuotedName(file.arrays.begin()->first));
+  }
+  if (use.parts == ColorizerParts::kDecoder) parts.neighbors.reset();
+  parts.decodes = use.parts != ColorizerParts::kNeighbors;
+  parts.full_size = use.full_size;
+  if (!parts.decodes && !has_neighbors) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "the colorizer was trained without nearest neighbours; train another one");
   }
   return std::make_shared<const PersonalColorizer>(std::move(parts));
 }

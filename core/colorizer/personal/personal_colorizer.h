@@ -12,6 +12,7 @@
 #include "core/colorizer/corrector.h"
 #include "core/colorizer/model/personal_model.h"
 #include "core/colorizer/neighbors/feature_neighbors.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/training/recipe.h"
 #include "core/colorizer/training/training_session.h"
 
@@ -26,7 +27,9 @@ class PersonalColorizer : public Colorizer {
     std::unique_ptr<FeatureNeighbors> neighbors;  // may be null
     RelativeChroma relative_chroma;
     std::vector<TrainingPoint> curve;
-    int threads = 0;  // for prediction; 0: one per core
+    int threads = 0;         // for prediction; 0: one per core
+    bool decodes = true;     // false: neighbors alone predict
+    bool full_size = false;  // PredictionOptions::full_size
   };
   // Rounds the model's parameters to half precision, as in colorizer files.
   explicit PersonalColorizer(Parts parts);
@@ -38,14 +41,14 @@ class PersonalColorizer : public Colorizer {
   std::string Serialize() const override;
 
   // Steps of Predict, for callers that run the encoder over several pictures at once. They pass the
-  // frozen taps (UsesFrozenTaps) of Padded(AtTrainingSize(luminance)).
+  // frozen taps (UsesFrozenTaps) of Padded(AtInferenceSize(luminance)).
   static void Check(const Image& luminance);
   static std::pair<int, int> PaddedSize(const Image& small);  // width, height
   static torch::Tensor Padded(const Image& small);
   bool UsesFrozenTaps() const { return !recipe_.model.HasAdapters(); }
   const TapEncoder& encoder() const { return *parts_.encoder; }
   void SetThreads() const;
-  Image AtTrainingSize(const Image& luminance) const;
+  Image AtInferenceSize(const Image& luminance) const;
   ColorPrediction PredictFromTaps(const std::vector<torch::Tensor>& taps,
                                   const torch::Tensor& padded,
                                   const Image& small,
@@ -54,7 +57,8 @@ class PersonalColorizer : public Colorizer {
 
   static std::shared_ptr<const Colorizer> Deserialize(std::string_view bytes,
                                                       std::shared_ptr<const TapEncoder> encoder,
-                                                      int threads);
+                                                      int threads,
+                                                      const PredictionOptions& use);
 
  private:
   struct Answer {

@@ -61,7 +61,7 @@ std::vector<Image> ColorizeRouted(std::span<const RoutedPicture> pictures,
     const Colorizer& colorizer = *colorizers.at(pictures[i].scene);
     const auto* personal = dynamic_cast<const PersonalColorizer*>(&colorizer);
     if (personal != nullptr && personal->UsesFrozenTaps()) {
-      jobs.push_back({personal, &luminance, &answers[i], personal->AtTrainingSize(luminance)});
+      jobs.push_back({personal, &luminance, &answers[i], personal->AtInferenceSize(luminance)});
     } else {
       answers[i] = colorizer.Colorize(luminance);  // adapters run inside the encoder
     }

@@ -182,7 +182,10 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
     SceneBatch alone(control.pool.thread_count());
     SceneBatch::Membership membership(place ? place->batch : alone, place ? place->project : "");
     std::optional<SceneBatch::Turn> turn(std::in_place, membership, control.cancel);
-    for (TrainingPicture& picture : pictures) FitWithin(options.max_side_px, &picture);
+    for (TrainingPicture& picture : pictures) {
+      FitWithin(options.max_side_px, &picture);
+      if (options.equal_draws) picture.share = 1.0;
+    }
     auto parts = Prepare(std::move(taps), pictures, options, recipe, control.cancel);
     TrainingSession session(pictures, options, recipe, *parts.model);
     session.Resume(control.checkpoints.Load(), control.progress);
@@ -198,9 +201,10 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
 
 std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
-                                               int threads) {
+                                               int threads,
+                                               const PredictionOptions& options) {
   return WithTorchErrors("colorizer file", [&] {
-    return PersonalColorizer::Deserialize(bytes, RequireTaps(encoder), threads);
+    return PersonalColorizer::Deserialize(bytes, RequireTaps(encoder), threads, options);
   });
 }
 

@@ -17,7 +17,7 @@ namespace color3d {
 // Trains a colorizer. `pictures`: the undistorted key view first (statistics, neighbors and
 // held-out augmentations are taken from it), then other pictures of the scene, of any size. Reports
 // "train_l1_ab" and "validation_delta_e00", the latter on augmentations of the key view that are
-// never trained on. Gradients are clipped; a non-finite loss restores the last good state, halves
+// never trained on. A non-finite loss restores the last good state, halves
 // the step and warns. Resumable. With a `place`, training takes turns with the other scenes of the
 // batch. The result does not depend on the batch or the number of threads, bit for bit. The
 // colorizer predicts on as many threads as the pool has.
@@ -27,11 +27,20 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
                                                 const RunControl& control,
                                                 const std::optional<BatchPlace>& place = {});
 
+// Parts of a colorizer that predict colours (STILL.md "Blend of neighbours and decoder").
+enum class ColorizerParts { kBoth, kNeighbors, kDecoder };
+
+struct PredictionOptions {
+  ColorizerParts parts = ColorizerParts::kBoth;
+  bool full_size = false;  // pictures larger than the training size are not reduced
+};
+
 // Reads a colorizer file. The colorizer predicts on `threads` threads; 0: one per core. Throws
 // Error{kInvalidArgument} if the file is damaged, kFailedPrecondition naming both digests if it was
-// trained on another encoder.
+// trained on another encoder, or if options.parts is kNeighbors and it has none.
 std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
-                                               int threads = 0);
+                                               int threads = 0,
+                                               const PredictionOptions& options = {});
 
 }  // namespace color3d

@@ -33,7 +33,7 @@ double Adam::Step(double learning_rate, double max_norm) {
     return norm;
   }
   ++steps_;
-  const double clip = norm > max_norm ? max_norm / norm : 1.0;
+  const double clip = max_norm > 0.0 && norm > max_norm ? max_norm / norm : 1.0;
   const double correction1 = 1.0 - std::pow(kBeta1, static_cast<double>(steps_));
   const double correction2 = 1.0 - std::pow(kBeta2, static_cast<double>(steps_));
   for (size_t i = 0; i < parameters_.size(); ++i) {

@@ -29,6 +29,14 @@ TEST(AdamTest, AgreesWithFormulaInFloat64) {
   }
 }
 
+TEST(AdamTest, DoesNotClipAtNormZero) {
+  torch::Tensor x = torch::tensor({3.0f}).requires_grad_(true);
+  Adam adam({{"x", x}});
+  (x * 50.0).sum().backward();
+  adam.Step(0.1, 0.0);
+  EXPECT_NEAR(adam.Moments()[0].second.item<float>(), 0.1f * 50.0f, 1e-4f);
+}
+
 TEST(AdamTest, IgnoresNonFiniteGradient) {
   torch::Tensor x = torch::tensor({3.0f}).requires_grad_(true);
   Adam adam({{"x", x}});

@@ -53,12 +53,34 @@ void ForEachNumber(Options& options, const Visit& visit) {
   visit("seed", options.seed);
 }
 
+// As ForEachNumber, of the options that earlier versions do not have.
+template <typename Options, typename Visit>
+void ForEachLaterOption(Options& options, const Visit& visit) {
+  visit("max_gradient_norm", options.max_gradient_norm);
+  visit("equal_draws", options.equal_draws);
+  visit("full_resolution", options.full_resolution);
+  visit("elastic_alpha_px", options.elastic.alpha_px);
+  visit("elastic_sigma_px", options.elastic.sigma_px);
+  visit("elastic_affine_px", options.elastic.affine_px);
+}
+
 }  // namespace
 
 nlohmann::json JsonFromOptions(const ColorizerOptions& options) {
   nlohmann::json json{{"recipe", NameOf(kRecipes, options.recipe)},
                       {"precision", NameOf(kPrecisions, options.precision)}};
   ForEachNumber(options, [&](const char* name, const auto& value) { json[name] = value; });
+  // Only what differs: colorizer files of the defaults are those of earlier versions.
+  if (!options.augment) json["augment"] = false;
+  if (!options.neighbors) json["use_neighbors"] = false;
+  const ColorizerOptions unset;
+  nlohmann::json defaults;
+  ForEachLaterOption(unset, [&](const char* name, const auto& value) { defaults[name] = value; });
+  ForEachLaterOption(options, [&](const char* name, const auto& value) {
+    if (defaults[name] != value) json[name] = value;
+  });
+  if (options.elastic.kind == ElasticOptions::Kind::kNoise) json["elastic"] = "noise";
+  if (options.instance_norm) json["instance_norm"] = *options.instance_norm;
   return json;
 }
 
@@ -68,6 +90,12 @@ ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
   options.precision = FromName(
       kPrecisions, "precision", json.value("precision", NameOf(kPrecisions, options.precision)));
   ForEachNumber(options, [&](const char* name, auto& value) { value = json.value(name, value); });
+  options.augment = json.value("augment", options.augment);
+  options.neighbors = json.value("use_neighbors", options.neighbors);
+  ForEachLaterOption(options,
+                     [&](const char* name, auto& value) { value = json.value(name, value); });
+  if (json.contains("elastic")) options.elastic.kind = ElasticOptions::Kind::kNoise;
+  if (json.contains("instance_norm")) options.instance_norm = json.at("instance_norm").get<bool>();
   return options;
 }
 

@@ -26,8 +26,13 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
     recipe.warmup_iterations = 0;
     recipe.neighbors = false;
   }
+  recipe.neighbors = recipe.neighbors && options.neighbors;
+  recipe.augment.elastic = options.elastic;
+  if (!options.augment) recipe.augment = AugmentOptions::CropsOnly();
   if (options.adapter_stages >= 0) recipe.model.adapter_stages = options.adapter_stages;
   recipe.model.decoder_width = options.decoder_width;
+  recipe.model.full_resolution = options.full_resolution;
+  if (options.instance_norm) recipe.model.instance_norm = *options.instance_norm;
   if (options.learning_rate > 0.0) recipe.first_learning_rate = options.learning_rate;
   recipe.model.half_products =
       options.precision == ColorizerOptions::Precision::kBfloat16 ||

@@ -15,7 +15,6 @@ struct TrainingRecipe {
   double first_learning_rate = 1e-3;
   double last_learning_rate = 1e-6;  // cosine
   int warmup_iterations = 20;
-  double max_gradient_norm = 1.0;
   bool neighbors = true;
   FeatureNeighborsOptions neighbor_options;
   // Share of the neighbors in the blend with the decoder, by their agreement on a colour:

@@ -99,7 +99,7 @@ bool TrainingSession::TrainOn(const TrainingSample& sample) {
   if (course_.running_loss > 0.0 && value > kExplosion * course_.running_loss + kDriftFloor)
     return false;
   loss.backward();
-  if (!std::isfinite(adam_.Step(LearningRate(), recipe_.max_gradient_norm))) return false;
+  if (!std::isfinite(adam_.Step(LearningRate(), options_.max_gradient_norm))) return false;
   course_.running_loss = course_.running_loss > 0.0
                              ? kLossMemory * course_.running_loss + (1.0 - kLossMemory) * value
                              : value;

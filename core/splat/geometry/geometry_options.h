@@ -102,7 +102,8 @@ struct GeometryOptions {
   // Gaussians, as in 4D Gaussian splatting.
   enum class Deformation { kWindows, kHexPlane };
   Deformation deformation = Deformation::kWindows;
-  int iterations = 1500;  // 0..100000
+  bool dense_start = true;  // kColor3d: also start from points of plane sweeps
+  int iterations = 1500;    // 0..100000
   // Seconds of training, 0: none, at most 86400. The whole schedule fits into this time or the
   // iterations, whichever ends first; equal inputs give similar results, not equal ones.
   double time_limit_seconds = 0.0;

@@ -332,7 +332,7 @@ class GeometryTrainer {
       const int level = schedule_.Level(fraction_, camera);
       run_.progress.OnProgress(
           state_.iteration,
-          std::llround(static_cast<double>(state_.iteration) / std::max(fraction_, 1e-9)),
+          std::llround(end_ * static_cast<double>(state_.iteration) / std::max(fraction_, 1e-9)),
           fmt::format("geometry, {} Gaussians at {}x{} px",
                       Count(),
                       SizeAtLevel(camera.width, level),

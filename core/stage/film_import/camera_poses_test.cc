@@ -119,9 +119,8 @@ TEST_F(CameraPosesTest, AppliesTimeOffsetsOfVideos) {
   ThreadPool pool(1);
   for (const std::string camera : {"left", "right"}) {
     const Camera lens = LensOf(camera);
-    Mp4Writer writer(
-        scratch_.path() / (camera + ".mp4"),
-        {.width = lens.width, .height = lens.height, .frames_per_second = 10, .threads = 1});
+    Mp4Writer writer(scratch_.path() / (camera + ".mp4"),
+                     {.width = lens.width, .height = lens.height, .frames_per_second = 10});
     for (int i = 0; i < kFrames; ++i) {
       const Image gray = RenderCorner(lens, PoseOf(camera, i), BoardAt(i));
       Image srgb(gray.width, gray.height, 3);

@@ -31,7 +31,7 @@ class FootageTest : public StageTest {
   void WriteFilm(const std::string& name, double began_s, bool with_sound = true) {
     ThreadPool pool(1);
     const fs::path silent = scratch_.path() / "silent.mp4";
-    Mp4Writer writer(silent, {.width = 64, .height = 48, .frames_per_second = 10, .threads = 1});
+    Mp4Writer writer(silent, {.width = 64, .height = 48, .frames_per_second = 10});
     for (int i = 0; i < 10 * kSeconds; ++i) writer.Add(Image(64, 48, 3, 0.5f), pool);
     writer.Finish();
     const fs::path file = scratch_.path() / name;

@@ -26,9 +26,8 @@ class ImportCameraFilmsTest : public StageTest {
   static double Gray(int camera, int frame) { return 0.2 + 0.2 * camera + 0.02 * frame; }
   void WriteFilm(int camera, int frames, double frames_per_second = 10) {
     ThreadPool pool(1);
-    Mp4Writer writer(
-        scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
-        {.width = kWidth, .height = kHeight, .frames_per_second = frames_per_second, .threads = 1});
+    Mp4Writer writer(scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
+                     {.width = kWidth, .height = kHeight, .frames_per_second = frames_per_second});
     for (int i = 0; i < frames; ++i) {
       writer.Add(Image(kWidth, kHeight, 3, static_cast<float>(Gray(camera, i))), pool);
     }

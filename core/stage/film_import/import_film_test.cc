@@ -46,7 +46,7 @@ class ImportFilmTest : public StageTest {
   void WriteVideo(int frames, int frames_of_first_place) {
     ThreadPool pool(1);
     Mp4Writer writer(scratch_.path() / "film.mp4",
-                     {.width = kWidth, .height = kHeight, .frames_per_second = 10, .threads = 1});
+                     {.width = kWidth, .height = kHeight, .frames_per_second = 10});
     for (int i = 0; i < frames; ++i) {
       writer.Add(FrameOf(i < frames_of_first_place ? 1 : 2, i), pool);
     }
@@ -232,7 +232,7 @@ TEST_F(ImportFilmTest, RefusesFourHoursWithRemedy) {
 TEST_F(ImportFilmTest, AcceptsDuplicateFrames) {
   ThreadPool pool(1);
   Mp4Writer writer(scratch_.path() / "film.mp4",
-                   {.width = kWidth, .height = kHeight, .frames_per_second = 24, .threads = 1});
+                   {.width = kWidth, .height = kHeight, .frames_per_second = 24});
   for (int i = 0; i < 30; ++i) writer.Add(FrameOf(1, i / 3 * 5), pool);
   writer.Finish();
   for (const View& view : Import().views) EXPECT_EQ(view.moment->shot, 0) << view.name;
@@ -283,7 +283,7 @@ TEST_F(ImportFilmTest, SteadiesExposure) {
   fs::remove_all(scratch_.path() / "frames");
   ThreadPool pool(1);
   Mp4Writer writer(scratch_.path() / "film.mp4",
-                   {.width = kWidth, .height = kHeight, .frames_per_second = 10, .threads = 1});
+                   {.width = kWidth, .height = kHeight, .frames_per_second = 10});
   for (int i = 0; i < 16; ++i) writer.Add(exposed(i), pool);
   writer.Finish();
   EXPECT_LT(flicker(Import({.deflicker = true})), 0.02);

@@ -63,6 +63,14 @@ std::vector<std::string> AdditionalKeyViewFolders(const StageContext& context) {
   }
 }
 
+std::vector<std::string> AdditionalKeyViewNames(const StageContext& context) {
+  std::vector<std::string> names;
+  for (const std::string& folder : AdditionalKeyViewFolders(context)) {
+    names.push_back(ReadJson(context, folder + artifact::kKeyColorFacts).value("view", ""));
+  }
+  return names;
+}
+
 CarriedColor ReadAdditionalKeyColor(const StageContext& context,
                                     const Scene& scene,
                                     int view,

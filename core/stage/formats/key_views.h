@@ -26,6 +26,9 @@ std::vector<int> ReadKeyViews(const StageContext& context,
 // the key views were given. They end in "/".
 std::vector<std::string> AdditionalKeyViewFolders(const StageContext& context);
 
+// Names of these key views, in the same order.
+std::vector<std::string> AdditionalKeyViewNames(const StageContext& context);
+
 // Colours of an additional key view, of the size of `images`. Their confidence is 0 where the view
 // is not painted or is masked out. Throws Error{kFailedPrecondition} when no input has them.
 CarriedColor ReadAdditionalKeyColor(const StageContext& context,

@@ -56,7 +56,7 @@ class RecolorRangesTest : public StageTest {
     AddInput(artifact::kKeyColor, EncodeAbPng(ab));
     RunForInputs([](StageContext& context) { RunCarryColor({}, context); });
     RunForInputs([](StageContext& context) { RunPersonalize({.iterations = 0}, context); });
-    RunForInputs([](StageContext& context) { RunColorizeViews(kWidth, context); });
+    RunForInputs([](StageContext& context) { RunColorizeViews({.max_side_px = kWidth}, context); });
   }
   std::vector<std::string> Recolor(const std::vector<RangeKeyView>& keys) {
     return RunForInputs([&](StageContext& context) {

@@ -73,7 +73,8 @@ void ColorAll(const Arguments& args, const Problem& problem, int second, LocalPi
     options.max_side_px = args.side_px;
     RunPersonalize(options, c);
   });
-  pipeline->Run(kind::kColorizeViews, [&](StageContext& c) { RunColorizeViews(args.side_px, c); });
+  pipeline->Run(kind::kColorizeViews,
+                [&](StageContext& c) { RunColorizeViews({.max_side_px = args.side_px}, c); });
 }
 
 // Mean CIEDE2000 of the photos' colours under their true L, over all training views.

@@ -46,6 +46,7 @@ class StageTest : public ::testing::Test {
                          .inputs = inputs_,
                          .output_folder = scratch_.path() / "out",
                          .scratch_folder = scratch_.path(),
+                         .seed = seed_,
                          .memory_bytes = memory_bytes_,
                          .models = models_,
                          .remote_colorizers = remote_},
@@ -81,6 +82,7 @@ class StageTest : public ::testing::Test {
   CheckpointStore* checkpoints_ = &none_;
   Warnings observer_;
   CancellationToken cancel_;
+  uint64_t seed_ = 1;
   int64_t memory_bytes_ = 0;
   std::map<std::string, std::filesystem::path> models_;
   RemoteColorizerFactory remote_;

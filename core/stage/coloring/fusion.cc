@@ -1,0 +1,62 @@
+#include <utility>
+
+#include "core/keycolor/automatic/automatic.h"
+#include "core/stage/coloring/view_coloring.h"
+#include "core/stage/film/color_frames.h"
+#include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/carry_facts.h"
+
+namespace color3d {
+
+ColorSources SourcesOf(const Colorizer& colorizer,
+                       std::function<Image(const Image& luminance)> position) {
+  return {
+      [&colorizer, position = std::move(position)](const Image& luminance, const Image& known) {
+        ColorPrediction predicted =
+            colorizer.Predict(luminance, {known, position ? position(luminance) : Image()});
+        return InferredColor{std::move(predicted.ab), std::move(predicted.distance)};
+      },
+      [](const Image& luminance) { return AutomaticColorizer::Embedded()->Colorize(luminance).ab; },
+      colorizer.relative_chroma()};
+}
+
+void ColorByFusion(const ViewColoring& coloring, StageContext& context) {
+  const Scene& scene = coloring.scene;
+  const ViewImages& images = coloring.images;
+  ViewsCheckpoint& done = coloring.done;
+  const auto sources = [&](int number) {
+    ColorSources of_view = SourcesOf(*coloring.colorizer, [&, number](const Image& luminance) {
+      return coloring.positions.Of(
+          number, images.WorkingCamera(number), luminance, images.Mask(number).get());
+    });
+    of_view.spread = coloring.options.spread;
+    if (coloring.options.guess) return of_view;
+    // Without distances nothing is guessed.
+    of_view.infer = [infer = std::move(of_view.infer)](const Image& luminance, const Image& known) {
+      return InferredColor{infer(luminance, known).ab, Image()};
+    };
+    return of_view;
+  };
+  if (coloring.are_frames) {
+    FrameColoring frames;
+    frames.sources = sources;
+    frames.deliver = [&](int number, const FusedColor& color) { done.Add(number, color); };
+    frames.was_done = [&](int number) { return done.WasDone(number); };
+    for (const std::string& name : ReadCarryFacts(context).key_views) {
+      frames.key_views.push_back(scene.FindView(name));
+    }
+    return ColorFrames(scene, images, frames, context);
+  }
+  context.pool().ForEach(std::ssize(scene.views), [&](int64_t index, int) {
+    context.ThrowIfCancelled();
+    const auto number = static_cast<int>(index);
+    if (done.WasDone(number)) return;
+    const auto luminance = images.Luminance(number);
+    const CarriedColor carried =
+        ReadCarried(context, scene.views[index], luminance->width, luminance->height);
+    ThreadPool one(1);
+    done.Add(number, FuseViewColor(*luminance, carried, sources(number), one, context.cancel()));
+  });
+}
+
+}  // namespace color3d

@@ -1,0 +1,161 @@
+#include "tests/bench/suite/suite_plan.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "core/base/digest.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+
+namespace color3d {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Trimmed(const std::string& text) {
+  const size_t begin = text.find_first_not_of(' ');
+  if (begin == std::string::npos) return "";
+  return text.substr(begin, text.find_last_not_of(' ') - begin + 1);
+}
+
+// The cells of "| a | b |".
+std::vector<std::string> Cells(const std::string& line) {
+  std::vector<std::string> cells;
+  std::istringstream stream(line.substr(1));
+  for (std::string cell; std::getline(stream, cell, '|');) cells.push_back(Trimmed(cell));
+  return cells;
+}
+
+std::string Joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+template <class T>
+std::vector<T> Select(const std::vector<T>& all,
+                      const std::vector<std::string>& names,
+                      const std::string& what) {
+  if (names.empty()) return all;
+  std::vector<std::string> known;
+  for (const T& element : all) known.push_back(element.name);
+  std::vector<T> selected;
+  for (const std::string& name : names) {
+    const auto at = std::find(known.begin(), known.end(), name);
+    if (at == known.end()) {
+      throw InvalidArgument("there is no {} {}; there are {}", what, name, Joined(known));
+    }
+    selected.push_back(all[static_cast<size_t>(at - known.begin())]);
+  }
+  return selected;
+}
+
+}  // namespace
+
+std::vector<SuitePreset> ReadPresetTable(const fs::path& markdown) {
+  std::vector<SuitePreset> presets;
+  std::istringstream stream(ReadFile(markdown));
+  int number = 0;
+  for (std::string line; std::getline(stream, line);) {
+    ++number;
+    // A row begins with a name in lower case; the header row with "name".
+    if (line.size() < 3 || line.rfind("| ", 0) != 0 || line[2] < 'a' || line[2] > 'z') continue;
+    const std::vector<std::string> cells = Cells(line);
+    if (cells[0] == "name") continue;
+    if (cells.size() < 5 || (cells[3] != "yes" && cells[3] != "no")) {
+      throw InvalidArgument("{}:{}: expected | name | file | kind | oracle: yes or no | claim |",
+                            markdown.string(),
+                            number);
+    }
+    SuitePreset preset{cells[0], {}, cells[2], cells[3] == "yes", cells[4]};
+    if (cells[1] != "-") {
+      preset.file = markdown.parent_path() / cells[1];
+      if (!fs::exists(preset.file)) {
+        throw InvalidArgument(
+            "{}:{}: there is no file {}", markdown.string(), number, preset.file.string());
+      }
+    }
+    presets.push_back(std::move(preset));
+  }
+  if (presets.empty()) throw InvalidArgument("{} has no table of presets", markdown.string());
+  return presets;
+}
+
+SuiteScenes ReadManifest(const fs::path& json, const fs::path& data) {
+  SuiteScenes scenes;
+  size_t entry = 0;
+  try {
+    const nlohmann::json manifest = nlohmann::json::parse(ReadFile(json));
+    for (const nlohmann::json& scene : manifest.at("scenes")) {
+      SuiteScene read{scene.at("name"),
+                      data / scene.at("path").get<std::string>(),
+                      scene.value("key_view", ""),
+                      scene.value("arguments", std::vector<std::string>())};
+      if (!IsSafeRelativePath(read.name) || read.name.find('/') != std::string::npos) {
+        throw InvalidArgument("{}: \"{}\" is not a name of a scene", json.string(), read.name);
+      }
+      if (fs::exists(read.folder)) {
+        scenes.found.push_back(std::move(read));
+      } else {
+        scenes.missing.push_back(read.name);
+      }
+      ++entry;
+    }
+  } catch (const nlohmann::json::exception& e) {
+    throw InvalidArgument("{}: scene {} cannot be read: {}", json.string(), entry, e.what());
+  }
+  return scenes;
+}
+
+std::vector<std::string> SuiteTask::Arguments(const fs::path& out) const {
+  std::vector<std::string> arguments = {"colorize",
+                                        scene.folder.string(),
+                                        "-o",
+                                        out.string(),
+                                        "--benchmark",
+                                        "--seed",
+                                        std::to_string(seed),
+                                        "--preset",
+                                        preset.file.empty() ? preset.name : preset.file.string()};
+  if (!scene.key_view.empty()) arguments.insert(arguments.end(), {"--key-view", scene.key_view});
+  if (preset.name == kBoundSource) arguments.push_back("--bound");
+  arguments.insert(arguments.end(), scene.arguments.begin(), scene.arguments.end());
+  return arguments;
+}
+
+std::vector<SuiteTask> PlanSuite(const std::vector<SuiteScene>& scenes,
+                                 const std::vector<SuitePreset>& presets,
+                                 int seeds) {
+  std::vector<SuiteTask> tasks;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    for (const SuiteScene& scene : scenes) {
+      for (const SuitePreset& preset : presets) {
+        if (preset.name == kBoundPreset) continue;
+        SuiteTask task{scene, preset, static_cast<uint64_t>(seed), {}};
+        nlohmann::json facts = {scene.name, scene.key_view, scene.arguments, preset.name};
+        if (!preset.file.empty()) facts.push_back(ReadFile(preset.file));
+        task.options_digest = Sha256Hex(facts.dump()).substr(0, 12);
+        tasks.push_back(std::move(task));
+      }
+    }
+  }
+  return tasks;
+}
+
+std::vector<SuitePreset> SelectPresets(const std::vector<SuitePreset>& all,
+                                       const std::vector<std::string>& names) {
+  return Select(all, names, "preset");
+}
+
+std::vector<SuiteScene> SelectScenes(const SuiteScenes& all,
+                                     const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    if (std::find(all.missing.begin(), all.missing.end(), name) != all.missing.end()) {
+      throw InvalidArgument("the scene {} is not in the data folder of this machine", name);
+    }
+  }
+  return Select(all.found, names, "scene");
+}
+
+}  // namespace color3d

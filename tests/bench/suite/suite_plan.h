@@ -1,0 +1,68 @@
+// The runs of a suite: scenes of a manifest x presets of a table x seeds. Pure but for reading
+// files.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace color3d {
+
+// A row of the table of baselines (tests/bench/baselines/README.md).
+struct SuitePreset {
+  std::string name;
+  std::filesystem::path file;  // empty: a preset of the server
+  std::string kind;            // ours, baseline, paper, ablation
+  bool oracle = false;         // uses true colours that a user does not have
+  std::string claim;           // one sentence
+};
+
+// The preset whose figure comes from runs of kBoundSource with `--bound`.
+inline constexpr char kBoundPreset[] = "bound";
+inline constexpr char kBoundSource[] = "fast";
+
+// Reads the rows of a Markdown table "| name | file | kind | oracle | claim |". Throws
+// Error{kInvalidArgument} with the line if one cannot be read or a file is missing.
+std::vector<SuitePreset> ReadPresetTable(const std::filesystem::path& markdown);
+
+struct SuiteScene {
+  std::string name;
+  std::filesystem::path folder;
+  std::string key_view;                // empty: selected by the preset
+  std::vector<std::string> arguments;  // further options of `color3d colorize`, e.g. --film
+};
+
+struct SuiteScenes {
+  std::vector<SuiteScene> found;
+  std::vector<std::string> missing;  // names of scenes without a folder on this machine
+};
+
+// Reads {"scenes": [{"name": ..., "path": ..., "key_view": ..., "arguments": [...]}]}; paths are
+// relative to `data`. Throws Error{kInvalidArgument} with the entry that is wrong.
+SuiteScenes ReadManifest(const std::filesystem::path& json, const std::filesystem::path& data);
+
+// A run to do.
+struct SuiteTask {
+  SuiteScene scene;
+  SuitePreset preset;
+  uint64_t seed = 1;
+  std::string options_digest;  // of all that decides the result but the program
+
+  // Arguments of `color3d`, with results in `out`.
+  std::vector<std::string> Arguments(const std::filesystem::path& out) const;
+};
+
+// All tasks but those of kBoundPreset: seed by seed, so that an interrupted suite has whole rows
+// first.
+std::vector<SuiteTask> PlanSuite(const std::vector<SuiteScene>& scenes,
+                                 const std::vector<SuitePreset>& presets,
+                                 int seeds);
+
+// Elements of `all` with these names, in their order; all if `names` is empty. Throws
+// Error{kInvalidArgument} with an unknown name and the known ones.
+std::vector<SuitePreset> SelectPresets(const std::vector<SuitePreset>& all,
+                                       const std::vector<std::string>& names);
+std::vector<SuiteScene> SelectScenes(const SuiteScenes& all, const std::vector<std::string>& names);
+
+}  // namespace color3d

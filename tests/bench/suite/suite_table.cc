@@ -1,0 +1,314 @@
+#include "tests/bench/suite/suite_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace color3d {
+namespace {
+
+constexpr double kNoticeable = 0.03;  // relative difference
+
+std::vector<double> ErrorsOf(const SuiteCell& cell) {
+  std::vector<double> errors;
+  for (const SuiteRow& row : cell.rows) {
+    for (const auto& [view, error] : row.view_errors) errors.push_back(error);
+  }
+  if (!errors.empty()) return errors;
+  for (const SuiteRow& row : cell.rows) {
+    const double error = row.Metric(kRankingMetric);
+    if (std::isfinite(error)) errors.push_back(error);
+  }
+  return errors;
+}
+
+// The cell of the upper bound, from the runs of kBoundSource.
+void AddBound(const std::vector<SuitePreset>& presets, std::vector<SuiteCell>* cells) {
+  const auto bound = std::find_if(
+      presets.begin(), presets.end(), [](const SuitePreset& p) { return p.name == kBoundPreset; });
+  if (bound == presets.end()) return;
+  for (const SuiteCell& cell : *cells) {
+    if (cell.preset.name != kBoundSource) continue;
+    SuiteCell of_bound{cell.scene, *bound, {}, {}, {}};
+    for (SuiteRow row : cell.rows) {
+      const double error = row.Metric(std::string(kRankingMetric) + "_bound");
+      if (!std::isfinite(error)) continue;
+      row.preset = kBoundPreset;
+      row.view_errors.clear();
+      row.metrics = {{kRankingMetric, error}, {"seconds_total", row.Metric("seconds_total")}};
+      of_bound.rows.push_back(std::move(row));
+    }
+    if (!of_bound.Empty()) {
+      cells->push_back(std::move(of_bound));
+      return;
+    }
+  }
+}
+
+void FindFrontier(SceneResults* results) {
+  std::vector<size_t> by_time;
+  for (size_t i = 0; i < results->cells.size(); ++i) {
+    const SuiteCell& cell = results->cells[i];
+    if (!cell.preset.oracle && cell.Mean("seconds_total") > 0.0) by_time.push_back(i);
+  }
+  const auto seconds = [&](size_t i) { return results->cells[i].Mean("seconds_total"); };
+  std::stable_sort(
+      by_time.begin(), by_time.end(), [&](size_t x, size_t y) { return seconds(x) < seconds(y); });
+  double best = std::numeric_limits<double>::infinity();
+  for (const size_t i : by_time) {
+    if (results->cells[i].error.mean >= best) continue;
+    best = results->cells[i].error.mean;
+    results->frontier.push_back(i);
+  }
+  const std::vector<size_t>& frontier = results->frontier;
+  if (frontier.size() < 3) return;
+  const auto x = [&](size_t i) { return std::log(seconds(i)); };
+  const auto y = [&](size_t i) { return results->cells[i].error.mean; };
+  const double width = x(frontier.back()) - x(frontier.front());
+  const double height = y(frontier.front()) - y(frontier.back());
+  double farthest = 0.0;
+  for (size_t k = 1; k + 1 < frontier.size(); ++k) {
+    const double u = (x(frontier[k]) - x(frontier.front())) / width;
+    const double v = (y(frontier.front()) - y(frontier[k])) / height;
+    if (v - u > farthest) {
+      farthest = v - u;
+      results->knee = static_cast<int>(k);
+    }
+  }
+}
+
+std::string Figure(double value, int decimals) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "";
+}
+
+std::string CsvCell(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+const SuiteCell* FindCell(const SceneResults& results, const std::string& preset) {
+  for (const SuiteCell& cell : results.cells) {
+    if (cell.preset.name == preset) return &cell;
+  }
+  return nullptr;
+}
+
+std::string MarkdownOfScene(const SceneResults& results) {
+  std::string text =
+      fmt::format("\n## {}\n\nWithout colour: {}.\n\n", results.scene, Figure(results.gray, 2));
+  text +=
+      "| preset | error (95 %) | photos | PSNR of L | colourfulness | ME | Gaussians | s | seeds | "
+      "|\n"
+      "|---|--:|--:|--:|--:|--:|--:|--:|--:|---|\n";
+  for (size_t i = 0; i < results.cells.size(); ++i) {
+    const SuiteCell& cell = results.cells[i];
+    std::string mark = cell.preset.oracle ? "oracle" : "";
+    const auto at = std::find(results.frontier.begin(), results.frontier.end(), i);
+    if (at != results.frontier.end()) {
+      mark = at - results.frontier.begin() == results.knee ? "frontier, knee" : "frontier";
+    }
+    text += fmt::format("| {} | {} ({} to {}) | {} | {} | {} | {} | {} | {} | {} | {} |\n",
+                        cell.preset.name,
+                        Figure(cell.error.mean, 2),
+                        Figure(cell.error.low, 2),
+                        Figure(cell.error.high, 2),
+                        Figure(cell.Mean("delta_e00_chroma_2d"), 2),
+                        Figure(cell.Mean("psnr_l"), 1),
+                        Figure(cell.Mean("colorfulness_ratio"), 2),
+                        Figure(cell.Mean("me"), 4),
+                        Figure(cell.Mean("gaussians"), 0),
+                        Figure(cell.Mean("seconds_total"), 0),
+                        cell.rows.size(),
+                        mark);
+  }
+  for (const SuiteCell& cell : results.failed) {
+    text += fmt::format("| {} | failed | | | | | | | | {} |\n", cell.preset.name, cell.failure);
+  }
+  return text;
+}
+
+}  // namespace
+
+double SuiteCell::Mean(const std::string& metric) const {
+  double sum = 0.0;
+  for (const SuiteRow& row : rows) sum += row.Metric(metric);
+  return sum / static_cast<double>(rows.size());
+}
+
+std::vector<SceneResults> SummarizeScenes(const std::vector<SuiteRow>& rows,
+                                          const std::vector<SuitePreset>& presets) {
+  std::vector<SceneResults> scenes;
+  for (const SuiteRow& row : rows) {
+    if (std::any_of(scenes.begin(), scenes.end(), [&](const SceneResults& s) {
+          return s.scene == row.scene;
+        })) {
+      continue;
+    }
+    SceneResults results{row.scene};
+    for (const SuitePreset& preset : presets) {
+      SuiteCell cell{row.scene, preset, {}, {}, {}};
+      for (const SuiteRow& other : rows) {
+        if (other.scene != row.scene || other.preset != preset.name) continue;
+        if (other.Failed()) {
+          cell.failure = other.failure;
+        } else {
+          cell.rows.push_back(other);
+        }
+      }
+      if (cell.Empty()) {
+        if (!cell.failure.empty()) results.failed.push_back(std::move(cell));
+        continue;
+      }
+      cell.failure.clear();
+      results.cells.push_back(std::move(cell));
+    }
+    AddBound(presets, &results.cells);
+    results.gray = std::numeric_limits<double>::quiet_NaN();
+    std::erase_if(results.cells, [](const SuiteCell& cell) { return ErrorsOf(cell).empty(); });
+    for (SuiteCell& cell : results.cells) {
+      cell.error = BootstrapMean(ErrorsOf(cell));
+      const double gray = cell.Mean("delta_e00_gray");
+      if (std::isfinite(gray)) results.gray = gray;
+    }
+    std::stable_sort(results.cells.begin(), results.cells.end(), [](const auto& x, const auto& y) {
+      return x.preset.oracle != y.preset.oracle ? y.preset.oracle : x.error.mean < y.error.mean;
+    });
+    FindFrontier(&results);
+    scenes.push_back(std::move(results));
+  }
+  return scenes;
+}
+
+std::vector<PresetSummary> SummarizePresets(const std::vector<SceneResults>& scenes,
+                                            const std::vector<SuitePreset>& presets) {
+  std::vector<PresetSummary> summaries;
+  for (const SuitePreset& preset : presets) {
+    PresetSummary summary{preset};
+    double log_ratio = 0.0;
+    for (const SceneResults& scene : scenes) {
+      const SuiteCell* cell = FindCell(scene, preset.name);
+      if (cell == nullptr || !(scene.gray > 0.0)) continue;
+      ++summary.scenes;
+      summary.mean_rank += static_cast<double>(cell - scene.cells.data() + 1);
+      log_ratio += std::log(cell->error.mean / scene.gray);
+      summary.seconds += cell->Mean("seconds_total");
+    }
+    if (summary.scenes == 0) continue;
+    summary.mean_rank /= summary.scenes;
+    summary.seconds /= summary.scenes;
+    summary.ratio_to_gray = std::exp(log_ratio / summary.scenes);
+    summaries.push_back(std::move(summary));
+  }
+  std::stable_sort(summaries.begin(), summaries.end(), [](const auto& x, const auto& y) {
+    return x.ratio_to_gray < y.ratio_to_gray;
+  });
+  return summaries;
+}
+
+std::vector<ClaimResult> TestClaims(const std::vector<SceneResults>& scenes) {
+  std::vector<ClaimResult> results;
+  for (const PaperClaim& claim : PaperClaims()) {
+    ClaimResult result{claim};
+    if (*claim.better == '\0') {
+      result.verdict = "cannot be tested";
+      results.push_back(result);
+      continue;
+    }
+    double log_ratio = 0.0;
+    for (const SceneResults& scene : scenes) {
+      const SuiteCell* better = FindCell(scene, claim.better);
+      const SuiteCell* worse = FindCell(scene, claim.worse);
+      if (better == nullptr || worse == nullptr) continue;
+      const double ratio = better->Mean(claim.metric) / worse->Mean(claim.metric);
+      if (!std::isfinite(ratio) || ratio <= 0.0) continue;
+      ++result.scenes;
+      result.holds_on += ratio < 1.0 ? 1 : 0;
+      log_ratio += std::log(ratio);
+    }
+    if (result.scenes == 0) {
+      result.verdict = "not run";
+    } else {
+      result.ratio = std::exp(log_ratio / result.scenes);
+      const int against = result.scenes - result.holds_on;
+      if (result.ratio < 1.0 - kNoticeable && 2 * result.holds_on > result.scenes) {
+        result.verdict = "holds";
+      } else if (result.ratio > 1.0 + kNoticeable && 2 * against > result.scenes) {
+        result.verdict = "does not hold";
+      } else {
+        result.verdict = "no difference";
+      }
+    }
+    results.push_back(result);
+  }
+  return results;
+}
+
+std::string SuiteCsv(const std::vector<SuiteRow>& rows) {
+  constexpr const char* kMetrics[] = {"delta_e00_chroma",
+                                      "delta_e00_chroma_2d",
+                                      "delta_e00_chroma_bound",
+                                      "delta_e00",
+                                      "delta_e00_gray",
+                                      "psnr_rgb",
+                                      "psnr_l",
+                                      "ssim_rgb",
+                                      "colorfulness_ratio",
+                                      "me",
+                                      "tc",
+                                      "gaussians",
+                                      "seconds_total",
+                                      "peak_memory_bytes"};
+  std::string text = "scene,preset,seed,failure";
+  for (const char* metric : kMetrics) text += std::string(",") + metric;
+  text += ",wall_seconds,commit,machine\n";
+  for (const SuiteRow& row : rows) {
+    text += fmt::format("{},{},{},{}", row.scene, row.preset, row.seed, CsvCell(row.failure));
+    for (const char* metric : kMetrics) {
+      const double value = row.Metric(metric);
+      text += std::isfinite(value) ? fmt::format(",{:.6g}", value) : ",";
+    }
+    text +=
+        fmt::format(",{:.1f},{},{}\n", row.wall_seconds, CsvCell(row.commit), CsvCell(row.machine));
+  }
+  return text;
+}
+
+std::string SuiteMarkdown(const std::vector<SceneResults>& scenes,
+                          const std::vector<PresetSummary>& presets,
+                          const std::vector<ClaimResult>& claims) {
+  std::string text =
+      "| preset | kind | scenes | mean rank | error / grey | mean s |\n|---|---|--:|--:|--:|--:|\n";
+  for (const PresetSummary& p : presets) {
+    text += fmt::format("| {} | {} | {} | {:.1f} | {:.2f} | {:.0f} |\n",
+                        p.preset.name,
+                        p.preset.oracle ? "oracle" : p.preset.kind,
+                        p.scenes,
+                        p.mean_rank,
+                        p.ratio_to_gray,
+                        p.seconds);
+  }
+  for (const SceneResults& scene : scenes) text += MarkdownOfScene(scene);
+  text +=
+      "\n## Claims of the paper\n\n| claim | compared | metric | scenes | ratio | verdict |\n"
+      "|---|---|---|--:|--:|---|\n";
+  for (const ClaimResult& result : claims) {
+    const bool tested = result.scenes > 0;
+    text += fmt::format("| {} | {} | {} | {} | {} | {} |\n",
+                        result.claim.text,
+                        *result.claim.better == '\0'
+                            ? std::string(result.claim.note)
+                            : fmt::format("{} against {}", result.claim.better, result.claim.worse),
+                        result.claim.metric,
+                        tested ? fmt::format("{} of {}", result.holds_on, result.scenes) : "",
+                        tested ? fmt::format("{:.2f}", result.ratio) : "",
+                        result.verdict);
+  }
+  return text;
+}
+
+}  // namespace color3d

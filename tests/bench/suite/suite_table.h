@@ -1,0 +1,86 @@
+// What the rows of a suite say: a cell for each scene and preset, the frontier of error and time,
+// and claims. Pure functions.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/bench/picture_scores.h"
+#include "tests/bench/suite/suite_plan.h"
+#include "tests/bench/suite/suite_rows.h"
+
+namespace color3d {
+
+// The metric that ranks: mean CIEDE2000 of chroma of held-out views.
+inline constexpr char kRankingMetric[] = "delta_e00_chroma";
+
+// All runs of a scene with a preset.
+struct SuiteCell {
+  std::string scene;
+  SuitePreset preset;
+  std::vector<SuiteRow> rows;  // that succeeded
+  std::string failure;         // of the last failed run; empty if one succeeded
+  // Over views and seeds; over seeds if there are no scores by view.
+  MeanWithInterval error;
+
+  bool Empty() const { return rows.empty(); }
+  // Mean over the rows; NaN if a row lacks the metric.
+  double Mean(const std::string& metric) const;
+};
+
+struct SceneResults {
+  std::string scene;
+  std::vector<SuiteCell> cells;  // with rows, least error first; oracles last
+  std::vector<SuiteCell> failed;
+  double gray = 0.0;  // error of no colour; NaN if unknown
+  // Indices of `cells`: no other cell without an oracle is both faster and better. By time.
+  std::vector<size_t> frontier;
+  // Index in `frontier` of the knee: the point farthest from the line between its ends, in the
+  // logarithm of seconds and in error, both scaled to 0..1. -1 with fewer than three points.
+  int knee = -1;
+};
+
+// Scenes in the order of their first row.
+std::vector<SceneResults> SummarizeScenes(const std::vector<SuiteRow>& rows,
+                                          const std::vector<SuitePreset>& presets);
+
+// Means over the scenes that have both the preset and grey.
+struct PresetSummary {
+  SuitePreset preset;
+  int scenes = 0;
+  double mean_rank = 0.0;      // among cells without an oracle
+  double ratio_to_gray = 0.0;  // geometric mean
+  double seconds = 0.0;        // mean
+};
+// By ratio_to_gray.
+std::vector<PresetSummary> SummarizePresets(const std::vector<SceneResults>& scenes,
+                                            const std::vector<SuitePreset>& presets);
+
+// A claim of the paper that compares two presets, or one that cannot be tested here.
+struct PaperClaim {
+  const char* text;
+  const char* better;  // preset that the claim says is better; empty: cannot be tested
+  const char* worse;
+  const char* metric;  // smaller is better
+  const char* note;    // what is compared, or why it cannot be tested
+};
+const std::vector<PaperClaim>& PaperClaims();
+
+struct ClaimResult {
+  PaperClaim claim;
+  int scenes = 0;       // with both presets
+  int holds_on = 0;     // scenes where `better` has the smaller metric
+  double ratio = 0.0;   // geometric mean of better / worse
+  std::string verdict;  // "holds", "does not hold", "no difference", "not run", "cannot be tested"
+};
+// A claim holds, or not, if the ratio differs from 1 by more than 3 % and more than half of the
+// scenes agree; else there is no difference.
+std::vector<ClaimResult> TestClaims(const std::vector<SceneResults>& scenes);
+
+// One line for each row, with a header.
+std::string SuiteCsv(const std::vector<SuiteRow>& rows);
+std::string SuiteMarkdown(const std::vector<SceneResults>& scenes,
+                          const std::vector<PresetSummary>& presets,
+                          const std::vector<ClaimResult>& claims);
+
+}  // namespace color3d
