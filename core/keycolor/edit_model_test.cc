@@ -69,7 +69,7 @@ TEST(EditModelTest, IsUndecidedWhereAllIsEdited) {
 
 TEST(EditModelTest, PosteriorKeepsCertainty) {
   EXPECT_EQ(EditedPosterior(0.0f, 1e6f), 0.0f);
-  EXPECT_EQ(EditedPosterior(1.0f, 1e-3f), 1.0f);
+  EXPECT_NEAR(EditedPosterior(1.0f, 1e-3f), 1.0f, 1e-3f);
   EXPECT_FLOAT_EQ(EditedPosterior(0.5f, 1.0f), 0.5f);
   EXPECT_NEAR(EditedPosterior(0.1f, 9.0f), 0.5f, 1e-6f);
 }
