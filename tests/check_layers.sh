@@ -146,7 +146,7 @@ public() {
 }
 
 public core/augment augment elastic_options outpaint surrogates
-public core/carry carry carry_views confidence dense_points plane_sweep view_color view_propagation
+public core/carry carry carry_views confidence dense_points plane_sweep view_color view_propagation fusion
 public core/colorizer colorizer corrector scene_batch personal/scene_colorizers personal/train_colorizer
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
@@ -154,7 +154,7 @@ public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads
 public core/grid edge_weights grid_solver
 public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling reduced weighted_resize \
   probe/focal_length probe/orientation probe/probe
-public core/keycolor from_image picture_checks recolor automatic/automatic external/remote \
+public core/keycolor edit_model from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
 public core/film anchor_frames film_carry moving_regions returning_shots shots steady_colors steady_tones
 public core/keyview collect_features coverage expected_error select tracks view_features

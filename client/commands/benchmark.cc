@@ -223,6 +223,7 @@ v1::JobSpec PrepareBenchmark(Connection& connection,
     *colorize->mutable_key_color() = UploadKeyColor(connection, options.color);
   }
   AddKeyViews(connection, options, colorize);
+  AddColorizer(connection, options, colorize);
   const auto uploads = AddTrueColors(options, folder, copies, selection, colorize);
   UploadMissing(connection, uploads, [&](int64_t done, int64_t total) {
     display.OnTransfer("uploading true colours", done, total);

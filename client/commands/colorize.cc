@@ -140,6 +140,7 @@ class Colorize {
     v1::JobSpec spec = ColorizeSpec(options_, scene);
     spec.mutable_colorize_scene()->clear_select_key_view();
     AddKeyViews(*connection_, options_, spec.mutable_colorize_scene());
+    AddColorizer(*connection_, options_, spec.mutable_colorize_scene());
     for (const std::string& input : JobAndInputs(*connection_, *state.accepted)) {
       spec.add_inputs(input);
     }
@@ -175,6 +176,7 @@ class Colorize {
     colorize->set_key_view(KeyView());
     *colorize->mutable_key_color() = UploadKeyColor(*connection_, options_.color);
     AddKeyViews(*connection_, options_, colorize);
+    AddColorizer(*connection_, options_, colorize);
     display_.PrintLine("key view " + (colorize->key_view().empty() ? std::string("will be selected")
                                                                    : colorize->key_view()));
     return spec;

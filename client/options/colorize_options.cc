@@ -6,9 +6,13 @@
 #include <map>
 #include <system_error>
 
+#include "client/lib/blob_transfer.h"
+#include "client/lib/scene_upload.h"
 #include "client/options/option_fields.h"
 #include "client/options/preset_file.h"
+#include "core/base/digest.h"
 #include "core/base/error.h"
+#include "core/base/file_kind.h"
 #include "core/catalogue/limits.h"
 #include "core/catalogue/stages.h"
 
@@ -146,6 +150,11 @@ void ColorizeOptions::Check() const {
   if (bound && !benchmark) {
     throw InvalidArgument("--bound needs --benchmark");
   }
+  if (!colorizer.empty() && !IsFile(colorizer)) {
+    throw Error(ErrorCode::kNotFound,
+                "--colorizer: there is no file {}; give colorizer.c3c of the results of a scene",
+                colorizer);
+  }
   RequestedOptions(*this);  // throws if the file of the preset cannot be read
   color.Check();
   if (keys > 1 && !benchmark) {
@@ -184,6 +193,15 @@ void AddKeyViews(Connection& connection,
     if (key.begin_s) added->set_begin_s(*key.begin_s);
     if (key.end_s) added->set_end_s(*key.end_s);
   }
+}
+
+void AddColorizer(Connection& connection,
+                  const ColorizeOptions& options,
+                  v1::ColorizeSceneSpec* spec) {
+  if (options.colorizer.empty()) return;
+  const UploadFile upload{options.colorizer, DigestFile(options.colorizer)};
+  UploadMissing(connection, {upload}, [](int64_t, int64_t) {});
+  *spec->mutable_personalize()->mutable_colorizer() = ToProto(upload.digest);
 }
 
 bool WantsAugmentFiles(const ColorizeOptions& options) {
@@ -254,6 +272,10 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
   app.add_flag("--bound",
                o->bound,
                "With --benchmark: also score the same geometry with the true colours of all views");
+  app.add_option("--colorizer",
+                 o->colorizer,
+                 "Use the colorizer of another scene (colorizer.c3c of its results) in place of "
+                 "training one: a baseline");
   app.add_option(
       "--encoder", o->encoder, "Name of the weights of the frozen encoder on the server");
   app.add_flag(

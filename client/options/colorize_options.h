@@ -22,6 +22,7 @@ struct ColorizeOptions {
   std::string masks;                              // folder; empty: none
   std::vector<std::string> additional_key_views;  // ParseAdditionalKeyView; in order of importance
   std::string key_view;                           // view name or stem; empty: selected
+  std::string colorizer;        // file of another scene's colorizer; empty: trained
   std::string encoder;          // name of weights on the server; empty: the embedded encoder
   std::string preset = "fast";  // name of a preset, or a preset file
   bool film = false;            // the photos are frames of a film
@@ -45,6 +46,11 @@ struct ColorizeOptions {
 void AddKeyViews(Connection& connection,
                  const ColorizeOptions& options,
                  v1::ColorizeSceneSpec* spec);
+
+// Uploads the colorizer of another scene, if one is given, and names it in the spec.
+void AddColorizer(Connection& connection,
+                  const ColorizeOptions& options,
+                  v1::ColorizeSceneSpec* spec);
 
 // Returns whether flags, settings or preset file request the pictures in PHOTOS/augment/.
 bool WantsAugmentFiles(const ColorizeOptions& options);

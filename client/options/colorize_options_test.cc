@@ -116,6 +116,12 @@ TEST_F(ColorizeOptionsTest, MasksNeedPhotos) {
   EXPECT_THAT(Complaint({"--masks=m", "--film"}), HasSubstr("--film takes frames as they are"));
 }
 
+TEST_F(ColorizeOptionsTest, RequiresFileOfOtherColorizer) {
+  EXPECT_THAT(Complaint({"--colorizer=none.c3c"}),
+              AllOf(HasSubstr("no file none.c3c"), HasSubstr("colorizer.c3c")));
+  EXPECT_EQ(Complaint({"--colorizer=" + File("any")}), "");
+}
+
 TEST_F(ColorizeOptionsTest, PosesFlagRequestsPoses) {
   ColorizeOptions options;
   EXPECT_FALSE(ImportSpec(options, "scenes/s").import_scene().has_film_poses());

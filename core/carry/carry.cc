@@ -185,7 +185,7 @@ CarriedColor CarryColor(const SurfaceView& source,
   }
   const Image warped = WarpedLuminance(source, target, map);
   const int width = target.camera.width, height = target.camera.height;
-  CarriedColor out{Image(width, height, 2), Image(width, height, 1)};
+  CarriedColor out{Image(width, height, ab.channels), Image(width, height, 1)};
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const double visible = map.visible.At(0, y, x);
@@ -197,7 +197,7 @@ CarriedColor CarryColor(const SurfaceView& source,
       double c = visible * std::exp(-offset * offset - structure * structure);
       if (!confidence.Empty()) c *= Read(confidence, 0, sx, sy);
       out.confidence.At(0, y, x) = std::min(1.0f, static_cast<float>(c));
-      for (int k = 0; k < 2; ++k) out.ab.At(k, y, x) = Read(ab, k, sx, sy);
+      for (int k = 0; k < ab.channels; ++k) out.ab.At(k, y, x) = Read(ab, k, sx, sy);
     }
   }
   return out;
@@ -207,7 +207,7 @@ void KeepMoreConfident(const CarriedColor& other, CarriedColor* color) {
   for (size_t i = 0; i < color->confidence.data.size(); ++i) {
     if (!(other.confidence.data[i] > color->confidence.data[i])) continue;
     color->confidence.data[i] = other.confidence.data[i];
-    for (int c = 0; c < 2; ++c) color->ab.Plane(c)[i] = other.ab.Plane(c)[i];
+    for (int c = 0; c < color->ab.channels; ++c) color->ab.Plane(c)[i] = other.ab.Plane(c)[i];
   }
 }
 
@@ -217,7 +217,7 @@ void FillFrom(const CarriedColor& other, CarriedColor* color) {
     const float second = (1.0f - first) * other.confidence.data[i];
     const float sum = first + second;
     if (!(sum > 0.0f)) continue;
-    for (int c = 0; c < 2; ++c) {
+    for (int c = 0; c < color->ab.channels; ++c) {
       float& ab = color->ab.Plane(c)[i];
       ab = (first * ab + second * other.ab.Plane(c)[i]) / sum;
     }

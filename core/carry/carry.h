@@ -33,17 +33,20 @@ struct CarryOptions {
 };
 
 struct CarriedColor {
-  Image ab;          // 2 channels, Lab units; 0 where nothing was carried
+  // 2 channels, Lab units; 0 where nothing was carried. Further channels are carried like these.
+  Image ab;
   Image confidence;  // 1 channel, 0..1
 };
 
-// `ab` (2 channels) and `confidence` (1 channel, 0..1; empty: 1 everywhere) are the source view's.
+// `ab` (2 channels or more) and `confidence` (1 channel, 0..1; empty: 1 everywhere) are the source
+// view's.
 CarriedColor CarryColor(const SurfaceView& source,
                         const Image& ab,
                         const Image& confidence,
                         const SurfaceView& target,
                         const CarryOptions& options);
 
+// The two below require equal sizes and channels.
 // Replaces each pixel of `color` by that of `other` where `other` is more confident.
 void KeepMoreConfident(const CarriedColor& other, CarriedColor* color);
 // Adds a source of lower rank. Its confidence is multiplied by 1 - that of `color`, so that it

@@ -101,7 +101,9 @@ CarriedColor CarryFromAll(const std::vector<ColoredKeyView>& keys,
                           const ViewSurfaces& target,
                           const CarryOptions& options) {
   const Camera& camera = target.rendered.camera;
-  CarriedColor all{Image(camera.width, camera.height, 2), Image(camera.width, camera.height, 1)};
+  const int channels = keys.empty() ? 2 : keys.front().color.ab.channels;
+  CarriedColor all{Image(camera.width, camera.height, channels),
+                   Image(camera.width, camera.height, 1)};
   for (const ColoredKeyView& key : keys) {
     const auto carry = [&](const SurfaceView& from, const SurfaceView& to) {
       return CarryColor(from, key.color.ab, key.color.confidence, to, options);

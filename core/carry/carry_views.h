@@ -65,7 +65,8 @@ struct ColoredKeyView {
   CarriedColor color;
 };
 
-// Carries from all key views; each gives only the colours that those before it do not give.
+// Carries from all key views, whose colours have equally many channels; each gives only the colours
+// that those before it do not give.
 CarriedColor CarryFromAll(const std::vector<ColoredKeyView>& keys,
                           const ViewSurfaces& target,
                           const CarryOptions& options);

@@ -68,7 +68,7 @@ const std::vector<Stage>& StageCatalogue() {
        .step = "view_colors",
        .purpose = "every view gets a colour at every pixel",
        .needs = {kScene, kColorizer},
-       // The last three: methods without carried colours.
+       // The last three: methods without carried colours, and recolouring.
        .reads = {kCarried, kCarryFacts, kGeometry, kKeyView, kKeyColor, kKeyViews},
        .resumes = true},
       {.kind = kCorrectColors,

@@ -10,6 +10,7 @@ void ColorizerOptions::UsePaperRecipe() {
   average_decay = 0.0;
   max_gradient_norm = 0.0;
   equal_draws = true;
+  instance_norm = true;
   full_resolution = true;
   elastic.kind = ElasticOptions::Kind::kNoise;
 }

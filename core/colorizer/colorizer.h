@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -25,7 +24,7 @@ inline constexpr int kMaxAdapterStages = 8;
 struct ColorizerOptions {
   enum class Recipe {
     kColor3d,  // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
-    kPaper,    // instance norm, adapters, rot90 + grid shuffle, lr 1e-4 -> 1e-6
+    kPaper,    // adapters, rot90 + grid shuffle, lr 1e-4 -> 1e-6
   };
   // Precision of matrix products and convolutions in training. All else is float32.
   enum class Precision {
@@ -52,9 +51,7 @@ struct ColorizerOptions {
   // Number of the encoder's deepest stages with Conv-Adapters, 0..8; -1: the recipe's default
   // (kColor3d: none, kPaper: all).
   int adapter_stages = -1;
-  // Norm by each picture's statistics, else by those of the key view; unset: the recipe's default
-  // (kColor3d: false, kPaper: true).
-  std::optional<bool> instance_norm;
+  bool instance_norm = false;      // norm by each picture's statistics, else by the key view's
   double max_gradient_norm = 1.0;  // gradients above it are scaled down to it, 0..1e6; 0: never
   bool equal_draws = false;        // ignore TrainingPicture::share
   // The decoder ends in a pixel shuffle to the size of the picture. If not, its output has the

@@ -28,7 +28,8 @@ std::string EncodeAbPng(const Image& ab, const Image& confidence) {
 
 AbMap DecodeAbPng(std::string_view bytes, const std::string& file_name) {
   const ImageInfo info = ProbeImage(bytes, file_name);
-  if (info.format != ImageFormat::kPng || info.bits_per_channel != 16 || info.channels != 3) {
+  if (info.format != ImageFormat::kPng || info.bits_per_channel != 16 ||
+      (info.channels != 3 && info.channels != 4)) {
     throw InvalidArgument("{} is not an ab map: a 16-bit RGB PNG is needed", file_name);
   }
   const Image packed = DecodeImage(bytes, file_name);

@@ -106,4 +106,14 @@ Image KeyColorFromEdit(const Image& original_srgb, const Image& edited_srgb, con
   return ab;
 }
 
+Image EditedShare(const Image& original_ab, const Image& edited_ab) {
+  Image share(original_ab.width, original_ab.height, 1);
+  for (size_t i = 0; i < share.data.size(); ++i) {
+    const float change = std::hypot(edited_ab.Plane(0)[i] - original_ab.Plane(0)[i],
+                                    edited_ab.Plane(1)[i] - original_ab.Plane(1)[i]);
+    share.data[i] = std::clamp(change / kMinChange - 1.0f, 0.0f, 1.0f);
+  }
+  return share;
+}
+
 }  // namespace color3d

@@ -14,4 +14,8 @@ namespace color3d {
 // mask.
 Image KeyColorFromEdit(const Image& original_srgb, const Image& edited_srgb, const Image* mask);
 
+// Returns the edited share of each pixel (1 channel, 0..1): 0 where the chroma changed by no more
+// than rounding, 1 from twice that on. Both are a, b (2 channels, Lab units) of one size.
+Image EditedShare(const Image& original_ab, const Image& edited_ab);
+
 }  // namespace color3d

@@ -3,9 +3,11 @@
 #include "core/base/files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/keycolor/recolor.h"
 #include "core/scene/key_photo.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/edited_share.h"
 #include "core/stage/formats/key_views.h"
 #include "core/stage/run_stages.h"
 #include "core/stage/sources/given_colors.h"
@@ -20,6 +22,22 @@ std::vector<std::string> NotesOnGivenPicture(const ColorizeKeyViewOptions& optio
   using Source = ColorizeKeyViewOptions::Source;
   if (options.source != Source::kImage && options.source != Source::kEdit) return {};
   return PictureNotes(ReadFile(options.file));
+}
+
+// Adds the edited share to the undistorted colours of an edit, as their third channel.
+void AddEditedShare(const KeyPhoto& photo,
+                    const Image& edited_ab,
+                    int view,
+                    const ViewImages& images,
+                    CarriedColor* color) {
+  const Image lab = LabFromSrgb(photo.srgb);
+  Image original(lab.width, lab.height, 2);
+  std::copy_n(lab.Plane(1), original.data.size(), original.data.begin());
+  const Image share = images.Undistort(view, EditedShare(original, edited_ab));
+  Image all(color->ab.width, color->ab.height, 3);
+  std::ranges::copy(color->ab.data, all.data.begin());
+  std::ranges::copy(share.data, all.Plane(2));
+  color->ab = std::move(all);
 }
 
 }  // namespace
@@ -58,7 +76,12 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
     // Confidence 0 marks places that the user left unpainted.
     for (float& value : color.confidence.data) value = std::max(value, kLeastConfidence);
   }
-  context.WriteOutput(artifact::kKeyColor, EncodeAbPng(color.ab, color.confidence));
+  if (options.source == ColorizeKeyViewOptions::Source::kEdit) {
+    AddEditedShare(photo, result.ab, key, images, &color);
+    if (color.confidence.Empty())
+      color.confidence = Image(color.ab.width, color.ab.height, 1, 1.0f);
+  }
+  context.WriteOutput(artifact::kKeyColor, EncodeCarriedPng(color));
   context.WriteOutput(artifact::kKeyViewColored,
                       EncodePng8(SrgbFromLab(JoinLab(photo.luminance, result.ab))));
   if (!result.regions.Empty()) {

@@ -5,6 +5,7 @@
 #include <iterator>
 
 #include "core/base/evenly.h"
+#include "core/base/files.h"
 #include "core/carry/confidence.h"
 #include "core/color/lab.h"
 #include "core/colorizer/personal/train_colorizer.h"
@@ -127,8 +128,14 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
 
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
-                    const std::string& encoder) {
+                    const std::string& encoder,
+                    const std::filesystem::path& other_colorizer) {
   options.Validate();
+  if (!other_colorizer.empty()) {
+    return context.WriteOutput(
+        artifact::kColorizer,
+        ColorizerForOtherScene(ReadFile(other_colorizer), context.LoadEncoder(encoder)));
+  }
   const Scene scene = ReadScene(context);
   const int key = ReadKeyView(context, scene);
   const ViewImages images(scene, context.scene_folder(), options.max_side_px, 0);

@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 
 class PersonalizeStageTest : public AugmentationStageTest {
  protected:
-  std::string Personalize() {
+  std::string Personalize(const std::filesystem::path& other_colorizer = {}) {
     StageContext::Setup setup;
     setup.scene_folder = scratch_.path() / "scene";
     setup.inputs = inputs_;
@@ -22,7 +22,7 @@ class PersonalizeStageTest : public AugmentationStageTest {
     ColorizerOptions options;
     options.iterations = 2;
     options.crop_px = options.max_side_px = 64;
-    RunPersonalize(options, context);
+    RunPersonalize(options, context, "", other_colorizer);
     return Output(artifact::kColorizer);
   }
   struct Warnings : NullObserver {
@@ -38,6 +38,21 @@ TEST_F(PersonalizeStageTest, ReportsKeyViewWithoutColor) {
   AddInput(artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, 0.3f)));
   Personalize();
   EXPECT_THAT(warnings_.text, AllOf(HasSubstr("almost no colour"), HasSubstr("hints")));
+}
+
+TEST_F(PersonalizeStageTest, TakesColorizerOfOtherScene) {
+  const Image luminance = LuminanceOfLab(Painting(kWidth, kHeight));
+  const auto colors = [&](const std::string& bytes) {
+    return LoadColorizer(bytes, Encoder::Embedded(), 1)->Colorize(luminance).data;
+  };
+  const std::filesystem::path file = scratch_.path() / "other.c3c";
+  const std::string other = Personalize();
+  WriteFileAtomic(file, other);
+  AddInput(artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, 30.0f)));
+  EXPECT_NE(colors(Personalize()), colors(other));
+  EXPECT_EQ(colors(Personalize(file)), colors(other));
+  WriteFileAtomic(file, "no colorizer");
+  EXPECT_THROW(Personalize(file), Error);
 }
 
 TEST_F(PersonalizeStageTest, RefusesKeyColorOfAnotherShape) {

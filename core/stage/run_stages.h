@@ -3,6 +3,7 @@
 // file.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -50,13 +51,16 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context);
 void RunGenerateAugmentations(const AugmentationOptions& options, StageContext& context);
 
 // Trains the colorizer of the scene on the key view, carried colours and generated pictures. Warns
-// if the key view has no colour. `encoder`: as in SelectKeyViewOptions.
+// if the key view has no colour. `encoder`: as in SelectKeyViewOptions. `other_colorizer`: file of
+// another scene's colorizer, which is used in place of training; empty: none.
 void RunPersonalize(const ColorizerOptions& options,
                     StageContext& context,
-                    const std::string& encoder = "");
+                    const std::string& encoder = "",
+                    const std::filesystem::path& other_colorizer = {});
 
-// Colours every view, with the sources of the colour. `encoder`: the one that the colorizer was
-// trained with.
+// Colours every view, with the sources of the colour. After an edit of the key photo of a static
+// scene, colour photos keep their own colours outside the edit. `encoder`: the one that the
+// colorizer was trained with.
 void RunColorizeViews(const ColorizeViewsOptions& options,
                       StageContext& context,
                       const std::string& encoder = "");

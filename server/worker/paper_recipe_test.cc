@@ -51,13 +51,19 @@ struct Row {
   double ours;
 };
 
+// 1 if the value is the expected one, else 0.
+template <typename T>
+double Is(T value, T expected) {
+  return value == expected ? 1.0 : 0.0;
+}
+
 std::vector<Row> ColorRows(const Resolved& r) {
   const AugmentOptions& augment = r.recipe.augment;
   return {
       {"key view: argmax of the entropy",
        1,
        "3.2",
-       r.key_view.strategy == KeyViewStrategy::kEntropy},
+       Is(r.key_view.strategy, KeyViewStrategy::kEntropy)},
       {"key view: temperature of the softmax", 1, "3.2", r.key_view.temperature},
       {"key view: the view itself takes part", 0, "3.2", 1.0 * r.key_view.exclude_self},
       {"key view: views excluded as outliers", 0, "3.2", 1.0 * r.key_view.outlier_guard},
@@ -80,7 +86,7 @@ std::vector<Row> ColorRows(const Resolved& r) {
       {"stop before the end of the schedule", 0, "A, tuning", r.colorizer.min_improvement},
       {"limit of the gradient's norm", 0, "A, tuning", r.colorizer.max_gradient_norm},
       {"average of the parameters", 0, "A, tuning", r.colorizer.average_decay},
-      {"float32", 1, "silent", r.colorizer.precision == ColorizerOptions::Precision::kFloat32},
+      {"float32", 1, "silent", Is(r.colorizer.precision, ColorizerOptions::Precision::kFloat32)},
       {"consistency term", 0, "3.2, eq. 3", r.colorizer.consistency_weight},
       {"adapters in all stages", 8, "3.2, A.2", 1.0 * r.recipe.model.adapter_stages},
       {"instance norm", 1, "A.2", 1.0 * r.recipe.model.instance_norm},
@@ -94,7 +100,7 @@ std::vector<Row> ColorRows(const Resolved& r) {
       {"augment: elastic is blurred noise",
        1,
        "3.2",
-       augment.elastic.kind == ElasticOptions::Kind::kNoise},
+       Is(augment.elastic.kind, ElasticOptions::Kind::kNoise)},
       {"augment: elastic alpha", 15, "silent", augment.elastic.alpha_px},
       {"augment: elastic sigma", 50, "silent", augment.elastic.sigma_px},
       {"augment: elastic affine", 50, "silent", augment.elastic.affine_px},
@@ -105,7 +111,7 @@ std::vector<Row> ColorRows(const Resolved& r) {
       {"views coloured by the colorizer alone",
        1,
        "3.3",
-       r.views.method == ColorizeViewsOptions::Method::kPersonalized},
+       Is(r.views.method, ColorizeViewsOptions::Method::kPersonalized)},
       {"views answered at full size", 1, "3.3", 1.0 * r.views.full_size},
       {"views: longer side", 1600, "silent", 1.0 * r.views.max_side_px},
   };

@@ -206,7 +206,10 @@ class CoreStageRunner : public StageRunner {
                                         context);
       case JobSpec::kPersonalize:
         return RunPersonalize(
-            PersonalizeOptions(spec.personalize(), context), context, spec.personalize().encoder());
+            PersonalizeOptions(spec.personalize(), context),
+            context,
+            spec.personalize().encoder(),
+            FetchIf(spec.personalize().has_colorizer(), spec.personalize().colorizer(), blobs));
       case JobSpec::kCarryColor:
         return RunCarryColor(CarryOptionsFrom(spec.carry_color()), context);
       case JobSpec::kCorrectColors:

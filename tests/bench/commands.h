@@ -21,6 +21,7 @@ void AddNextKeyCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddRasterizeCommand(CLI::App& app);
 void AddReconstructCommand(CLI::App& app);
+void AddRecolorCommand(CLI::App& app);
 void AddReferenceCommand(CLI::App& app);
 void AddPosesCommand(CLI::App& app);
 void AddPretrainCommand(CLI::App& app);

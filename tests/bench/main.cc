@@ -34,6 +34,7 @@ int main(int argc, char** argv) {
   color3d::AddChromaCommand(app);
   color3d::AddWeightsCommand(app);
   color3d::AddHintsCommand(app);
+  color3d::AddRecolorCommand(app);
   color3d::AddReferenceCommand(app);
   try {
     app.parse(argc, argv);

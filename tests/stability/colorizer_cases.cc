@@ -175,6 +175,7 @@ StabilityResult FastLearning(ColorizerOptions::Recipe recipe, double rate) {
   Problem p = Textured();
   for (size_t i = 0; i < p.ab.PlaneSize(); ++i) p.ab.Plane(0)[i] = p.luminance.data[i] - 50.0f;
   p.options.recipe = recipe;
+  p.options.instance_norm = recipe == ColorizerOptions::Recipe::kPaper;
   p.options.learning_rate = rate;
   p.options.iterations = 60;
   return Train(p);

@@ -106,6 +106,11 @@ void FeatureNeighbors::PutInto(TensorFile* file) const {
   PutTensors(ListTensors(bank_), kPrefix, StoredType::kFloat16, file);
 }
 
+void FeatureNeighbors::ForgetPositions(TensorFile* file) {
+  const auto positions = file->arrays.find(std::string(kPrefix) + "positions");
+  if (positions != file->arrays.end()) std::ranges::fill(positions->second.values, 0.0f);
+}
+
 std::unique_ptr<FeatureNeighbors> FeatureNeighbors::TakeFrom(const TapEncoder& encoder,
                                                              const FeatureNeighborsOptions& options,
                                                              const std::string& what,

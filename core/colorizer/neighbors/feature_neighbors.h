@@ -63,6 +63,8 @@ class FeatureNeighbors {
 
   // Adds the arrays "neighbors.*". The bank is in half precision already.
   void PutInto(TensorFile* file) const;
+  // Marks all positions in the file as unknown, if it has neighbors.
+  static void ForgetPositions(TensorFile* file);
   // Moves the arrays "neighbors.*" out of the file. Throws Error{kInvalidArgument} starting with
   // `what` if one is missing or does not fit.
   static std::unique_ptr<FeatureNeighbors> TakeFrom(const TapEncoder& encoder,

@@ -97,6 +97,7 @@ TEST(ColorizerTest, RestoresSameColorizerFromFile) {
   paper.elastic.alpha_px = 34.0;
   ColorizerOptions old_paper;  // of files of earlier versions
   old_paper.recipe = ColorizerOptions::Recipe::kPaper;
+  old_paper.instance_norm = true;
   for (ColorizerOptions options : {ColorizerOptions(), paper, old_paper}) {
     options.iterations = 3;
     options.crop_px = 64;
@@ -244,6 +245,35 @@ TEST(ColorizerTest, RefusesDamagedFiles) {
     changed[random.NextBelow(static_cast<uint32_t>(bytes.size()))] ^= 0x10;
     ExpectRefused(changed);
   }
+}
+
+TEST(ColorizerTest, ForOtherSceneForgetsPositions) {
+  const Key key = MakeKey(96, 80);
+  // Positions grow with x in the scene of the colorizer, and fall in the other one.
+  Image here(96, 80, 4, 1.0f), there(96, 80, 4, 1.0f);
+  for (int y = 0; y < 80; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      here.At(0, y, x) = 0.02f * x;
+      there.At(0, y, x) = 0.02f * (95 - x);
+    }
+  }
+  ThreadPool pool(1);
+  NoCheckpoints checkpoints;
+  NullObserver progress;
+  const CancellationToken cancel;
+  TrainingPicture picture{"key", key.luminance, key.ab};
+  picture.position = here;
+  const std::string bytes =
+      TrainColorizer(TheEncoder(), {picture}, Quick(0), {pool, checkpoints, progress, cancel})
+          ->Serialize();
+  const auto colors = [&](const std::string& file, const Image& position) {
+    return LoadColorizer(file, TheEncoder(), 1)->Predict(key.luminance, {{}, position}).ab.data;
+  };
+  EXPECT_NE(colors(bytes, there), colors(bytes, {}));
+  const std::string other = ColorizerForOtherScene(bytes, TheEncoder());
+  EXPECT_EQ(colors(other, there), colors(bytes, {}));
+  EXPECT_THROW(ColorizerForOtherScene(bytes.substr(1), TheEncoder()), Error);
+  EXPECT_THROW(ColorizerForOtherScene(bytes, std::make_shared<OtherEncoder>()), Error);
 }
 
 TEST(ColorizerTest, RefusesOtherEncoder) {

@@ -208,4 +208,11 @@ std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
   });
 }
 
+std::string ColorizerForOtherScene(std::string_view bytes, std::shared_ptr<const Encoder> encoder) {
+  LoadColorizer(bytes, std::move(encoder));  // throws if the file is unusable
+  TensorFile file = ReadTensorFile(bytes, kColorizerFormat, "the colorizer file");
+  FeatureNeighbors::ForgetPositions(&file);
+  return WriteTensorFile(file, kColorizerFormat);
+}
+
 }  // namespace color3d

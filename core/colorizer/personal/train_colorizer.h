@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -42,5 +43,9 @@ std::shared_ptr<const Colorizer> LoadColorizer(std::string_view bytes,
                                                std::shared_ptr<const Encoder> encoder,
                                                int threads = 0,
                                                const PredictionOptions& options = {});
+
+// Returns the file of a colorizer for use in another scene: positions in space, which mean nothing
+// there, are removed. Throws as LoadColorizer.
+std::string ColorizerForOtherScene(std::string_view bytes, std::shared_ptr<const Encoder> encoder);
 
 }  // namespace color3d

@@ -80,7 +80,8 @@ nlohmann::json JsonFromOptions(const ColorizerOptions& options) {
     if (defaults[name] != value) json[name] = value;
   });
   if (options.elastic.kind == ElasticOptions::Kind::kNoise) json["elastic"] = "noise";
-  if (options.instance_norm) json["instance_norm"] = *options.instance_norm;
+  const bool is_paper = options.recipe == ColorizerOptions::Recipe::kPaper;
+  if (options.instance_norm != is_paper) json["instance_norm"] = options.instance_norm;
   return json;
 }
 
@@ -95,7 +96,8 @@ ColorizerOptions OptionsFromJson(const nlohmann::json& json) {
   ForEachLaterOption(options,
                      [&](const char* name, auto& value) { value = json.value(name, value); });
   if (json.contains("elastic")) options.elastic.kind = ElasticOptions::Kind::kNoise;
-  if (json.contains("instance_norm")) options.instance_norm = json.at("instance_norm").get<bool>();
+  options.instance_norm =
+      json.value("instance_norm", options.recipe == ColorizerOptions::Recipe::kPaper);
   return options;
 }
 

@@ -19,7 +19,6 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
   // 3.75) and slowed iterations down, because gradients then pass through the encoder.
   TrainingRecipe recipe;
   if (options.recipe == ColorizerOptions::Recipe::kPaper) {
-    recipe.model.instance_norm = true;
     recipe.model.adapter_stages = kMaxAdapterStages;
     recipe.augment = AugmentOptions::Paper();
     recipe.first_learning_rate = 1e-4;
@@ -32,7 +31,7 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
   if (options.adapter_stages >= 0) recipe.model.adapter_stages = options.adapter_stages;
   recipe.model.decoder_width = options.decoder_width;
   recipe.model.full_resolution = options.full_resolution;
-  if (options.instance_norm) recipe.model.instance_norm = *options.instance_norm;
+  recipe.model.instance_norm = options.instance_norm;
   if (options.learning_rate > 0.0) recipe.first_learning_rate = options.learning_rate;
   recipe.model.half_products =
       options.precision == ColorizerOptions::Precision::kBfloat16 ||

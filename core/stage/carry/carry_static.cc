@@ -14,7 +14,8 @@ constexpr int64_t kPhotosCacheBytes = int64_t{1} << 30;
 void CarryStatic(const CarryInputs& inputs, StageContext& context) {
   const SceneSurfaces surfaces(
       inputs, std::min(kPhotosCacheBytes, context.MemoryBytes() / 4), context);
-  const std::vector<ColoredKeyView> keys = ReadColoredKeyViews(inputs, surfaces, context);
+  const std::vector<ColoredKeyView> keys =
+      ReadColoredKeyViews(inputs, surfaces, context, /*edits=*/true);
   const auto carry = [&](int view) {
     return CarryFromAll(keys, surfaces.Of(view), inputs.options.carry);
   };

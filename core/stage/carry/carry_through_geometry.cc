@@ -8,6 +8,7 @@
 #include "core/stage/carry/carry_results.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_checkpoint.h"
+#include "core/stage/formats/edited_share.h"
 #include "core/stage/formats/key_views.h"
 #include "core/stage/sources/render_view.h"
 
@@ -21,6 +22,13 @@ SurfaceRenderer RendererOf(const Scene& scene, const GaussianModel& geometry) {
     RenderedView seen = RenderView(geometry, view, camera, one);
     return RenderedSurface{std::move(seen.median_depth), std::move(seen.opacity)};
   };
+}
+
+// Adds `plane` (1 channel) as the last channel; does nothing if it is empty.
+void AddChannel(const Image& plane, Image* image) {
+  if (plane.Empty()) return;
+  ++image->channels;
+  image->data.insert(image->data.end(), plane.data.begin(), plane.data.end());
 }
 
 }  // namespace
@@ -39,7 +47,8 @@ SceneSurfaces::SceneSurfaces(const CarryInputs& inputs, int64_t cache_bytes, Sta
 
 std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
                                                 const SceneSurfaces& surfaces,
-                                                StageContext& context) {
+                                                StageContext& context,
+                                                bool edits) {
   const ViewImages& images = surfaces.images();
   std::vector<ColoredKeyView> keys;
   for (const int view : inputs.key_views) {
@@ -49,9 +58,17 @@ std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
       const Camera& camera = key.surfaces.rendered.camera;
       key.color = ReadKeyColor(context, camera.width, camera.height);
       ClearMasked(images.Mask(view).get(), &key.color.confidence);
+      if (edits) {
+        AddChannel(ReadEditedShare(context, artifact::kKeyColor, camera.width, camera.height),
+                   &key.color.ab);
+      }
     } else {
       key.color = CarryFromAll(keys, key.surfaces, inputs.options.carry);
-      FillFrom(ReadAdditionalKeyColor(context, inputs.scene, view, images), &key.color);
+      CarriedColor own = ReadAdditionalKeyColor(context, inputs.scene, view, images);
+      if (key.color.ab.channels > 2) {
+        AddChannel(ReadAdditionalEditedShare(context, inputs.scene, view, images), &own.ab);
+      }
+      FillFrom(own, &key.color);
     }
     keys.push_back(std::move(key));
   }
@@ -71,7 +88,7 @@ void CarryIntoViews(const CarryInputs& inputs,
     const auto key = std::ranges::find(keys, view, &ColoredKeyView::view);
     const bool is_key = key != keys.end();
     const CarriedColor color = is_key ? key->color : carry(view);
-    done.Add(view, is_key ? 1.0 : CoveredShare(color), EncodeAbPng(color.ab, color.confidence));
+    done.Add(view, is_key ? 1.0 : CoveredShare(color), EncodeCarriedPng(color));
   });
   WriteCoverage(inputs, done.coverage(), context);
 }

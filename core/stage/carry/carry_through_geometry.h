@@ -27,10 +27,12 @@ class SceneSurfaces {
 };
 
 // The key views with their colours. Each additional one has the colours that those before it give
-// it, and its own where they give none.
+// it, and its own where they give none. With `edits`, and if the chosen key view is an edit, the
+// edited share is the third channel of the colours.
 std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
                                                 const SceneSurfaces& surfaces,
-                                                StageContext& context);
+                                                StageContext& context,
+                                                bool edits = false);
 
 // Writes the colours of all views: those of key views as they are, of other ones as `carry` gives
 // them. `carry` is called from several threads, for views of one time after each other.

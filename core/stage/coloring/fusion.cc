@@ -1,6 +1,10 @@
+#include <atomic>
+#include <memory>
+#include <optional>
 #include <utility>
 
 #include "core/keycolor/automatic/automatic.h"
+#include "core/stage/coloring/recolored_views.h"
 #include "core/stage/coloring/view_coloring.h"
 #include "core/stage/film/color_frames.h"
 #include "core/stage/formats/artifact_io.h"
@@ -47,16 +51,32 @@ void ColorByFusion(const ViewColoring& coloring, StageContext& context) {
     }
     return ColorFrames(scene, images, frames, context);
   }
+  const auto recolorer =
+      ViewRecolorer::Read(scene, images, coloring.positions, *coloring.colorizer, context);
+  std::atomic<int> gray_views = 0;
   context.pool().ForEach(std::ssize(scene.views), [&](int64_t index, int) {
     context.ThrowIfCancelled();
     const auto number = static_cast<int>(index);
     if (done.WasDone(number)) return;
+    if (recolorer) {
+      if (const std::optional<FusedColor> color = recolorer->Recolor(number)) {
+        return done.Add(number, *color);
+      }
+      ++gray_views;
+    }
     const auto luminance = images.Luminance(number);
     const CarriedColor carried =
         ReadCarried(context, scene.views[index], luminance->width, luminance->height);
     ThreadPool one(1);
     done.Add(number, FuseViewColor(*luminance, carried, sources(number), one, context.cancel()));
   });
+  if (gray_views > 0) {
+    context.Warn(
+        "{} of {} photos are grey and have no colours of their own to keep beside the edit: they "
+        "get all colours from the edited key view. To keep theirs, give these photos in colour",
+        gray_views.load(),
+        scene.views.size());
+  }
 }
 
 }  // namespace color3d

@@ -71,22 +71,27 @@ std::vector<std::string> AdditionalKeyViewNames(const StageContext& context) {
   return names;
 }
 
-CarriedColor ReadAdditionalKeyColor(const StageContext& context,
-                                    const Scene& scene,
-                                    int view,
-                                    const ViewImages& images) {
+std::string AdditionalKeyViewFolder(const StageContext& context, const Scene& scene, int view) {
   const std::string& name = scene.views[view].name;
   for (const std::string& folder : AdditionalKeyViewFolders(context)) {
-    if (ReadJson(context, folder + artifact::kKeyColorFacts).value("view", "") != name) continue;
-    const std::string file = folder + artifact::kKeyColor;
-    const Camera camera = images.WorkingCamera(view);
-    CarriedColor color = Resized(ReadAbMap(context, file), camera.width, camera.height);
-    ClearMasked(images.Mask(view).get(), &color.confidence);
-    return color;
+    if (ReadJson(context, folder + artifact::kKeyColorFacts).value("view", "") == name) {
+      return folder;
+    }
   }
   throw Error(ErrorCode::kFailedPrecondition,
               "the colours of the additional key view {} are missing among the inputs",
               name);
+}
+
+CarriedColor ReadAdditionalKeyColor(const StageContext& context,
+                                    const Scene& scene,
+                                    int view,
+                                    const ViewImages& images) {
+  const std::string file = AdditionalKeyViewFolder(context, scene, view) + artifact::kKeyColor;
+  const Camera camera = images.WorkingCamera(view);
+  CarriedColor color = Resized(ReadAbMap(context, file), camera.width, camera.height);
+  ClearMasked(images.Mask(view).get(), &color.confidence);
+  return color;
 }
 
 }  // namespace color3d

@@ -28,9 +28,12 @@ std::vector<std::string> AdditionalKeyViewFolders(const StageContext& context);
 
 // Names of these key views, in the same order.
 std::vector<std::string> AdditionalKeyViewNames(const StageContext& context);
+// Folder of the additional key view. Throws Error{kFailedPrecondition} when no input has its
+// colours.
+std::string AdditionalKeyViewFolder(const StageContext& context, const Scene& scene, int view);
 
 // Colours of an additional key view, of the size of `images`. Their confidence is 0 where the view
-// is not painted or is masked out. Throws Error{kFailedPrecondition} when no input has them.
+// is not painted or is masked out. Throws as AdditionalKeyViewFolder.
 CarriedColor ReadAdditionalKeyColor(const StageContext& context,
                                     const Scene& scene,
                                     int view,
