@@ -40,8 +40,7 @@ class ImportCameraFilmsTest : public StageTest {
                      {.width = kWidth,
                       .height = kHeight,
                       .frames_per_second = 10,
-                      .ticks_per_second = 1000,
-                      .threads = 1});
+                      .ticks_per_second = 1000});
     for (int i = 0; i < frames; ++i) {
       if (i == dropped) continue;
       writer.AddAt(
