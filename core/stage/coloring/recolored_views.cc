@@ -1,6 +1,7 @@
 #include "core/stage/coloring/recolored_views.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
 #include <vector>
