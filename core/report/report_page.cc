@@ -178,6 +178,20 @@ std::string SectionHtml(const ReportSection& section) {
 
 std::string Seconds(double seconds) { return seconds > 0.0 ? Number(seconds) : std::string(); }
 
+// The estimates beside the measured seconds, over the stages that have both; empty without them.
+std::string PlanCheckHtml(const std::vector<PlanStep>& plan) {
+  double estimated = 0.0, measured = 0.0;
+  for (const PlanStep& step : plan) {
+    if (!step.needed || step.measured_seconds < 0.0 || !(step.estimated_seconds > 0.0)) continue;
+    estimated += step.estimated_seconds;
+    measured += step.measured_seconds;
+  }
+  if (!(measured > 0.0)) return "";
+  return fmt::format("<p>Expected before the run, on two cores: {:.0f} s; measured: {:.0f} s.</p>",
+                     estimated,
+                     measured);
+}
+
 // Steps left out come first, since no other chapter shows them.
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
   double saved = 0.0;
@@ -196,6 +210,7 @@ std::string PlanHtml(const std::vector<PlanStep>& plan) {
     }
   }
   if (!left_out.rows.empty()) html += TableHtml(left_out);
+  html += PlanCheckHtml(plan);
   if (!done.rows.empty()) {
     html += "<details><summary>Steps carried out, with reasons</summary>" + TableHtml(done) +
             "</details>";

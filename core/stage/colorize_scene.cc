@@ -145,6 +145,17 @@ double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kin
   return seconds;
 }
 
+// By the plan of the server; negative if it is unknown, as in benchmarks without a server.
+double ExpectedSecondsOf(const std::vector<StageSummary>& stages, const std::string& kind) {
+  double seconds = -1.0;
+  for (const StageSummary& s : stages) {
+    if (s.kind == kind && s.expected_seconds >= 0.0) {
+      seconds = std::max(seconds, 0.0) + s.expected_seconds;
+    }
+  }
+  return seconds;
+}
+
 std::string DescribeMotion(const FilmFindings& film, const Scene& scene) {
   std::string text = scene.relief       ? "the camera stands still, so that depth is unknown"
                      : film.poses_found ? fmt::format("{} frames have poses", film.frames_placed)
@@ -182,7 +193,14 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     if (s.state == "SKIPPED") SkipStep(s.kind, s.skip_reason, &plan);
   }
   for (PlanStep& step : plan) {
-    if (step.needed && !step.stage.empty()) step.measured_seconds = SecondsOf(stages, step.stage);
+    if (step.stage.empty()) continue;
+    const double expected = ExpectedSecondsOf(stages, step.stage);
+    const bool skipped = std::ranges::any_of(stages, [&](const StageSummary& s) {
+      return s.kind == step.stage && s.state == "SKIPPED";
+    });
+    // Other stages that are not needed ran without their main work, e.g. import with given poses.
+    if (expected >= 0.0 && (step.needed || skipped)) step.estimated_seconds = expected;
+    if (step.needed) step.measured_seconds = SecondsOf(stages, step.stage);
   }
   const auto add_reason = [&plan](const char* stage, const std::string& note) {
     for (PlanStep& step : plan) {

@@ -14,6 +14,7 @@
 #include "core/catalogue/artifacts.h"
 #include "server/base/service_error.h"
 #include "server/ops/process.h"
+#include "server/planning/job_plan.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/key_view_jobs.h"
 #include "server/planning/stage_key.h"
@@ -38,6 +39,34 @@ std::string IdentityOf(const fs::path& model) {
     identity += part.filename().string() + ' ' + FileIdentity(part) + '\n';
   }
   return identity;
+}
+
+// The stages of a graph with the seconds that its plan expected.
+std::vector<StageSummary> SummarizeStages(const std::vector<JobRecord>& jobs,
+                                          const SceneFacts& facts) {
+  NewGraph graph;
+  v1::ImportSceneSpec import;
+  for (const JobRecord& job : jobs) {
+    NewJob planned;
+    planned.kind = job.kind;
+    planned.spec = job.spec;
+    if (job.skipped_by_plan) planned.skip_reason = job.skip_reason;
+    graph.jobs.push_back(std::move(planned));
+    if (job.kind == kind::kImportScene) import = ParseSpec(job.spec, job.name).import_scene();
+  }
+  const v1::JobPlan plan = DescribeGraph(graph, facts, import, {});
+  std::vector<StageSummary> stages;
+  for (int i = 0; i < plan.stages_size(); ++i) {
+    const JobRecord& job = jobs[static_cast<size_t>(i)];
+    stages.push_back({.kind = job.kind,
+                      .state = JobStateName(job.state),
+                      .skip_reason = job.skip_reason,
+                      .seconds = job.usage.seconds,
+                      .expected_seconds = plan.stages(i).expected_seconds(),
+                      .peak_memory_bytes = job.usage.peak_memory_bytes,
+                      .warnings = job.usage.warnings});
+  }
+  return stages;
 }
 
 class StoredBlobs : public BlobSource {
@@ -185,14 +214,8 @@ void Attempt::Prepare() {
       run_.inputs[artifact.name] = path;
     }
   }
-  for (const JobRecord& child : context_.store.ListChildren(job_.name)) {
-    run_.graph.push_back({.kind = child.kind,
-                          .state = JobStateName(child.state),
-                          .skip_reason = child.skip_reason,
-                          .seconds = child.usage.seconds,
-                          .peak_memory_bytes = child.usage.peak_memory_bytes,
-                          .warnings = child.usage.warnings});
-  }
+  run_.graph = SummarizeStages(context_.store.ListChildren(job_.name),
+                               SceneFactsFrom(context_.store.GetScene(job_.scene)));
   const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
   if (part.bytes.empty()) return;

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "color3d/v1/job.grpc.pb.h"
-#include "core/catalogue/scene_files.h"
 #include "core/catalogue/stages.h"
 #include "server/access/notify_targets.h"
 #include "server/base/service_error.h"
@@ -77,15 +76,6 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
   return inputs;
 }
 
-SceneFacts SceneFactsFrom(const SceneRecord& scene) {
-  return {.pictures = scene.photo_count,
-          .layout = scene.layout,
-          .augment_files = static_cast<int>(
-              std::count_if(scene.files.begin(), scene.files.end(), [](const auto& file) {
-                return IsAugmentFile(file.path);
-              }))};
-}
-
 // Returns the route's colorize_key_view job, by default the accepted one of its scene, and the
 // inputs of that job.
 SceneRouteInputs LoadRoute(const ProjectStore& store,
@@ -128,7 +118,7 @@ NewGraph PlanRequest(const ProjectStore& store, const v1::JobSpec& spec) {
 }
 
 // Throws Error{kInvalidArgument} for facts that no scene can have.
-SceneFacts SceneFactsFrom(const v1::Capture& capture) {
+SceneFacts FactsOfCapture(const v1::Capture& capture) {
   constexpr int kMaxFiles = 10'000;  // as in CreateScene
   if (!v1::Scene::Layout_IsValid(capture.layout()) ||
       capture.layout() == v1::Scene::LAYOUT_UNSPECIFIED) {
@@ -163,6 +153,7 @@ std::vector<MeasuredJob> MeasuredJobs(const ProjectStore& store) {
     }
     if (!facts->second) continue;
     const v1::JobSpec spec = ParseSpec(job.spec, job.name);
+    if (spec.stage_case() == v1::JobSpec::STAGE_NOT_SET) continue;
     measured.push_back(
         {EstimateJobSeconds(spec, *facts->second, spec.import_scene()), job.usage.seconds});
   }
@@ -198,7 +189,7 @@ v1::JobPlan DescribeRequest(const RpcParts& parts,
   CheckName(spec.scene(), "scenes");
   CheckSpec(spec);
   CheckNames(spec, parts.models);
-  const SceneFacts facts = request.has_capture() ? SceneFactsFrom(request.capture())
+  const SceneFacts facts = request.has_capture() ? FactsOfCapture(request.capture())
                                                  : SceneFactsFrom(store.GetScene(spec.scene()));
   const std::vector<JobRecord> inputs = LoadInputs(store, spec);
   const NewGraph graph =
