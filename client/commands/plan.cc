@@ -16,8 +16,8 @@
 namespace color3d::client {
 namespace {
 
-v1::Capture CaptureOf(const PhotoFolder& folder) {
-  v1::Capture capture;
+v1::CaptureFacts CaptureOf(const PhotoFolder& folder) {
+  v1::CaptureFacts capture;
   capture.set_layout(static_cast<v1::Scene::Layout>(folder.Layout()));
   capture.set_photo_count(static_cast<int>(folder.photos.size()));
   capture.set_augment_file_count(static_cast<int>(folder.augment_files.size()));
@@ -60,7 +60,7 @@ ExitCode Plan(const Context& context, const ColorizeOptions& options) {
                                      ? options.key_view
                                      : FindPhotoByStem(folder, options.color.PictureOfView());
     *request.mutable_spec() = SpecToPlan(options, key_view);
-    *request.mutable_capture() = CaptureOf(folder);
+    *request.mutable_facts() = CaptureOf(folder);
   } else {
     *request.mutable_spec() = SpecToPlan(options, options.key_view);
     request.mutable_spec()->set_scene(ResourceName(options.scene, "scenes"));

@@ -155,6 +155,18 @@ std::string CurvesHtml(const std::vector<CurvePoint>& curves) {
   return "<div class=\"plots\">" + PlotsSvg(curves) + "</div>";
 }
 
+std::string ErrorAgainstTimeHtml(const ReportData& data) {
+  if (data.curves.empty() && data.run_curve.series.empty()) return "";
+  std::string html = ChapterStart("Error against time");
+  if (!data.run_curve.series.empty()) {
+    html +=
+        "<p>The first plot is the whole run, by stage: the estimated error of the colours, "
+        "against seconds of computing.</p><div class=\"plots\">" +
+        PlotSvg(data.run_curve) + "</div>";
+  }
+  return html + CurvesHtml(data.curves) + "</section>";
+}
+
 std::string SectionHtml(const ReportSection& section) {
   std::string html = ChapterStart(section.title) + Paragraphs(section.notes);
   if (!section.legend.empty()) {
@@ -310,9 +322,7 @@ std::string RenderReport(const ReportData& data) {
   }
   for (const ReportSection& section : data.sections) html += SectionHtml(section);
   html += ViewsHtml(data.views);
-  if (!data.curves.empty()) {
-    html += ChapterStart("Error against time") + CurvesHtml(data.curves) + "</section>";
-  }
+  html += ErrorAgainstTimeHtml(data);
   if (!data.plan.empty()) html += PlanHtml(data.plan);
   html += StagesHtml(data.stages) + FiguresHtml(data.metrics) + RepeatHtml(data);
   html += "</main>";

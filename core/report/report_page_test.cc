@@ -81,6 +81,18 @@ TEST(ReportPageTest, ComparesPlanWithMeasuredSeconds) {
   EXPECT_EQ(RenderReport(data).find("Expected before the run"), std::string::npos);
 }
 
+TEST(ReportPageTest, ShowsCurveOfWholeRun) {
+  ReportData data;
+  EXPECT_EQ(RenderReport(data).find("Error against time"), std::string::npos);
+  data.run_curve.title = "estimated error of the colours";
+  data.run_curve.series = {{"carry color", {{"", 0.0, 0, "", 10.0}, {"", 8.0, 0, "", 3.0}}},
+                           {"personalize", {{"", 8.0, 0, "", 3.0}, {"", 18.0, 0, "", 2.0}}}};
+  const std::string html = RenderReport(data);
+  EXPECT_NE(html.find("Error against time"), std::string::npos);
+  EXPECT_NE(html.find("aria-label=\"estimated error of the colours\""), std::string::npos);
+  EXPECT_NE(html.find("carry color"), std::string::npos) << "a band has its name";
+}
+
 TEST(ReportPageTest, ShowsChoiceAndColorOfKeyView) {
   ReportData data;
   data.key_view.pictures = {"a.jpg", {{"as captured", "\x89PNG"}}};

@@ -11,6 +11,7 @@
 #include "core/image/codec.h"
 #include "core/report/curves.h"
 #include "core/report/report_page.h"
+#include "core/report/run_curve.h"
 #include "core/report/scene_plan.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/formats/artifact_io.h"
@@ -106,6 +107,15 @@ std::vector<CurvePoint> CollectCurves(const StageContext& context) {
     curves.insert(curves.end(), points.begin(), points.end());
   }
   return curves;
+}
+
+RunCurve CollectRunCurve(const std::vector<StageSummary>& stages,
+                         const std::vector<CurvePoint>& curves) {
+  std::vector<RanStage> ran;
+  for (const StageSummary& s : stages) {
+    if (s.state == "SUCCEEDED") ran.push_back({s.kind, s.seconds});
+  }
+  return EstimateRunCurve(ran, curves);
 }
 
 // Facts of the plan that follow from the scene's kind.
@@ -311,6 +321,8 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
                               std::back_inserter(data.curves),
                               [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
   data.sections = colors.Sections(std::move(personalization));
+  const RunCurve run_curve = CollectRunCurve(stages, curves);
+  data.run_curve = RunCurvePlot(run_curve);
   data.views = ReportViews(scene, context);
   data.headline = Headline(metrics);
   for (const auto& [name, value] : metrics.items()) {
@@ -323,7 +335,9 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   }
   AddHowToRepeat(keys, facts.has_truth, context, &data);
   context.WriteOutput(artifact::kMetrics, metrics.dump(1) + "\n");
-  context.WriteOutput(artifact::kAllCurves, CurvesToCsv(curves));
+  std::vector<CurvePoint> all_curves = RunCurvePoints(run_curve);
+  all_curves.insert(all_curves.end(), curves.begin(), curves.end());
+  context.WriteOutput(artifact::kAllCurves, CurvesToCsv(all_curves));
   context.WriteOutput(artifact::kPlan, PlanToJson(data.plan));
   context.WriteOutput(artifact::kReport, RenderReport(data));
   ForwardResults(context);

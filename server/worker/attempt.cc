@@ -14,11 +14,11 @@
 #include "core/catalogue/artifacts.h"
 #include "server/base/service_error.h"
 #include "server/ops/process.h"
-#include "server/planning/job_plan.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/key_view_jobs.h"
 #include "server/planning/stage_key.h"
 #include "server/worker/blob_checkpoints.h"
+#include "server/worker/stage_summaries.h"
 #include "server/worker/told_paths.h"
 
 namespace color3d {
@@ -39,34 +39,6 @@ std::string IdentityOf(const fs::path& model) {
     identity += part.filename().string() + ' ' + FileIdentity(part) + '\n';
   }
   return identity;
-}
-
-// The stages of a graph with the seconds that its plan expected.
-std::vector<StageSummary> SummarizeStages(const std::vector<JobRecord>& jobs,
-                                          const SceneFacts& facts) {
-  NewGraph graph;
-  v1::ImportSceneSpec import;
-  for (const JobRecord& job : jobs) {
-    NewJob planned;
-    planned.kind = job.kind;
-    planned.spec = job.spec;
-    if (job.skipped_by_plan) planned.skip_reason = job.skip_reason;
-    graph.jobs.push_back(std::move(planned));
-    if (job.kind == kind::kImportScene) import = ParseSpec(job.spec, job.name).import_scene();
-  }
-  const v1::JobPlan plan = DescribeGraph(graph, facts, import, {});
-  std::vector<StageSummary> stages;
-  for (int i = 0; i < plan.stages_size(); ++i) {
-    const JobRecord& job = jobs[static_cast<size_t>(i)];
-    stages.push_back({.kind = job.kind,
-                      .state = JobStateName(job.state),
-                      .skip_reason = job.skip_reason,
-                      .seconds = job.usage.seconds,
-                      .expected_seconds = plan.stages(i).expected_seconds(),
-                      .peak_memory_bytes = job.usage.peak_memory_bytes,
-                      .warnings = job.usage.warnings});
-  }
-  return stages;
 }
 
 class StoredBlobs : public BlobSource {

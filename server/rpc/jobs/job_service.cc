@@ -118,17 +118,17 @@ NewGraph PlanRequest(const ProjectStore& store, const v1::JobSpec& spec) {
 }
 
 // Throws Error{kInvalidArgument} for facts that no scene can have.
-SceneFacts FactsOfCapture(const v1::Capture& capture) {
+SceneFacts FactsOfCapture(const v1::CaptureFacts& capture) {
   constexpr int kMaxFiles = 10'000;  // as in CreateScene
   if (!v1::Scene::Layout_IsValid(capture.layout()) ||
       capture.layout() == v1::Scene::LAYOUT_UNSPECIFIED) {
-    throw InvalidArgument("capture.layout is {}; give a value of Scene.Layout",
+    throw InvalidArgument("facts.layout is {}; give a value of Scene.Layout",
                           static_cast<int>(capture.layout()));
   }
   for (const auto& [name, count] : {std::pair{"photo_count", capture.photo_count()},
                                     {"augment_file_count", capture.augment_file_count()}}) {
     if (count < 0 || count > kMaxFiles) {
-      throw InvalidArgument("capture.{} is {}; the range is 0 to {}", name, count, kMaxFiles);
+      throw InvalidArgument("facts.{} is {}; the range is 0 to {}", name, count, kMaxFiles);
     }
   }
   return {.pictures = capture.photo_count(),
@@ -176,11 +176,11 @@ v1::JobPlan DescribeRequest(const RpcParts& parts,
                             const v1::PlanJobRequest& request) {
   if (!request.has_spec()) throw InvalidArgument("spec is required");
   v1::JobSpec spec = request.spec();
-  if (request.has_capture()) {
+  if (request.has_facts()) {
     if (!spec.scene().empty() || spec.inputs_size() > 0 || spec.has_personalize_scenes()) {
       throw InvalidArgument(
-          "capture describes a scene that is not stored; leave out spec.scene, spec.inputs and "
-          "spec.personalize_scenes, or leave out capture");
+          "facts describe a scene that is not stored; leave out spec.scene, spec.inputs and "
+          "spec.personalize_scenes, or leave out facts");
     }
     spec.set_scene("scenes/not-stored");
   } else if (spec.scene().empty() && spec.personalize_scenes().routes_size() > 0) {
@@ -189,11 +189,11 @@ v1::JobPlan DescribeRequest(const RpcParts& parts,
   CheckName(spec.scene(), "scenes");
   CheckSpec(spec);
   CheckNames(spec, parts.models);
-  const SceneFacts facts = request.has_capture() ? FactsOfCapture(request.capture())
-                                                 : SceneFactsFrom(store.GetScene(spec.scene()));
+  const SceneFacts facts = request.has_facts() ? FactsOfCapture(request.facts())
+                                               : SceneFactsFrom(store.GetScene(spec.scene()));
   const std::vector<JobRecord> inputs = LoadInputs(store, spec);
   const NewGraph graph =
-      request.has_capture() ? PlanJob(spec, inputs, facts) : PlanRequest(store, spec);
+      request.has_facts() ? PlanJob(spec, inputs, facts) : PlanRequest(store, spec);
   return DescribeGraph(
       graph, facts, FindImport(graph, inputs), MeasureMachine(MeasuredJobs(store)));
 }

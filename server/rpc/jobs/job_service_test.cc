@@ -80,11 +80,11 @@ TEST_F(JobServiceTest, PlanEqualsCreatedJobs) {
 TEST_F(JobServiceTest, PlansCapturesThatAreNotStored) {
   v1::PlanJobRequest request;
   *request.mutable_spec() = AutomaticSceneSpec("");
-  request.mutable_capture()->set_layout(v1::Scene::LAYOUT_COLMAP);
-  request.mutable_capture()->set_photo_count(20);
+  request.mutable_facts()->set_layout(v1::Scene::LAYOUT_COLMAP);
+  request.mutable_facts()->set_photo_count(20);
   v1::JobPlan few, many;
   ASSERT_TRUE(AskForPlan(*client_, request, &few).ok());
-  request.mutable_capture()->set_photo_count(60);
+  request.mutable_facts()->set_photo_count(60);
   ASSERT_TRUE(AskForPlan(*client_, request, &many).ok());
   EXPECT_GT(many.expected_seconds(), few.expected_seconds() + 10.0);
   // Blobs need not be uploaded.
@@ -103,12 +103,12 @@ TEST_F(JobServiceTest, RefusesBadPlans) {
   v1::PlanJobRequest request;
   EXPECT_THAT(refusal(request), HasSubstr("spec is required"));
   *request.mutable_spec() = AutomaticSceneSpec("");
-  request.mutable_capture()->set_photo_count(20);
-  EXPECT_THAT(refusal(request), HasSubstr("capture.layout is 0"));
-  request.mutable_capture()->set_layout(v1::Scene::LAYOUT_COLMAP);
-  request.mutable_capture()->set_photo_count(-1);
-  EXPECT_THAT(refusal(request), HasSubstr("capture.photo_count is -1"));
-  request.mutable_capture()->set_photo_count(20);
+  request.mutable_facts()->set_photo_count(20);
+  EXPECT_THAT(refusal(request), HasSubstr("facts.layout is 0"));
+  request.mutable_facts()->set_layout(v1::Scene::LAYOUT_COLMAP);
+  request.mutable_facts()->set_photo_count(-1);
+  EXPECT_THAT(refusal(request), HasSubstr("facts.photo_count is -1"));
+  request.mutable_facts()->set_photo_count(20);
   request.mutable_spec()->set_scene("scenes/some");
   EXPECT_THAT(refusal(request), HasSubstr("leave out spec.scene"));
   request.mutable_spec()->clear_scene();
