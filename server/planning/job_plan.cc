@@ -59,7 +59,8 @@ StageWork WorkOf(const v1::JobSpec& stage,
   return work;
 }
 
-// Options of another stage that decide the cost of one: `geometry` of the same scene, or nullptr.
+// `geometry`: options of the geometry stage in the same graph, which decide the cost of later stages
+// too; nullptr if there is none.
 double EstimateWithGeometry(const v1::JobSpec& stage,
                             const v1::ReconstructGeometrySpec* geometry,
                             const SceneFacts& facts,

@@ -57,7 +57,7 @@ class RecoloredViewsTest : public StageTest {
   static double WallX(int view, int x) {
     return AtX(view) + kDepth * (x + 0.5 - kWidth / 2.0) / kFocal;
   }
-  // The Lab picture of a view, with the red stripes made green if `edited`.
+  // The Lab picture of a view within the gamut, with the red stripes made green if `edited`.
   static Image Photo(int view, bool edited) {
     Image lab(kWidth, kHeight, 3);
     for (int y = 0; y < kHeight; ++y) {
@@ -69,7 +69,7 @@ class RecoloredViewsTest : public StageTest {
         lab.At(2, y, x) = static_cast<float>(color.b);
       }
     }
-    return lab;
+    return LabFromSrgb(SrgbFromLab(lab));
   }
   void WritePhoto(int view, bool gray) {
     const Image lab = Photo(view, false);

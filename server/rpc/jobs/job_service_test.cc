@@ -28,8 +28,11 @@ TEST_F(JobServiceTest, RefusesBadJobs) {
   const std::string scene = client_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
-  *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = DigestOf("absent");
   grpc::Status status = CreateStatus(spec);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("spec has no stage"));
+  *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = DigestOf("absent");
+  status = CreateStatus(spec);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(ReasonOfStatus(status), "BLOB_MISSING");
   spec.mutable_solve_chroma();

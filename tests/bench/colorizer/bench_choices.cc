@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
+#include "core/carry/fusion.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/colorizer/personal/train_colorizer.h"

@@ -158,8 +158,9 @@ void Run(const Arguments& args) {
       Image share;
       const Image truth = Edited(args, own, &share);
       Score(truth, share, own, ab, &scores);
-      WriteFileAtomic(out / ViewArtifact("sheets/", scene.views[view], ".jpg"),
-                      EncodeJpeg(Sheet(own, truth, ab)));
+      const std::filesystem::path sheet = out / ViewArtifact("sheets/", scene.views[view], ".jpg");
+      std::filesystem::create_directories(sheet.parent_path());
+      WriteFileAtomic(sheet, EncodeJpeg(Sheet(own, truth, ab)));
     }
     double seconds = 0.0;
     for (const StageSummary& stage : pipeline.summaries()) seconds += stage.seconds;
