@@ -136,13 +136,17 @@ SceneFacts FactsOfCapture(const v1::CaptureFacts& capture) {
           .augment_files = capture.augment_file_count()};
 }
 
-// Seconds of the newest finished jobs of the project. Jobs whose scene was deleted are left out.
+// Seconds of the newest finished jobs of the project, of a few scenes at most, whose files are
+// read. Jobs whose scene was deleted are left out.
 std::vector<MeasuredJob> MeasuredJobs(const ProjectStore& store) {
   constexpr int kNewestJobs = 60;
+  constexpr size_t kMostScenes = 5;
   std::vector<MeasuredJob> measured;
   std::map<std::string, std::optional<SceneFacts>> facts_of_scenes;
   for (const JobRecord& job : store.ListJobs({}, 0, kNewestJobs, kListBudget)) {
     if (job.state != JobState::kSucceeded || job.cached || job.spec.empty()) continue;
+    const bool is_full = facts_of_scenes.size() >= kMostScenes;
+    if (is_full && !facts_of_scenes.contains(job.scene)) continue;
     const auto [facts, is_new] = facts_of_scenes.try_emplace(job.scene);
     if (is_new) {
       try {
