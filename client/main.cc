@@ -76,6 +76,7 @@ int Main(int argc, char** argv) {
       ->envname("COLOR3D_TOKEN_FILE");
   app.add_flag("--json", context.json, "Print one JSON object instead of text");
   AddColorizeCommand(app, context);
+  AddPlanCommand(app, context);
   AddInspectCommand(app, context);
   AddSceneCommands(app, context);
   AddKeyCommands(app, context);

@@ -159,7 +159,7 @@ public core/keycolor edit_model from_image picture_checks recolor automatic/auto
 public core/film anchor_frames film_carry moving_regions returning_shots shots steady_colors steady_tones
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics scene_consistency temporal_consistency view_scores
-public core/report contact_sheet curves report_page scene_plan
+public core/report contact_sheet curves report_page run_curve scene_plan
 public core/scene camera frame_numbers frame_times import_options key_photo photo_masks relief scene \
   view_images formats/camera_file formats/camera_films import/hold_out import/import \
   masks/masked_points masks/still_regions
@@ -176,7 +176,7 @@ public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics
 public server/notify notifier webhook
-public server/planning asked_formats job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
+public server/planning asked_formats job_plan job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store chore_store client_store job job_store project_store worker_store sqlite_job_store store_file user_models
@@ -197,7 +197,7 @@ core/stage/report/next_key_view.cc 1
 core/stage/select_key_view.cc 1
 server/planning/colorize_scene_graph.cc 1
 server/planning/scene_facts.h 3
-server/planning/time_budget.cc 5
+server/planning/time_budget.cc 4
 server/rpc/scenes/scene_validation.cc 2
 server/worker/stage_runner.cc 1
 '

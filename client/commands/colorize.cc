@@ -11,12 +11,14 @@
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
 #include "client/commands/key_jobs.h"
+#include "client/commands/plan.h"
 #include "client/commands/results.h"
 #include "client/commands/scene_target.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/lib/photos/film_as_frames.h"
 #include "client/lib/photos/mask_files.h"
+#include "client/lib/plan_text.h"
 #include "client/lib/text.h"
 #include "client/options/colorize_options.h"
 #include "core/base/files.h"
@@ -183,11 +185,21 @@ class Colorize {
   }
 
   ExitCode Finish(const v1::JobSpec& spec) {
+    const std::optional<v1::JobPlan> plan = ShowPlan(*connection_, spec, display_);
     return Submit(spec, {}, [&](nlohmann::ordered_json result) {
-      if (!context_.json) return PrintText(Summary(out_));
+      if (!context_.json) return PrintText(Summary(out_) + PlanCheck(plan));
       result["metrics"] = ReadResult(out_, artifact::kMetrics);
+      if (plan) result["plan"] = ToJson(*plan);
       PrintJson(result);
     });
+  }
+
+  // The line that compares the plan with the seconds of the results; empty if one is unknown.
+  std::string PlanCheck(const std::optional<v1::JobPlan>& plan) const {
+    const auto metrics = ReadResult(out_, artifact::kMetrics);
+    const auto seconds = metrics.find("seconds_total");
+    if (!plan || seconds == metrics.end() || !seconds->is_number()) return "";
+    return PlanCheckText(plan->expected_seconds(), seconds->get<double>()) + "\n";
   }
 
   // Submits the job, follows it and `earlier` ones, and downloads its results. With --detach

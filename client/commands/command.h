@@ -48,6 +48,7 @@ inline CLI::App* AddCommand(CLI::App& parent,
 
 // Each declares its commands in `app`. Requires: `context` outlives `app`.
 void AddColorizeCommand(CLI::App& app, Context& context);
+void AddPlanCommand(CLI::App& app, Context& context);
 void AddInspectCommand(CLI::App& app, Context& context);
 void AddSceneCommands(CLI::App& app, Context& context);
 void AddKeyCommands(CLI::App& app, Context& context);

@@ -10,10 +10,11 @@ namespace color3d {
 
 struct StageSummary {
   std::string kind;
-  std::string state;              // of its job: "SUCCEEDED", "SKIPPED", ...
-  std::string skip_reason;        // reason for which the plan leaves it out
-  double seconds = 0.0;           // of computing, over all attempts (of the original when cached)
-  int64_t peak_memory_bytes = 0;  // 0: not measured
+  std::string state;               // of its job: "SUCCEEDED", "SKIPPED", ...
+  std::string skip_reason;         // reason for which the plan leaves it out
+  double seconds = 0.0;            // of computing, over all attempts (of the original when cached)
+  double expected_seconds = -1.0;  // by the plan, on two cores; < 0: unknown
+  int64_t peak_memory_bytes = 0;   // 0: not measured
   std::vector<std::string> warnings;
 };
 

@@ -195,6 +195,13 @@ std::string EscapeHtml(const std::string& text) {
   return escaped;
 }
 
+std::string PlotSvg(const Plot& plot) {
+  return fmt::format("<svg class=\"plot\" role=\"img\" aria-label=\"{}\" {}>{}</svg>",
+                     EscapeHtml(plot.title),
+                     ViewBox(kWidth, kHeight),
+                     PlotElements(plot));
+}
+
 std::string PlotsSvg(const std::vector<CurvePoint>& points) {
   std::vector<std::string> order;
   std::map<std::string, std::vector<CurvePoint>> groups;
@@ -206,11 +213,7 @@ std::string PlotsSvg(const std::vector<CurvePoint>& points) {
   std::string svg;
   for (const std::string& title : order) {
     if (groups[title].size() < 2) continue;
-    svg += fmt::format(
-        "<svg class=\"plot\" role=\"img\" aria-label=\"{}\" {}>{}</svg>",
-        EscapeHtml(title),
-        ViewBox(kWidth, kHeight),
-        PlotElements({title, {{"", groups[title]}}, false, title.ends_with("residual")}));
+    svg += PlotSvg({title, {{"", groups[title]}}, false, title.ends_with("residual")});
   }
   return svg;
 }

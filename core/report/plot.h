@@ -23,6 +23,9 @@ struct Plot {
 // A complete file: the plots in rows of four, with their styles.
 std::string FigureSvg(const std::vector<Plot>& plots);
 
+// For a page that has the styles.
+std::string PlotSvg(const Plot& plot);
+
 // For a page that has the styles: one plot for each (stage, error_name) of `points`, in the order
 // of first appearance. Single points are left out. Plots of residuals have a logarithmic axis.
 std::string PlotsSvg(const std::vector<CurvePoint>& points);

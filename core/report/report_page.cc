@@ -155,6 +155,18 @@ std::string CurvesHtml(const std::vector<CurvePoint>& curves) {
   return "<div class=\"plots\">" + PlotsSvg(curves) + "</div>";
 }
 
+std::string ErrorAgainstTimeHtml(const ReportData& data) {
+  if (data.curves.empty() && data.run_curve.series.empty()) return "";
+  std::string html = ChapterStart("Error against time");
+  if (!data.run_curve.series.empty()) {
+    html +=
+        "<p>The first plot is the whole run, by stage: the estimated error of the colours, "
+        "against seconds of computing.</p><div class=\"plots\">" +
+        PlotSvg(data.run_curve) + "</div>";
+  }
+  return html + CurvesHtml(data.curves) + "</section>";
+}
+
 std::string SectionHtml(const ReportSection& section) {
   std::string html = ChapterStart(section.title) + Paragraphs(section.notes);
   if (!section.legend.empty()) {
@@ -178,6 +190,20 @@ std::string SectionHtml(const ReportSection& section) {
 
 std::string Seconds(double seconds) { return seconds > 0.0 ? Number(seconds) : std::string(); }
 
+// The estimates beside the measured seconds, over the stages that have both; empty without them.
+std::string PlanCheckHtml(const std::vector<PlanStep>& plan) {
+  double estimated = 0.0, measured = 0.0;
+  for (const PlanStep& step : plan) {
+    if (!step.needed || step.measured_seconds < 0.0 || !(step.estimated_seconds > 0.0)) continue;
+    estimated += step.estimated_seconds;
+    measured += step.measured_seconds;
+  }
+  if (!(measured > 0.0)) return "";
+  return fmt::format("<p>Expected before the run, on two cores: {:.0f} s; measured: {:.0f} s.</p>",
+                     estimated,
+                     measured);
+}
+
 // Steps left out come first, since no other chapter shows them.
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
   double saved = 0.0;
@@ -196,6 +222,7 @@ std::string PlanHtml(const std::vector<PlanStep>& plan) {
     }
   }
   if (!left_out.rows.empty()) html += TableHtml(left_out);
+  html += PlanCheckHtml(plan);
   if (!done.rows.empty()) {
     html += "<details><summary>Steps carried out, with reasons</summary>" + TableHtml(done) +
             "</details>";
@@ -295,9 +322,7 @@ std::string RenderReport(const ReportData& data) {
   }
   for (const ReportSection& section : data.sections) html += SectionHtml(section);
   html += ViewsHtml(data.views);
-  if (!data.curves.empty()) {
-    html += ChapterStart("Error against time") + CurvesHtml(data.curves) + "</section>";
-  }
+  html += ErrorAgainstTimeHtml(data);
   if (!data.plan.empty()) html += PlanHtml(data.plan);
   html += StagesHtml(data.stages) + FiguresHtml(data.metrics) + RepeatHtml(data);
   html += "</main>";

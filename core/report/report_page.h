@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/report/curves.h"
+#include "core/report/plot.h"
 #include "core/report/scene_plan.h"
 
 namespace color3d {
@@ -84,6 +85,7 @@ struct ReportData {
   std::vector<std::pair<std::string, std::string>>
       headline;  // the most important metrics, in words
   std::vector<std::pair<std::string, double>> metrics;
+  Plot run_curve;  // of the whole run; without series: none
   std::vector<CurvePoint> curves;
   std::vector<PlanStep> plan;
   std::vector<ReportStage> stages;  // stages that ran

@@ -71,6 +71,28 @@ TEST(ReportPageTest, ShowsPlanTimesAndCommands) {
   EXPECT_EQ(RenderReport({}).find("Reproduction"), std::string::npos);
 }
 
+TEST(ReportPageTest, ComparesPlanWithMeasuredSeconds) {
+  ReportData data;
+  data.plan = {{"key_view_selection", false, "the key view was given", 1.25, -1.0, ""},
+               {"luminance_geometry", true, "every scene needs it", 19.0, 14.0, ""},
+               {"chroma", true, "a and b are fitted", 3.0, 2.0, ""}};
+  EXPECT_NE(RenderReport(data).find("on two cores: 22 s; measured: 16 s"), std::string::npos);
+  for (PlanStep& step : data.plan) step.measured_seconds = -1.0;
+  EXPECT_EQ(RenderReport(data).find("Expected before the run"), std::string::npos);
+}
+
+TEST(ReportPageTest, ShowsCurveOfWholeRun) {
+  ReportData data;
+  EXPECT_EQ(RenderReport(data).find("Error against time"), std::string::npos);
+  data.run_curve.title = "estimated error of the colours";
+  data.run_curve.series = {{"carry color", {{"", 0.0, 0, "", 10.0}, {"", 8.0, 0, "", 3.0}}},
+                           {"personalize", {{"", 8.0, 0, "", 3.0}, {"", 18.0, 0, "", 2.0}}}};
+  const std::string html = RenderReport(data);
+  EXPECT_NE(html.find("Error against time"), std::string::npos);
+  EXPECT_NE(html.find("aria-label=\"estimated error of the colours\""), std::string::npos);
+  EXPECT_NE(html.find("carry color"), std::string::npos) << "a band has its name";
+}
+
 TEST(ReportPageTest, ShowsChoiceAndColorOfKeyView) {
   ReportData data;
   data.key_view.pictures = {"a.jpg", {{"as captured", "\x89PNG"}}};

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/catalogue/cost_model.h"
 #include "core/catalogue/estimates.h"
 #include "core/catalogue/stages.h"
 
@@ -16,7 +17,6 @@ namespace {
 
 // Measured on two cores. The report shows measured seconds beside these estimates.
 constexpr double kSecondsPerRemapMegapixel = 0.01;
-constexpr double kSecondsPerFeatureMegapixel = 0.5;
 constexpr double kFullyDynamic = 0.5;  // motion energy
 
 // Steps that do something else for a kind of capture.
@@ -74,7 +74,8 @@ void Decide(const PlanFacts& f, PlanStep* step) {
     step->estimated_seconds = kPosesSecondsPerPhoto * f.views;
     if (f.has_poses) leave_out("the scene comes with camera poses");
   } else if (step->stage == kind::kSelectKeyView) {
-    step->estimated_seconds = kSecondsPerFeatureMegapixel * f.views * f.megapixels_per_view;
+    step->estimated_seconds =
+        EstimateSeconds(step->stage, {.views = f.views, .megapixels = f.megapixels_per_view});
     if (!f.key_view_strategy.empty()) {
       step->reason = "the key view is chosen by " + f.key_view_strategy;
     }

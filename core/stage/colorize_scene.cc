@@ -11,6 +11,7 @@
 #include "core/image/codec.h"
 #include "core/report/curves.h"
 #include "core/report/report_page.h"
+#include "core/report/run_curve.h"
 #include "core/report/scene_plan.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/formats/artifact_io.h"
@@ -108,6 +109,15 @@ std::vector<CurvePoint> CollectCurves(const StageContext& context) {
   return curves;
 }
 
+RunCurve CollectRunCurve(const std::vector<StageSummary>& stages,
+                         const std::vector<CurvePoint>& curves) {
+  std::vector<RanStage> ran;
+  for (const StageSummary& s : stages) {
+    if (s.state == "SUCCEEDED") ran.push_back({s.kind, s.seconds});
+  }
+  return EstimateRunCurve(ran, curves);
+}
+
 // Facts of the plan that follow from the scene's kind.
 PlanFacts FactsOfKind(const Scene& scene, const StageContext& context) {
   const CaptureKindInfo& capture = ColoredAs(context, scene);
@@ -141,6 +151,17 @@ double SecondsOf(const std::vector<StageSummary>& stages, const std::string& kin
   double seconds = -1.0;
   for (const StageSummary& s : stages) {
     if (s.kind == kind && s.state == "SUCCEEDED") seconds = std::max(seconds, 0.0) + s.seconds;
+  }
+  return seconds;
+}
+
+// By the plan of the server; negative if it is unknown, as in benchmarks without a server.
+double ExpectedSecondsOf(const std::vector<StageSummary>& stages, const std::string& kind) {
+  double seconds = -1.0;
+  for (const StageSummary& s : stages) {
+    if (s.kind == kind && s.expected_seconds >= 0.0) {
+      seconds = std::max(seconds, 0.0) + s.expected_seconds;
+    }
   }
   return seconds;
 }
@@ -182,7 +203,14 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
     if (s.state == "SKIPPED") SkipStep(s.kind, s.skip_reason, &plan);
   }
   for (PlanStep& step : plan) {
-    if (step.needed && !step.stage.empty()) step.measured_seconds = SecondsOf(stages, step.stage);
+    if (step.stage.empty()) continue;
+    const double expected = ExpectedSecondsOf(stages, step.stage);
+    const bool skipped = std::ranges::any_of(stages, [&](const StageSummary& s) {
+      return s.kind == step.stage && s.state == "SKIPPED";
+    });
+    // Other stages that are not needed ran without their main work, e.g. import with given poses.
+    if (expected >= 0.0 && (step.needed || skipped)) step.estimated_seconds = expected;
+    if (step.needed) step.measured_seconds = SecondsOf(stages, step.stage);
   }
   const auto add_reason = [&plan](const char* stage, const std::string& note) {
     for (PlanStep& step : plan) {
@@ -293,6 +321,8 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
                               std::back_inserter(data.curves),
                               [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
   data.sections = colors.Sections(std::move(personalization));
+  const RunCurve run_curve = CollectRunCurve(stages, curves);
+  data.run_curve = RunCurvePlot(run_curve);
   data.views = ReportViews(scene, context);
   data.headline = Headline(metrics);
   for (const auto& [name, value] : metrics.items()) {
@@ -305,7 +335,9 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   }
   AddHowToRepeat(keys, facts.has_truth, context, &data);
   context.WriteOutput(artifact::kMetrics, metrics.dump(1) + "\n");
-  context.WriteOutput(artifact::kAllCurves, CurvesToCsv(curves));
+  std::vector<CurvePoint> all_curves = RunCurvePoints(run_curve);
+  all_curves.insert(all_curves.end(), curves.begin(), curves.end());
+  context.WriteOutput(artifact::kAllCurves, CurvesToCsv(all_curves));
   context.WriteOutput(artifact::kPlan, PlanToJson(data.plan));
   context.WriteOutput(artifact::kReport, RenderReport(data));
   ForwardResults(context);

@@ -1,8 +1,12 @@
 // Facts about a scene that are known before its import. Pure functions, thread-safe.
 #pragma once
 
+#include <algorithm>
+
 #include "color3d/v1/stage.pb.h"
 #include "core/catalogue/captures.h"
+#include "core/catalogue/scene_files.h"
+#include "server/store/job.h"
 
 namespace color3d {
 
@@ -14,6 +18,16 @@ struct SceneFacts {
   CaptureLayout layout = CaptureLayout::kPhotos;
   int augment_files = 0;
 };
+
+// Requires: the record has its files.
+inline SceneFacts SceneFactsFrom(const SceneRecord& scene) {
+  return {.pictures = scene.photo_count,
+          .layout = scene.layout,
+          .augment_files = static_cast<int>(
+              std::count_if(scene.files.begin(), scene.files.end(), [](const auto& file) {
+                return IsAugmentFile(file.path);
+              }))};
+}
 
 inline bool EstimatesPoses(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   const PoseSource poses = InfoOf(facts.layout).poses;

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <string>
 
-#include "core/catalogue/estimates.h"
+#include "core/catalogue/cost_model.h"
 #include "core/catalogue/film_rate.h"
 #include "core/catalogue/stages.h"
 #include "proto/option_text.h"
@@ -15,11 +15,11 @@
 namespace color3d {
 namespace {
 
-// Measured at 500 px on two cores (tests/bench/RESULTS.md "Still scenes").
-constexpr double kBaseSeconds = 6.0;
-constexpr double kSecondsPerPhoto = 1.7;  // carrying, colouring, rendering and scoring one view
-// Films are coloured along the optical flow: carrying 0.1, colouring 0.3, movie and metrics 0.1.
-constexpr double kSecondsPerFrame = 0.5;
+// Not in the cost model: the report, and the features that personalization begins with.
+constexpr double kBaseSeconds = 5.6;
+// Of the preset fast.
+constexpr int kAssumedSidePx = 500;
+constexpr int kAssumedGaussians = 40'000;
 constexpr char kFewerFrames[] = ", or fewer frames (film_stride, film_begin_s, film_end_s)";
 constexpr double kMinScheduledSeconds = 15.0;  // with less, the result is of no use
 
@@ -41,15 +41,7 @@ int FramesInRange(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   return (inside + stride - 1) / stride;
 }
 
-struct ExpectedViews {
-  int count = 0;            // that the import will make
-  bool is_counted = false;  // the frames of video files are not counted before the import
-  const char* noun = "photos";
-  const char* fewer = ", or fewer photos";  // remedy
-  double seconds_each = kSecondsPerPhoto;
-  bool have_geometry = false;
-  bool are_reconstructed = true;
-};
+}  // namespace
 
 ExpectedViews ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   const bool is_counted = facts.pictures > 0;
@@ -66,14 +58,17 @@ ExpectedViews ViewsOf(const SceneFacts& facts, const v1::ImportSceneSpec& import
               .is_counted = is_counted,
               .noun = "frames",
               .fewer = kFewerFrames,
-              .seconds_each =
-                  InfoOf(layout.kind).is_reconstructed ? kSecondsPerPhoto : kSecondsPerFrame,
+              .kind = KindBeforeImport(facts, import),
+              .are_frames = true,
               .are_reconstructed = InfoOf(KindBeforeImport(facts, import)).is_reconstructed};
     case ViewSource::kPhotos:
       break;
   }
-  return {facts.pictures, is_counted};
+  return {
+      .count = facts.pictures, .is_counted = is_counted, .kind = KindBeforeImport(facts, import)};
 }
+
+namespace {
 
 std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   const double fixed = FixedSeconds(facts, import);
@@ -94,8 +89,17 @@ std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSc
 
 double FixedSeconds(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
   const ExpectedViews views = ViewsOf(facts, import);
-  const double poses = EstimatesPoses(facts, import) ? kPosesSecondsPerPhoto : 0.0;
-  return kBaseSeconds + (views.seconds_each + poses) * views.count;
+  const StageWork work = {.views = views.count,
+                          .megapixels = AssumedMegapixels(kAssumedSidePx, views.are_frames),
+                          .gaussians = views.are_reconstructed ? kAssumedGaussians : 0,
+                          .kind = views.kind,
+                          .estimates_poses = EstimatesPoses(facts, import),
+                          .key_view_given = true};
+  double seconds = kBaseSeconds;
+  for (const Stage& stage : StageCatalogue()) {
+    if (!stage.keeps_time_limit) seconds += EstimateSeconds(stage.kind, work);
+  }
+  return seconds;
 }
 
 TimeBudget DivideTimeBudget(double seconds,

@@ -64,7 +64,7 @@ TEST(Planner, BudgetOfAFilmGoesToPersonalization) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_time_budget_seconds(120);
   const SceneFacts film = {.pictures = 65, .layout = CaptureLayout::kFilm};
-  EXPECT_NEAR(FixedSeconds(film), 39.0, 1.0);
+  EXPECT_NEAR(FixedSeconds(film), 27.0, 1.0);
   EXPECT_NEAR(PersonalizeSeconds(spec, film) + FixedSeconds(film), 120.0, 1e-6);
   v1::ImportSceneSpec* import = spec.mutable_colorize_scene()->mutable_import_scene();
   import->set_film_poses(v1::ImportSceneSpec::FILM_POSES_AUTO);
@@ -125,8 +125,8 @@ TEST(Planner, RefusalOfAFilmSpeaksOfFrames) {
     return std::string("nothing");
   };
   EXPECT_THAT(complaint(40, {.pictures = 65, .layout = CaptureLayout::kFilm}),
-              HasSubstr("65 frames take about 39 s in stages that cannot be shortened; give at "
-                        "least 54 s, or fewer frames (film_stride"));
+              HasSubstr("65 frames take about 28 s in stages that cannot be shortened; give at "
+                        "least 43 s, or fewer frames (film_stride"));
   EXPECT_THAT(complaint(12, {.pictures = 0, .layout = CaptureLayout::kFilm}),
               HasSubstr("a film takes, without its frames, about 6 s"));
 }

@@ -18,6 +18,7 @@
 #include "server/planning/key_view_jobs.h"
 #include "server/planning/stage_key.h"
 #include "server/worker/blob_checkpoints.h"
+#include "server/worker/stage_summaries.h"
 #include "server/worker/told_paths.h"
 
 namespace color3d {
@@ -185,14 +186,8 @@ void Attempt::Prepare() {
       run_.inputs[artifact.name] = path;
     }
   }
-  for (const JobRecord& child : context_.store.ListChildren(job_.name)) {
-    run_.graph.push_back({.kind = child.kind,
-                          .state = JobStateName(child.state),
-                          .skip_reason = child.skip_reason,
-                          .seconds = child.usage.seconds,
-                          .peak_memory_bytes = child.usage.peak_memory_bytes,
-                          .warnings = child.usage.warnings});
-  }
+  run_.graph = SummarizeStages(context_.store.ListChildren(job_.name),
+                               SceneFactsFrom(context_.store.GetScene(job_.scene)));
   const StageKeyPart part = KeyPartOf(run_.spec);
   NoteModels(part.models);
   if (part.bytes.empty()) return;

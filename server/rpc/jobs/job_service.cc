@@ -4,13 +4,17 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <map>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "color3d/v1/job.grpc.pb.h"
-#include "core/catalogue/scene_files.h"
 #include "core/catalogue/stages.h"
 #include "server/access/notify_targets.h"
 #include "server/base/service_error.h"
+#include "server/planning/job_plan.h"
+#include "server/planning/job_spec.h"
 #include "server/planning/plan_scenes.h"
 #include "server/planning/planner.h"
 #include "server/planning/spec_check.h"
@@ -72,15 +76,6 @@ std::vector<JobRecord> LoadInputs(const ProjectStore& store, const v1::JobSpec& 
   return inputs;
 }
 
-SceneFacts SceneFactsFrom(const SceneRecord& scene) {
-  return {.pictures = scene.photo_count,
-          .layout = scene.layout,
-          .augment_files = static_cast<int>(
-              std::count_if(scene.files.begin(), scene.files.end(), [](const auto& file) {
-                return IsAugmentFile(file.path);
-              }))};
-}
-
 // Returns the route's colorize_key_view job, by default the accepted one of its scene, and the
 // inputs of that job.
 SceneRouteInputs LoadRoute(const ProjectStore& store,
@@ -120,6 +115,91 @@ NewGraph PlanRequest(const ProjectStore& store, const v1::JobSpec& spec) {
     routes.push_back(LoadRoute(store, route));
   }
   return PlanPersonalizeScenes(spec, routes);
+}
+
+// Throws Error{kInvalidArgument} for facts that no scene can have.
+SceneFacts FactsOfCapture(const v1::CaptureFacts& capture) {
+  constexpr int kMaxFiles = 10'000;  // as in CreateScene
+  if (!v1::Scene::Layout_IsValid(capture.layout()) ||
+      capture.layout() == v1::Scene::LAYOUT_UNSPECIFIED) {
+    throw InvalidArgument("facts.layout is {}; give a value of Scene.Layout",
+                          static_cast<int>(capture.layout()));
+  }
+  for (const auto& [name, count] : {std::pair{"photo_count", capture.photo_count()},
+                                    {"augment_file_count", capture.augment_file_count()}}) {
+    if (count < 0 || count > kMaxFiles) {
+      throw InvalidArgument("facts.{} is {}; the range is 0 to {}", name, count, kMaxFiles);
+    }
+  }
+  return {.pictures = capture.photo_count(),
+          .layout = static_cast<CaptureLayout>(capture.layout()),
+          .augment_files = capture.augment_file_count()};
+}
+
+// Seconds of the newest finished jobs of the project, of a few scenes at most, whose files are
+// read. Jobs whose scene was deleted are left out.
+std::vector<MeasuredJob> MeasuredJobs(const ProjectStore& store) {
+  constexpr int kNewestJobs = 60;
+  constexpr size_t kMostScenes = 5;
+  std::vector<MeasuredJob> measured;
+  std::map<std::string, std::optional<SceneFacts>> facts_of_scenes;
+  for (const JobRecord& job : store.ListJobs({}, 0, kNewestJobs, kListBudget)) {
+    if (job.state != JobState::kSucceeded || job.cached || job.spec.empty()) continue;
+    const bool is_full = facts_of_scenes.size() >= kMostScenes;
+    if (is_full && !facts_of_scenes.contains(job.scene)) continue;
+    const auto [facts, is_new] = facts_of_scenes.try_emplace(job.scene);
+    if (is_new) {
+      try {
+        facts->second = SceneFactsFrom(store.GetScene(job.scene));
+      } catch (const Error& e) {
+        if (e.code() != ErrorCode::kNotFound) throw;
+      }
+    }
+    if (!facts->second) continue;
+    const v1::JobSpec spec = ParseSpec(job.spec, job.name);
+    if (spec.stage_case() == v1::JobSpec::STAGE_NOT_SET) continue;
+    measured.push_back(
+        {EstimateJobSeconds(spec, *facts->second, spec.import_scene()), job.usage.seconds});
+  }
+  return measured;
+}
+
+// Options of the import in the graph, else among the inputs.
+v1::ImportSceneSpec FindImport(const NewGraph& graph, const std::vector<JobRecord>& inputs) {
+  for (const NewJob& job : graph.jobs) {
+    if (job.kind == kind::kImportScene) return ParseSpec(job.spec, job.kind).import_scene();
+  }
+  for (const JobRecord& job : inputs) {
+    if (job.kind == kind::kImportScene) return ParseSpec(job.spec, job.name).import_scene();
+  }
+  return {};
+}
+
+v1::JobPlan DescribeRequest(const RpcParts& parts,
+                            const ProjectStore& store,
+                            const v1::PlanJobRequest& request) {
+  if (!request.has_spec()) throw InvalidArgument("spec is required");
+  v1::JobSpec spec = request.spec();
+  if (request.has_facts()) {
+    if (!spec.scene().empty() || spec.inputs_size() > 0 || spec.has_personalize_scenes()) {
+      throw InvalidArgument(
+          "facts describe a scene that is not stored; leave out spec.scene, spec.inputs and "
+          "spec.personalize_scenes, or leave out facts");
+    }
+    spec.set_scene("scenes/not-stored");
+  } else if (spec.scene().empty() && spec.personalize_scenes().routes_size() > 0) {
+    spec.set_scene(spec.personalize_scenes().routes(0).scene());
+  }
+  CheckName(spec.scene(), "scenes");
+  CheckSpec(spec);
+  CheckNames(spec, parts.models);
+  const SceneFacts facts = request.has_facts() ? FactsOfCapture(request.facts())
+                                               : SceneFactsFrom(store.GetScene(spec.scene()));
+  const std::vector<JobRecord> inputs = LoadInputs(store, spec);
+  const NewGraph graph =
+      request.has_facts() ? PlanJob(spec, inputs, facts) : PlanRequest(store, spec);
+  return DescribeGraph(
+      graph, facts, FindImport(graph, inputs), MeasureMachine(MeasuredJobs(store)));
 }
 
 JobRecord CreateJobRecord(const RpcParts& parts,
@@ -204,6 +284,14 @@ class JobServiceImpl final : public v1::JobService::CallbackService {
                                 v1::Job* response) override {
     return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
       *response = ToProto(CreateJobRecord(parts_, call, *request));
+    });
+  }
+
+  ServerUnaryReactor* PlanJob(CallbackServerContext* context,
+                              const v1::PlanJobRequest* request,
+                              v1::JobPlan* response) override {
+    return AnswerRead(parts_, context, request, response, [=, this](const Call& call) {
+      *response = DescribeRequest(parts_, call.store, *request);
     });
   }
 

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <string>
+#include <vector>
 
 #include "tests/support/service/rpc_fixture.h"
 
@@ -42,6 +44,79 @@ TEST_F(JobServiceTest, RefusesBadJobs) {
   EXPECT_EQ(CreateStatus(spec).error_code(), grpc::StatusCode::NOT_FOUND);
   spec.set_scene("../x");
   EXPECT_EQ(CreateStatus(spec).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+}
+
+grpc::Status AskForPlan(TestClient& client, const v1::PlanJobRequest& request, v1::JobPlan* plan) {
+  grpc::ClientContext context;
+  return client.jobs->PlanJob(&context, request, plan);
+}
+
+v1::JobSpec AutomaticSceneSpec(const std::string& scene) {
+  v1::JobSpec spec;
+  spec.set_scene(scene);
+  spec.mutable_colorize_scene()->mutable_key_color()->set_automatic(true);
+  return spec;
+}
+
+TEST_F(JobServiceTest, PlanEqualsCreatedJobs) {
+  const std::string scene = client_->MakeScene().name();
+  v1::PlanJobRequest request;
+  *request.mutable_spec() = AutomaticSceneSpec(scene);
+  v1::JobPlan plan;
+  const grpc::Status status = AskForPlan(*client_, request, &plan);
+  ASSERT_TRUE(status.ok()) << status.error_message();
+  EXPECT_TRUE(client_->Children(scene).empty()) << "a plan creates nothing";
+  const v1::Job job = client_->Create(request.spec());
+  std::vector<std::string> planned, created;
+  for (const v1::PlannedStage& stage : plan.stages()) {
+    planned.push_back(stage.kind() + (stage.runs() ? "" : " left out: " + stage.reason()));
+  }
+  for (const v1::Job& child : client_->Children(job.name())) {
+    const bool runs = child.state() != v1::Job::STATE_SKIPPED;
+    created.push_back(child.kind() + (runs ? "" : " left out: " + child.skip_reason()));
+  }
+  EXPECT_THAT(planned, ::testing::UnorderedElementsAreArray(created));
+  EXPECT_GT(plan.expected_seconds(), 1.0);
+  EXPECT_EQ(plan.machine_factor(), 1.0);
+}
+
+TEST_F(JobServiceTest, PlansCapturesThatAreNotStored) {
+  v1::PlanJobRequest request;
+  *request.mutable_spec() = AutomaticSceneSpec("");
+  request.mutable_facts()->set_layout(v1::Scene::LAYOUT_COLMAP);
+  request.mutable_facts()->set_photo_count(20);
+  v1::JobPlan few, many;
+  ASSERT_TRUE(AskForPlan(*client_, request, &few).ok());
+  request.mutable_facts()->set_photo_count(60);
+  ASSERT_TRUE(AskForPlan(*client_, request, &many).ok());
+  EXPECT_GT(many.expected_seconds(), few.expected_seconds() + 10.0);
+  // Blobs need not be uploaded.
+  *request.mutable_spec()->mutable_colorize_scene()->mutable_key_color()->mutable_image() =
+      DigestOf("absent");
+  EXPECT_TRUE(AskForPlan(*client_, request, &many).ok());
+}
+
+TEST_F(JobServiceTest, RefusesBadPlans) {
+  const auto refusal = [&](const v1::PlanJobRequest& request) {
+    v1::JobPlan plan;
+    const grpc::Status status = AskForPlan(*client_, request, &plan);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+    return status.error_message();
+  };
+  v1::PlanJobRequest request;
+  EXPECT_THAT(refusal(request), HasSubstr("spec is required"));
+  *request.mutable_spec() = AutomaticSceneSpec("");
+  request.mutable_facts()->set_photo_count(20);
+  EXPECT_THAT(refusal(request), HasSubstr("facts.layout is 0"));
+  request.mutable_facts()->set_layout(v1::Scene::LAYOUT_COLMAP);
+  request.mutable_facts()->set_photo_count(-1);
+  EXPECT_THAT(refusal(request), HasSubstr("facts.photo_count is -1"));
+  request.mutable_facts()->set_photo_count(20);
+  request.mutable_spec()->set_scene("scenes/some");
+  EXPECT_THAT(refusal(request), HasSubstr("leave out spec.scene"));
+  request.mutable_spec()->clear_scene();
+  request.mutable_spec()->mutable_colorize_scene()->set_time_budget_seconds(20);
+  EXPECT_THAT(refusal(request), HasSubstr("give at least"));
 }
 
 TEST_F(JobServiceTest, FullQueueGivesRetryDelay) {

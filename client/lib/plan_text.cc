@@ -1,0 +1,64 @@
+#include "client/lib/plan_text.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "client/lib/text.h"
+
+namespace color3d::client {
+namespace {
+
+std::string InWords(std::string kind) {
+  std::replace(kind.begin(), kind.end(), '_', ' ');
+  return kind;
+}
+
+// Rows of the stages that run, or of those that are left out.
+std::string StageTable(const v1::JobPlan& plan, bool runs, const std::string& heading) {
+  std::vector<std::vector<std::string>> rows = {{heading, "seconds", "reason"}};
+  for (const v1::PlannedStage& stage : plan.stages()) {
+    if (stage.runs() != runs) continue;
+    const double seconds = stage.expected_seconds();
+    rows.push_back(
+        {InWords(stage.kind()), seconds > 0.0 ? HumanSeconds(seconds) : "-", stage.reason()});
+  }
+  return rows.size() > 1 ? Table(std::move(rows)) : "";
+}
+
+}  // namespace
+
+std::string PlanText(const v1::JobPlan& plan) {
+  std::string text = StageTable(plan, true, "runs") + StageTable(plan, false, "left out");
+  text += fmt::format("expected: {} of computing", HumanSeconds(plan.expected_seconds()));
+  if (plan.saved_seconds() >= 0.05) {
+    text += fmt::format("; {} saved", HumanSeconds(plan.saved_seconds()));
+  }
+  text += plan.measured_jobs() > 0
+              ? fmt::format(
+                    " (this server takes {:.1f} times the seconds of two cores of the "
+                    "reference machine, by its last {} jobs)",
+                    plan.machine_factor(),
+                    plan.measured_jobs())
+              : " (two cores of the reference machine; this server has not run enough jobs to know "
+                "its own speed)";
+  return text + "\n";
+}
+
+bool IsWithinAThird(double expected_seconds, double measured_seconds) {
+  return std::abs(expected_seconds - measured_seconds) <= measured_seconds / 3.0;
+}
+
+std::string PlanCheckText(double expected_seconds, double measured_seconds) {
+  return fmt::format("expected {} of computing, took {}{}",
+                     HumanSeconds(expected_seconds),
+                     HumanSeconds(measured_seconds),
+                     IsWithinAThird(expected_seconds, measured_seconds)
+                         ? ""
+                         : ": more than a third off (results of earlier equal jobs keep the "
+                           "seconds of their first run)");
+}
+
+}  // namespace color3d::client

@@ -1,0 +1,66 @@
+#include "client/lib/plan_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace color3d::client {
+namespace {
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+v1::JobPlan SomePlan() {
+  v1::JobPlan plan;
+  const auto add = [&](const char* kind, bool runs, const char* reason, double seconds) {
+    v1::PlannedStage* stage = plan.add_stages();
+    stage->set_kind(kind);
+    stage->set_runs(runs);
+    stage->set_reason(reason);
+    stage->set_expected_seconds(seconds);
+  };
+  add("carry_color", true, "colours are carried", 12.0);
+  add("correct_colors", false, "no corrections were given", 0.0);
+  add("solve_chroma", false, "frames are not reconstructed", 27.0);
+  plan.set_expected_seconds(12.0);
+  plan.set_saved_seconds(27.0);
+  plan.set_machine_factor(1.0);
+  return plan;
+}
+
+TEST(PlanTextTest, NamesStagesReasonsAndSeconds) {
+  const std::string text = PlanText(SomePlan());
+  EXPECT_THAT(text, HasSubstr("carry color"));
+  EXPECT_THAT(text, HasSubstr("colours are carried"));
+  EXPECT_THAT(text, HasSubstr("frames are not reconstructed"));
+  EXPECT_THAT(text, HasSubstr("expected: 12 s of computing; 27 s saved"));
+  EXPECT_LT(text.find("carry color"), text.find("left out"));
+  EXPECT_GT(text.find("solve chroma"), text.find("left out"));
+}
+
+TEST(PlanTextTest, SaysHowSpeedOfServerIsKnown) {
+  v1::JobPlan plan = SomePlan();
+  EXPECT_THAT(PlanText(plan), HasSubstr("has not run enough jobs"));
+  plan.set_machine_factor(2.5);
+  plan.set_measured_jobs(9);
+  EXPECT_THAT(PlanText(plan), HasSubstr("2.5 times"));
+  EXPECT_THAT(PlanText(plan), HasSubstr("9 jobs"));
+}
+
+TEST(PlanTextTest, OmitsHeadingWithoutStagesLeftOut) {
+  v1::JobPlan plan = SomePlan();
+  plan.mutable_stages()->DeleteSubrange(1, 2);
+  plan.set_saved_seconds(0.0);
+  EXPECT_THAT(PlanText(plan), Not(HasSubstr("left out")));
+  EXPECT_THAT(PlanText(plan), Not(HasSubstr("saved")));
+}
+
+TEST(PlanTextTest, ComparesWithMeasuredSeconds) {
+  EXPECT_TRUE(IsWithinAThird(41.0, 60.0));
+  EXPECT_TRUE(IsWithinAThird(79.0, 60.0));
+  EXPECT_FALSE(IsWithinAThird(39.0, 60.0));
+  EXPECT_FALSE(IsWithinAThird(81.0, 60.0));
+  EXPECT_EQ(PlanCheckText(54.0, 57.0), "expected 54 s of computing, took 57 s");
+  EXPECT_THAT(PlanCheckText(20.0, 57.0), HasSubstr("more than a third off"));
+}
+
+}  // namespace
+}  // namespace color3d::client

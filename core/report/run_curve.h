@@ -1,0 +1,44 @@
+// Estimated error of the colours against seconds since the start of the run, over all stages. Pure
+// functions.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/report/curves.h"
+#include "core/report/plot.h"
+
+namespace color3d {
+
+// Stage that ran, in the order of the pipeline.
+struct RanStage {
+  std::string kind;
+  double seconds = 0.0;  // of computing
+};
+
+struct RunPoint {
+  double seconds = 0.0;  // of computing since the start of the run
+  std::string stage;     // that ran then
+  double error = 0.0;    // estimated CIEDE2000 of chroma
+};
+
+struct RunCurve {
+  std::vector<RunPoint> points;      // by seconds; at least one at the end of each stage
+  std::optional<double> true_error;  // of held-out views at the end of the run; nullopt: no truth
+};
+
+// The estimate is c E + (1 - c) V (core/METHOD.md, "Plan and error of a run"): c is the share of
+// the pixels that get carried colours, E the usual error of such colours, V the error of the
+// colorizer on parts of the key view that it did not learn from. Empty if no colorizer was trained:
+// V is unknown.
+RunCurve EstimateRunCurve(const std::vector<RanStage>& stages,
+                          const std::vector<CurvePoint>& curves);
+
+// Points of curves.csv: stage "whole_run", errors "estimated_delta_e00" and "delta_e00_chroma".
+std::vector<CurvePoint> RunCurvePoints(const RunCurve& curve);
+
+// One line for each stage, so that the stages are bands of colour, and one for the true error.
+Plot RunCurvePlot(const RunCurve& curve);
+
+}  // namespace color3d

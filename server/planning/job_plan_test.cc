@@ -1,0 +1,175 @@
+#include "server/planning/job_plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/catalogue/stages.h"
+#include "server/planning/job_spec.h"
+#include "tests/support/service/planned_graphs.h"
+
+namespace color3d {
+namespace {
+using ::testing::HasSubstr;
+
+v1::JobPlan PlanOf(const v1::JobSpec& spec,
+                   const SceneFacts& facts,
+                   const MachineFactor& machine = {}) {
+  const NewGraph graph = PlanJob(spec, {}, facts);
+  return DescribeGraph(graph, facts, spec.colorize_scene().import_scene(), machine);
+}
+
+const v1::PlannedStage& StageIn(const v1::JobPlan& plan, const std::string& kind) {
+  for (const v1::PlannedStage& stage : plan.stages()) {
+    if (stage.kind() == kind) return stage;
+  }
+  ADD_FAILURE() << "no " << kind;
+  return v1::PlannedStage::default_instance();
+}
+
+v1::JobSpec SpecWithKeyView() {
+  v1::JobSpec spec = SceneSpec();
+  spec.mutable_colorize_scene()->set_key_view("a.jpg");
+  return spec;
+}
+
+// Totals of tests/bench/RESULTS.md, which were measured with given key views.
+struct MeasuredRun {
+  const char* scene;
+  SceneFacts facts;
+  double seconds;
+  bool finds_poses_of_film = false;
+};
+
+TEST(JobPlanTest, AgreesWithMeasuredRuns) {
+  const MeasuredRun runs[] = {
+      {"fern", {.pictures = 20, .layout = CaptureLayout::kColmap}, 51},
+      {"fox", {.pictures = 50, .layout = CaptureLayout::kTransforms}, 69},
+      {"banana", {.pictures = 14, .layout = CaptureLayout::kColmap}, 38},
+      {"sceaux", {.pictures = 11, .layout = CaptureLayout::kColmap}, 42},
+      {"head", {.pictures = 33, .layout = CaptureLayout::kPhotos}, 109},
+      {"lady_running", {.pictures = 65, .layout = CaptureLayout::kFilm}, 31},
+      {"man_walking", {.pictures = 24, .layout = CaptureLayout::kFilm}, 17},
+      {"cam01", {.pictures = 25, .layout = CaptureLayout::kFilm}, 15},
+      {"lady_running with poses", {.pictures = 65, .layout = CaptureLayout::kFilm}, 150, true}};
+  for (const MeasuredRun& run : runs) {
+    v1::JobSpec spec = SpecWithKeyView();
+    if (run.finds_poses_of_film) {
+      spec.mutable_colorize_scene()->mutable_import_scene()->set_film_poses(
+          v1::ImportSceneSpec::FILM_POSES_AUTO);
+    }
+    EXPECT_NEAR(PlanOf(spec, run.facts).expected_seconds(), run.seconds, run.seconds / 3.0)
+        << run.scene;
+  }
+}
+
+// The stages that the plan says run are the jobs that are not skipped, in the same order.
+TEST(JobPlanTest, EqualsGraph) {
+  v1::JobSpec no_carry = SceneSpec();
+  no_carry.mutable_colorize_scene()->mutable_carry_color()->set_skip(true);
+  v1::JobSpec paper = SceneSpec();
+  paper.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);
+  v1::JobSpec best = SceneSpec();
+  best.mutable_colorize_scene()->set_preset(v1::PRESET_BEST);
+  const SceneFacts captures[] = {{.pictures = 20, .layout = CaptureLayout::kPhotos},
+                                 {.pictures = 20, .layout = CaptureLayout::kColmap},
+                                 {.layout = CaptureLayout::kSplat},
+                                 {.pictures = 60, .layout = CaptureLayout::kFilm},
+                                 {.pictures = 60, .layout = CaptureLayout::kFilms},
+                                 {.pictures = 30, .layout = CaptureLayout::kNerfies}};
+  for (const v1::JobSpec& spec : {SceneSpec(), SpecWithKeyView(), no_carry, paper, best}) {
+    for (const SceneFacts& facts : captures) {
+      const NewGraph graph = PlanJob(spec, {}, facts);
+      const v1::JobPlan plan = DescribeGraph(graph, facts, {}, {});
+      ASSERT_EQ(plan.stages_size() + 1, static_cast<int>(graph.jobs.size())) << "and the parent";
+      double expected = 0.0, saved = 0.0;
+      for (int i = 0; i < plan.stages_size(); ++i) {
+        const v1::PlannedStage& stage = plan.stages(i);
+        const NewJob& job = graph.jobs[static_cast<size_t>(i)];
+        EXPECT_EQ(stage.kind(), job.kind);
+        EXPECT_EQ(stage.runs(), job.skip_reason.empty());
+        EXPECT_FALSE(stage.reason().empty()) << stage.kind();
+        if (!stage.runs()) EXPECT_EQ(stage.reason(), job.skip_reason);
+        EXPECT_TRUE(std::isfinite(stage.expected_seconds()) && stage.expected_seconds() >= 0.0);
+        (stage.runs() ? expected : saved) += stage.expected_seconds();
+      }
+      EXPECT_NEAR(plan.expected_seconds(), expected, 1e-9);
+      EXPECT_NEAR(plan.saved_seconds(), saved, 1e-9);
+      EXPECT_GT(plan.expected_seconds(), 5.0);
+    }
+  }
+}
+
+TEST(JobPlanTest, LeavesOutReconstructionOfFilms) {
+  const v1::JobPlan plan = PlanOf(SceneSpec(), {.pictures = 60, .layout = CaptureLayout::kFilm});
+  EXPECT_FALSE(StageIn(plan, kind::kReconstructGeometry).runs());
+  EXPECT_FALSE(StageIn(plan, kind::kSolveChroma).runs());
+  EXPECT_TRUE(StageIn(plan, kind::kCarryColor).runs());
+}
+
+TEST(JobPlanTest, LeftOutStageSavesItsSeconds) {
+  v1::JobSpec spec = SceneSpec();
+  const v1::PlannedStage carried = StageIn(PlanOf(spec, kTwentyPhotos), kind::kCarryColor);
+  spec.mutable_colorize_scene()->mutable_carry_color()->set_skip(true);
+  const v1::JobPlan plan = PlanOf(spec, kTwentyPhotos);
+  EXPECT_TRUE(carried.runs());
+  EXPECT_FALSE(StageIn(plan, kind::kCarryColor).runs());
+  EXPECT_NEAR(
+      StageIn(plan, kind::kCarryColor).expected_seconds(), carried.expected_seconds(), 1e-9);
+  EXPECT_GT(plan.saved_seconds(), 1.0);
+}
+
+TEST(JobPlanTest, GrowsWithPhotosPixelsAndIterations) {
+  const double seconds = PlanOf(SceneSpec(), kTwentyPhotos).expected_seconds();
+  EXPECT_GT(
+      PlanOf(SceneSpec(), {.pictures = 40, .layout = CaptureLayout::kColmap}).expected_seconds(),
+      seconds + 10.0);
+  v1::JobSpec larger = SceneSpec();
+  larger.mutable_colorize_scene()->set_max_side_px(1000);
+  EXPECT_GT(PlanOf(larger, kTwentyPhotos).expected_seconds(), 2.0 * seconds);
+  v1::JobSpec longer = SceneSpec();
+  longer.mutable_colorize_scene()->mutable_reconstruct_geometry()->set_iterations(3000);
+  EXPECT_GT(PlanOf(longer, kTwentyPhotos).expected_seconds(), seconds + 10.0);
+  EXPECT_GT(
+      PlanOf(SceneSpec(), {.pictures = 20, .layout = CaptureLayout::kPhotos}).expected_seconds(),
+      seconds + 5.0)
+      << "poses are estimated";
+}
+
+TEST(JobPlanTest, KeepsTimeBudget) {
+  v1::JobSpec spec = SpecWithKeyView();
+  spec.mutable_colorize_scene()->set_time_budget_seconds(45);
+  const double budgeted = PlanOf(spec, kTwentyPhotos).expected_seconds();
+  EXPECT_LE(budgeted, 45.0);
+  EXPECT_LT(budgeted, PlanOf(SpecWithKeyView(), kTwentyPhotos).expected_seconds());
+}
+
+TEST(JobPlanTest, NamesGivenKeyViewAndMissingTruth) {
+  const v1::JobPlan plan = PlanOf(SpecWithKeyView(), kTwentyPhotos);
+  EXPECT_THAT(StageIn(plan, kind::kSelectKeyView).reason(), HasSubstr("a.jpg"));
+  EXPECT_EQ(StageIn(plan, kind::kSelectKeyView).expected_seconds(), 0.0);
+  EXPECT_THAT(StageIn(plan, kind::kEvaluate).reason(), HasSubstr("no true colours"));
+}
+
+TEST(JobPlanTest, ScalesWithMachine) {
+  const double seconds = PlanOf(SceneSpec(), kTwentyPhotos).expected_seconds();
+  const v1::JobPlan slow = PlanOf(SceneSpec(), kTwentyPhotos, {.factor = 2.5, .jobs = 9});
+  EXPECT_NEAR(slow.expected_seconds(), 2.5 * seconds, 1e-9);
+  EXPECT_EQ(slow.measured_jobs(), 9);
+}
+
+TEST(MachineFactorTest, IsMedianOfLongJobs) {
+  EXPECT_EQ(MeasureMachine({}).factor, 1.0);
+  EXPECT_EQ(MeasureMachine({{10, 30}, {10, 30}}).factor, 1.0) << "too few";
+  const MachineFactor factor =
+      MeasureMachine({{10, 30}, {5, 15}, {20, 60}, {20, 2000}, {0.2, 50}, {10, 30}, {4, 0}});
+  EXPECT_NEAR(factor.factor, 3.0, 1e-9) << "neither an outlier nor short jobs count";
+  EXPECT_EQ(factor.jobs, 5);
+  EXPECT_EQ(MeasureMachine({{1, 1e6}, {1, 1e6}, {1, 1e6}}).factor, 20.0);
+}
+
+}  // namespace
+}  // namespace color3d
