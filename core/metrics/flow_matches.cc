@@ -11,8 +11,8 @@ std::vector<PixelMatch> MatchByFlow(const Image& luminance,
                                     int stride_px) {
   if (stride_px < 1) throw InvalidArgument("the stride of matches is {} px, at least 1", stride_px);
   // Optical flow needs one size.
-  const bool same_size = luminance.width == other_luminance.width &&
-                         luminance.height == other_luminance.height;
+  const bool same_size =
+      luminance.width == other_luminance.width && luminance.height == other_luminance.height;
   const Image other =
       same_size ? other_luminance : Resize(other_luminance, luminance.width, luminance.height);
   const float scale_x = static_cast<float>(other_luminance.width) / luminance.width;

@@ -54,9 +54,9 @@ TEST(MatchByFlowTest, ScalesToSizeOfOtherPhoto) {
   const Image texture = Texture(120, 80, 0.0);
   for (int y = 0; y < 40; ++y) {
     for (int x = 0; x < 60; ++x) {
-      half.At(0, y, x) = 0.25f * (texture.At(0, 2 * y, 2 * x) + texture.At(0, 2 * y, 2 * x + 1) +
-                                  texture.At(0, 2 * y + 1, 2 * x) +
-                                  texture.At(0, 2 * y + 1, 2 * x + 1));
+      half.At(0, y, x) =
+          0.25f * (texture.At(0, 2 * y, 2 * x) + texture.At(0, 2 * y, 2 * x + 1) +
+                   texture.At(0, 2 * y + 1, 2 * x) + texture.At(0, 2 * y + 1, 2 * x + 1));
     }
   }
   const auto matches = MatchByFlow(texture, half, 4);

@@ -71,8 +71,8 @@ double FrechetDistance(const Rows& first, const Rows& second) {
   const bool few = std::max(first.size(), second.size()) <= width;
   const double root_trace = few ? RootTraceOfDeviations(a, b)
                                 : RootTraceOfCovariances(a.transpose() * a, b.transpose() * b);
-  const double distance = (m1.mean - m2.mean).squaredNorm() + a.squaredNorm() + b.squaredNorm() -
-                          2.0 * root_trace;
+  const double distance =
+      (m1.mean - m2.mean).squaredNorm() + a.squaredNorm() + b.squaredNorm() - 2.0 * root_trace;
   return std::max(0.0, distance);
 }
 

@@ -106,8 +106,7 @@ class Scorer {
   }
 
   std::vector<PixelMatch> MatchedByGeometry(const ViewPair& pair) const {
-    return MatchByGeometry(
-        views_.at(pair.first).geometry, views_.at(pair.second).geometry, match_);
+    return MatchByGeometry(views_.at(pair.first).geometry, views_.at(pair.second).geometry, match_);
   }
 
   std::vector<PixelMatch> MatchedByFlow(const ViewPair& pair) const {

@@ -120,9 +120,9 @@ Scores ScoreView(const Image& true_srgb,
   };
   v["delta_e00"] = MeanDeltaE00(Gather(rendered, of_color), Gather(truth, of_color));
   v["delta_e00_chroma"] = error(ChromaOfLab(rendered));
-  v["delta_e00_chroma_p90"] = Percentile(
-      DeltaE00OfPixels(WithTrueLuminance(truth, ChromaOfLab(rendered)), truth, of_color),
-      kHighPercentile);
+  v["delta_e00_chroma_p90"] =
+      Percentile(DeltaE00OfPixels(WithTrueLuminance(truth, ChromaOfLab(rendered)), truth, of_color),
+                 kHighPercentile);
   v["delta_e00_chroma_2d"] = error(AtColorSide(view_ab));
   v["delta_e00_gray"] = error(Image(truth.width, truth.height, 2));
   return v;
