@@ -50,9 +50,9 @@ double RootTraceOfCovariances(const Eigen::MatrixXd& c1, const Eigen::MatrixXd& 
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> first(c1);
   const Eigen::MatrixXd root = first.eigenvectors() * RootsOf(first.eigenvalues()).asDiagonal() *
                                first.eigenvectors().transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> product(root * c2 * root,
-                                                               Eigen::EigenvaluesOnly);
-  return RootsOf(product.eigenvalues()).sum();
+  const Eigen::MatrixXd product = root * c2 * root;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> second(product, Eigen::EigenvaluesOnly);
+  return RootsOf(second.eigenvalues()).sum();
 }
 
 // The same for C1 = A^T A and C2 = B^T B with few rows: C1 C2 has the non-zero eigenvalues of

@@ -120,7 +120,7 @@ std::vector<torch::Tensor> LpipsNetwork::Features(const torch::Tensor& rgb) cons
                                   /*stride=*/{step.stride, step.stride},
                                   /*padding=*/{step.padding, step.padding}));
     if (!step.is_compared) continue;
-    const torch::Tensor length = torch::sqrt((x * x).sum(1, /*keepdim=*/true));
+    const torch::Tensor length = torch::sqrt((x * x).sum(at::IntArrayRef{1}, /*keepdim=*/true));
     features.push_back(x / (length + kLeastLength));
   }
   return features;
