@@ -83,10 +83,10 @@ void RunScore(const ScoreArguments& args) {
   nlohmann::ordered_json json;
   json["views"] = views.size();
   std::string table = fmt::format("{:<24}", "view");
-  for (const char* name : kShown) table += fmt::format(" {:>18}", name);
+  for (const char* name : kShown) table += fmt::format(" {:>20}", name);
   for (const PictureScores& view : views) {
     table += fmt::format("\n{:<24}", view.view);
-    for (const char* name : kShown) table += fmt::format(" {:>18.3f}", view.scores.at(name));
+    for (const char* name : kShown) table += fmt::format(" {:>20.3f}", view.scores.at(name));
     json["scores"][view.view] = view.scores;
   }
   table += fmt::format("\n{:<24}", "mean");
@@ -95,9 +95,9 @@ void RunScore(const ScoreArguments& args) {
     std::vector<double> values;
     for (const PictureScores& view : views) values.push_back(view.scores.at(name));
     const MeanWithInterval over_views = BootstrapMean(values);
-    table += fmt::format(" {:>18.3f}", over_views.mean);
+    table += fmt::format(" {:>20.3f}", over_views.mean);
     interval +=
-        fmt::format(" {:>18}", fmt::format("{:.3f}..{:.3f}", over_views.low, over_views.high));
+        fmt::format(" {:>20}", fmt::format("{:.3f}..{:.3f}", over_views.low, over_views.high));
     json["mean"][name] = over_views.mean;
     json["interval_95"][name] = {over_views.low, over_views.high};
   }

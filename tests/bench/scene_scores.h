@@ -3,7 +3,6 @@
 // CLIP score). Pure but for reading files, thread-safe.
 #pragma once
 
-#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -17,12 +16,12 @@
 namespace color3d {
 
 struct PerceptualOptions {
-  std::filesystem::path fid_weights;
+  std::string fid_weights;        // files; empty: not given
   bool allow_biased_fid = false;  // with too few pictures
-  std::filesystem::path lpips_weights;
-  std::filesystem::path lpips_linear;
-  std::filesystem::path reference;  // the coloured key view
-  std::filesystem::path clip_weights;
+  std::string lpips_weights;
+  std::string lpips_linear;
+  std::string reference;  // the coloured key view
+  std::string clip_weights;
   std::string prompt;
   // Throws Error{kInvalidArgument} for options of which another one is missing.
   void Validate() const;

@@ -84,7 +84,7 @@ TEST_F(SceneScoresTest, NamesScoresThatAreLeftOut) {
 
 TEST_F(SceneScoresTest, FidOfFewPicturesIsLeftOutOrMarked) {
   for (int i = 0; i < 3; ++i) AddView(i, /*swap_channels=*/i > 0);
-  options_.fid_weights = Write("fid.safetensors", SmallInceptionWeights(1008));
+  options_.fid_weights = Write("fid.safetensors", SmallInceptionWeights(1008)).string();
   const PerceptualScores left_out = Perception();
   EXPECT_FALSE(left_out.fid);
   EXPECT_THAT(left_out.left_out.at("fid"), HasSubstr("3 pictures"));
@@ -98,7 +98,7 @@ TEST_F(SceneScoresTest, FidOfFewPicturesIsLeftOutOrMarked) {
 
 TEST_F(SceneScoresTest, FidOfTrueColorsIsZero) {
   for (int i = 0; i < 3; ++i) AddView(i);
-  options_.fid_weights = Write("fid.safetensors", SmallInceptionWeights(1008));
+  options_.fid_weights = Write("fid.safetensors", SmallInceptionWeights(1008)).string();
   options_.allow_biased_fid = true;
   EXPECT_NEAR(*Perception().fid, 0.0, 1e-6);
 }
@@ -106,9 +106,9 @@ TEST_F(SceneScoresTest, FidOfTrueColorsIsZero) {
 TEST_F(SceneScoresTest, ReferenceDistanceNoticesSwappedChannels) {
   AddView(0);
   AddView(1, /*swap_channels=*/true);
-  options_.lpips_weights = Write("alexnet.safetensors", SmallAlexNetWeights());
-  options_.lpips_linear = Write("alex.safetensors", SmallLpipsLinearWeights("alex"));
-  options_.reference = views_[0].photo;
+  options_.lpips_weights = Write("alexnet.safetensors", SmallAlexNetWeights()).string();
+  options_.lpips_linear = Write("alex.safetensors", SmallLpipsLinearWeights("alex")).string();
+  options_.reference = views_[0].photo.string();
   const std::vector<double> distances = Perception().of_views.at("ref_lpips");
   ASSERT_EQ(distances.size(), 2u);
   EXPECT_EQ(distances[0], 0.0);
@@ -134,7 +134,7 @@ TEST_F(SceneScoresTest, RejectsHalfOptionsAndOtherWeights) {
   options_.prompt.clear();
   options_.allow_biased_fid = true;
   EXPECT_THAT(ErrorText(), HasSubstr("--fid-weights is missing"));
-  options_.fid_weights = Write("other.safetensors", SmallVggWeights());
+  options_.fid_weights = Write("other.safetensors", SmallVggWeights()).string();
   EXPECT_THAT(ErrorText(), HasSubstr("Conv2d_1a_3x3.conv.weight"));
 }
 
