@@ -158,7 +158,7 @@ public core/keycolor edit_model from_image picture_checks recolor automatic/auto
   external/script hints/hint_map hints/hints references/reference words/prompt
 public core/film anchor_frames film_carry moving_regions returning_shots shots steady_colors steady_tones
 public core/keyview collect_features coverage expected_error select tracks view_features
-public core/metrics scene_consistency temporal_consistency view_scores
+public core/metrics confidence_interval scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page run_curve scene_plan
 public core/scene camera frame_numbers frame_times import_options key_photo photo_masks relief scene \
   view_images formats/camera_file formats/camera_films import/hold_out import/import \

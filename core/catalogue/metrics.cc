@@ -32,6 +32,7 @@ const std::vector<Metric>& MetricCatalogue() {
       // Held-out views: core/metrics/view_scores.h.
       {"delta_e00_chroma", "colour error (CIEDE2000)", {}, kInHeadline | kInSummary | kByHeldOut},
       {"delta_e00_gray", "colour error if left grey", {}, kInHeadline | kInSummary},
+      {"delta_e00_chroma_p90", "colour error, 90th percentile of pixels"},
       {"delta_e00", "CIEDE2000, luminance included"},
       {"psnr_rgb", "PSNR of held-out views", kDecibels, kInHeadline | kInSummary | kByHeldOut},
       {"ssim_rgb", "SSIM", {4}, kInSummary},
@@ -39,6 +40,7 @@ const std::vector<Metric>& MetricCatalogue() {
       {"ab_rmse", "RMSE of a and b"},
       {"colorfulness", "colourfulness", {1}},
       {"colorfulness_ratio", "colourfulness, relative to the truth"},
+      {"colorfulness_absolute", "colourfulness, absolute channels", {1}},
       // Held-out pixels by the source of their colour.
       {"delta_e00_seen", "colour error where seen"},
       {"delta_e00_inferred", "colour error where inferred"},
@@ -51,6 +53,13 @@ const std::vector<Metric>& MetricCatalogue() {
       {"tc_short", "TC, next view", {5}, kInScores, kAgreement},
       {"tc_long", "TC, 7 apart", {5}, kInScores, kAgreement},
       {"matches", "matched pixels", {0}, kInScores},
+      // The same on matches that all methods share: core/metrics/flow_matches.h.
+      {"me_common", "ME, common matches", {4}, kInMetrics, kAgreement},
+      {"me_de00_common", "ME, CIEDE2000, common matches", {}, kInMetrics, kAgreement},
+      {"tc_common", "TC, common matches", {5}, kInMetrics, kAgreement},
+      {"tc_short_common", "TC, next view, common matches", {5}, kInScores},
+      {"tc_long_common", "TC, 7 apart, common matches", {5}, kInScores},
+      {"matches_common", "common matched pixels", {0}, kInScores},
       {"pairs", "pairs of pictures", {0}, kInScores},
       // Steadiness of films: core/metrics/temporal_consistency.h.
       {"tc_chroma", "TC of chroma", {}, kInSummary, kSteadiness},
@@ -68,6 +77,7 @@ const std::vector<Metric>& MetricCatalogue() {
       // The work.
       {"gaussians", "Gaussians", {0}, kInHeadline | kInSummary},
       {"seconds_total", "computing time", kSeconds, kInHeadline},
+      {"seconds_per_frame", "computing time of a frame", {2, " s"}},
   };
   return catalogue;
 }

@@ -98,7 +98,10 @@ double MeanDeltaE00(const Image& lab_x, const Image& lab_y) {
   return sum / static_cast<double>(n);
 }
 
-double Colorfulness(const Image& srgb) {
+namespace {
+
+// `absolute`: of the magnitudes of the opponent channels.
+double ColorfulnessOf(const Image& srgb, bool absolute) {
   if (srgb.channels != 3 || srgb.Empty()) {
     throw InvalidArgument("colourfulness needs a 3-channel sRGB image, got {} channels",
                           srgb.channels);
@@ -109,8 +112,9 @@ double Colorfulness(const Image& srgb) {
     const double r = 255.0 * srgb.data[i];
     const double g = 255.0 * srgb.data[n + i];
     const double b = 255.0 * srgb.data[2 * n + i];
-    const double rg = r - g;
-    const double yb = 0.5 * (r + g) - b;
+    const double signed_rg = r - g, signed_yb = 0.5 * (r + g) - b;
+    const double rg = absolute ? std::abs(signed_rg) : signed_rg;
+    const double yb = absolute ? std::abs(signed_yb) : signed_yb;
     sum_rg += rg;
     sum_yb += yb;
     sum_rg2 += rg * rg;
@@ -122,5 +126,11 @@ double Colorfulness(const Image& srgb) {
                           std::max(0.0, sum_yb2 / n - mean_yb * mean_yb);
   return std::sqrt(variance) + 0.3 * std::hypot(mean_rg, mean_yb);
 }
+
+}  // namespace
+
+double Colorfulness(const Image& srgb) { return ColorfulnessOf(srgb, /*absolute=*/false); }
+
+double AbsoluteColorfulness(const Image& srgb) { return ColorfulnessOf(srgb, /*absolute=*/true); }
 
 }  // namespace color3d

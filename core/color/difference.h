@@ -15,4 +15,8 @@ double MeanDeltaE00(const Image& lab_x, const Image& lab_y);
 // formula works on 0..255).
 double Colorfulness(const Image& srgb);
 
+// The same of the magnitudes of the opponent channels, as common colourizers compute it: lower, and
+// blind to the sign, so that a picture of two complementary hues scores as one of a single hue.
+double AbsoluteColorfulness(const Image& srgb);
+
 }  // namespace color3d

@@ -102,6 +102,18 @@ TEST(Colorfulness, MatchesTheFormula) {
   const double mu = std::hypot(127.5, -63.75);
   EXPECT_NEAR(Colorfulness(image), sigma + 0.3 * mu, 1e-4);
   EXPECT_THROW(Colorfulness(Image(2, 2, 1)), Error);
+  EXPECT_THROW(AbsoluteColorfulness(Image(2, 2, 1)), Error);
+}
+
+// Half red, half green: rg = 255 and -255, yb = 127.5 in both.
+TEST(Colorfulness, AbsoluteVariantIgnoresSign) {
+  Image image(2, 1, 3, 0.0f);
+  image.At(0, 0, 0) = 1.0f;
+  image.At(1, 0, 1) = 1.0f;
+  EXPECT_NEAR(Colorfulness(image), 255.0 + 0.3 * 127.5, 1e-4);
+  EXPECT_NEAR(AbsoluteColorfulness(image), 0.3 * std::hypot(255.0, 127.5), 1e-4);
+  const Image one_hue(2, 2, 3, 0.4f);
+  EXPECT_NEAR(AbsoluteColorfulness(one_hue), 0.0, 1e-6);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <utility>
 
 #include "core/color/lab.h"
+#include "core/color/lab_planes.h"
+#include "core/metrics/flow_matches.h"
 
 namespace color3d {
 namespace {
@@ -20,6 +22,16 @@ struct ViewPictures {
 
 struct PairScores {
   PairDifference rendered, colored, truth;
+};
+
+struct Meters {
+  ConsistencyMeter rendered, colored, truth;
+
+  void Add(const ViewPair& pair, const PairScores& scores) {
+    rendered.Add(pair, scores.rendered);
+    colored.Add(pair, scores.colored);
+    truth.Add(pair, scores.truth);
+  }
 };
 
 ColoredPicture PictureOfLab(Image lab) {
@@ -41,22 +53,27 @@ class Scorer {
     with_truth_ = std::all_of(pairs.begin(), pairs.end(), [&](const ViewPair& pair) {
       return source_.has_truth(pair.first) && source_.has_truth(pair.second);
     });
-    ConsistencyMeter rendered, colored, truth;
+    Meters own, common;
     for (size_t begin = 0; begin < pairs.size(); begin += kBatch) {
       const std::vector<ViewPair> batch(pairs.begin() + begin,
                                         pairs.begin() + std::min(begin + kBatch, pairs.size()));
       Load(batch);
-      std::vector<PairScores> scores(batch.size());
-      pool_.ForEach(static_cast<int64_t>(batch.size()),
-                    [&](int64_t i, int) { scores[i] = Compare(batch[i]); });
+      std::vector<PairScores> scores(batch.size()), common_scores(batch.size());
+      pool_.ForEach(static_cast<int64_t>(batch.size()), [&](int64_t i, int) {
+        scores[i] = Compare(batch[i], MatchedByGeometry(batch[i]));
+        if (with_truth_) common_scores[i] = Compare(batch[i], MatchedByFlow(batch[i]));
+      });
       for (size_t i = 0; i < batch.size(); ++i) {
-        rendered.Add(batch[i], scores[i].rendered);
-        colored.Add(batch[i], scores[i].colored);
-        truth.Add(batch[i], scores[i].truth);
+        own.Add(batch[i], scores[i]);
+        common.Add(batch[i], common_scores[i]);
       }
     }
-    SceneConsistency result{rendered.Result(), colored.Result(), std::nullopt};
-    if (with_truth_ && !pairs.empty()) result.truth = truth.Result();
+    SceneConsistency result{
+        own.rendered.Result(), own.colored.Result(), std::nullopt, std::nullopt};
+    if (!with_truth_ || pairs.empty()) return result;
+    result.truth = own.truth.Result();
+    result.common = SceneConsistency::Common{
+        common.rendered.Result(), common.colored.Result(), common.truth.Result()};
     return result;
   }
 
@@ -88,10 +105,19 @@ class Scorer {
     pictures.truth.lab = LabFromSrgb(pictures.truth.srgb);
   }
 
-  PairScores Compare(const ViewPair& pair) const {
+  std::vector<PixelMatch> MatchedByGeometry(const ViewPair& pair) const {
+    return MatchByGeometry(views_.at(pair.first).geometry, views_.at(pair.second).geometry, match_);
+  }
+
+  std::vector<PixelMatch> MatchedByFlow(const ViewPair& pair) const {
+    return MatchByFlow(LuminanceOfLab(views_.at(pair.first).truth.lab),
+                       LuminanceOfLab(views_.at(pair.second).truth.lab),
+                       kStridePx);
+  }
+
+  PairScores Compare(const ViewPair& pair, const std::vector<PixelMatch>& matches) const {
     const ViewPictures& from = views_.at(pair.first);
     const ViewPictures& to = views_.at(pair.second);
-    const auto matches = MatchByGeometry(from.geometry, to.geometry, match_);
     PairScores scores;
     scores.rendered = CompareMatches(from.rendered, to.rendered, matches);
     scores.colored = CompareMatches(from.colored, to.colored, matches);

@@ -35,9 +35,15 @@ struct ConsistencySource {
 };
 
 struct SceneConsistency {
+  // On matches by optical flow of the true luminance (MatchByFlow): the same pixels whatever model
+  // or method made the colours.
+  struct Common {
+    Consistency rendered, colored, truth;
+  };
   Consistency rendered;              // renders of the coloured model
   Consistency colored;               // the photos in their predicted colours
   std::optional<Consistency> truth;  // the photos in their true colours
+  std::optional<Common> common;      // with `truth` only
 };
 
 // Consistency over ConsistencyPairs of all groups, training and held-out views alike. Matches come

@@ -1,5 +1,8 @@
 #include "core/metrics/view_scores.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
@@ -56,6 +59,25 @@ double MaskedSsim(const Image& drawn, const Image& truth, const std::vector<size
   return 1.0 - (1.0 - Ssim(composed, truth, 1.0)) / share;
 }
 
+constexpr double kHighPercentile = 0.9;
+
+// Nearest rank. Requires: there are values.
+double Percentile(std::vector<double> values, double share) {
+  const double rank = std::ceil(share * static_cast<double>(values.size()));
+  const auto at = values.begin() + (std::max<int64_t>(1, static_cast<int64_t>(rank)) - 1);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+std::vector<double> DeltaE00OfPixels(const Image& lab_x,
+                                     const Image& lab_y,
+                                     const std::vector<size_t>& pixels) {
+  std::vector<double> errors;
+  errors.reserve(pixels.size());
+  for (const size_t i : pixels) errors.push_back(DeltaE00(Pixel(lab_x, i), Pixel(lab_y, i)));
+  return errors;
+}
+
 constexpr size_t kMostRanked = 1 << 20;  // even
 
 void KeepEverySecond(std::vector<float>* values) {
@@ -83,9 +105,14 @@ Scores ScoreView(const Image& true_srgb,
   v["ssim_rgb"] = MaskedSsim(rendered_srgb, truth_srgb, pixels);
   v["psnr_l"] = Psnr(counting(LuminanceOfLab(lab)), counting(LuminanceOfLab(true_lab)), 100.0);
   v["ab_rmse"] = AbRmse(counting(lab), counting(true_lab));
-  v["colorfulness"] = Colorfulness(counting(rendered_srgb));
-  v["colorfulness_2d"] = Colorfulness(counting(SrgbFromLab(WithTrueLuminance(true_lab, view_ab))));
-  v["colorfulness_truth"] = Colorfulness(counting(truth_srgb));
+  const auto add_colorfulness = [&](const char* suffix, const Image& srgb) {
+    const Image row = counting(srgb);
+    v[std::string("colorfulness") + suffix] = Colorfulness(row);
+    v[std::string("colorfulness_absolute") + suffix] = AbsoluteColorfulness(row);
+  };
+  add_colorfulness("", rendered_srgb);
+  add_colorfulness("_2d", SrgbFromLab(WithTrueLuminance(true_lab, view_ab)));
+  add_colorfulness("_truth", truth_srgb);
 
   const Image rendered = FitWithin(lab, kColorSidePx);
   const auto error = [&](const Image& ab) {
@@ -93,6 +120,9 @@ Scores ScoreView(const Image& true_srgb,
   };
   v["delta_e00"] = MeanDeltaE00(Gather(rendered, of_color), Gather(truth, of_color));
   v["delta_e00_chroma"] = error(ChromaOfLab(rendered));
+  v["delta_e00_chroma_p90"] =
+      Percentile(DeltaE00OfPixels(WithTrueLuminance(truth, ChromaOfLab(rendered)), truth, of_color),
+                 kHighPercentile);
   v["delta_e00_chroma_2d"] = error(AtColorSide(view_ab));
   v["delta_e00_gray"] = error(Image(truth.width, truth.height, 2));
   return v;

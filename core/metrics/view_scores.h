@@ -23,6 +23,8 @@ inline constexpr int kColorSidePx = 400;
 // size; `view_ab`: any size. `mask`: 1 channel of the size of the truth; pixels count where it is
 // 1, reduced pixels only if all of their parts do; null: all pixels count. Returns no scores if no
 // pixel counts.
+//
+// "delta_e00_chroma_p90": 90th percentile over the pixels (nearest rank) in place of the mean.
 Scores ScoreView(const Image& true_srgb,
                  const Image& rendered_lab,
                  const Image& view_ab,

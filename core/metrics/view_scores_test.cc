@@ -84,6 +84,23 @@ TEST(ScoreView, CountsUnmaskedPixelsOnly) {
   EXPECT_TRUE(ScoreView(truth, drawn, ChromaOfLab(drawn), &nothing).empty());
 }
 
+// A fifth of the pixels has the wrong chroma: the percentile is its error, the mean a fifth of it.
+TEST(ScoreView, PercentileShowsSmallWrongParts) {
+  const Image truth(100, 50, 3, 0.5f);
+  Image lab = LabFromSrgb(truth);
+  for (int y = 0; y < 10; ++y) {
+    for (int x = 0; x < 100; ++x) lab.At(1, y, x) = 20.0f;
+  }
+  const Scores scores = ScoreView(truth, lab, ChromaOfLab(lab));
+  EXPECT_GT(scores.at("delta_e00_chroma_p90"), 10.0);
+  EXPECT_NEAR(scores.at("delta_e00_chroma"), 0.2 * scores.at("delta_e00_chroma_p90"), 0.01);
+  for (int y = 5; y < 10; ++y) {
+    for (int x = 0; x < 100; ++x) lab.At(1, y, x) = 0.0f;
+  }
+  const Scores tenth = ScoreView(truth, lab, ChromaOfLab(lab));
+  EXPECT_NEAR(tenth.at("delta_e00_chroma_p90"), 0.0, 0.05);
+}
+
 TEST(SourceErrors, GoodConfidenceCorrelatesWithErrors) {
   const Image truth(48, 32, 3, 0.5f);
   Image ab(48, 32, 2);

@@ -61,6 +61,7 @@ ordered_json CollectMetrics(const std::vector<StageSummary>& stages,
     const auto scores = ReadJson(context, artifact::kScores);
     const auto& mean = scores.at("mean");
     for (const std::string& key : KeysInOrder(mean)) metrics[key] = mean.at(key);
+    if (scores.contains("interval_95")) metrics["interval_95"] = scores.at("interval_95");
     AddByHeldOut(scores, &metrics);
   }
   metrics["key_views"] = keys;
@@ -257,13 +258,25 @@ std::string Summary(const Scene& scene,
                      static_cast<int>(metrics.value("seconds_total", 0.0) + 0.5));
 }
 
+// " (95 % interval over views: 3.10 to 4.20)" for metrics with a confidence interval, else "".
+std::string IntervalText(const ordered_json& metrics, const char* key) {
+  const auto intervals = metrics.find("interval_95");
+  if (intervals == metrics.end() || !intervals->contains(key)) return "";
+  const ordered_json& interval = intervals->at(key);
+  return fmt::format(" (95 % interval over views: {} to {})",
+                     MetricText(key, interval.at(0).get<double>()),
+                     MetricText(key, interval.at(1).get<double>()));
+}
+
 // The most important metrics, in words.
 std::vector<std::pair<std::string, std::string>> Headline(const ordered_json& metrics) {
   std::vector<std::pair<std::string, std::string>> headline;
   for (const Metric& metric : MetricCatalogue()) {
     const auto found = metrics.find(metric.key);
     if (!metric.Is(Metric::kInHeadline) || found == metrics.end() || !found->is_number()) continue;
-    headline.emplace_back(metric.label, MetricText(metric.key, found->get<double>()));
+    headline.emplace_back(
+        metric.label,
+        MetricText(metric.key, found->get<double>()) + IntervalText(metrics, metric.key));
   }
   return headline;
 }
@@ -306,7 +319,11 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
   const std::vector<CurvePoint> curves = CollectCurves(context);
   PlanFacts facts = FactsOfKind(scene, context);
   facts.motion = MotionOf(facts, curves, context);
-  const ordered_json metrics = CollectMetrics(stages, keys, next, colors, facts.motion, context);
+  ordered_json metrics = CollectMetrics(stages, keys, next, colors, facts.motion, context);
+  if (scene.HasTimes() && !scene.views.empty()) {
+    metrics["seconds_per_frame"] =
+        metrics.at("seconds_total").get<double>() / static_cast<double>(scene.views.size());
+  }
   facts.has_truth = metrics.contains("delta_e00");
 
   ReportData data;

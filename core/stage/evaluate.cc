@@ -10,6 +10,7 @@
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
+#include "core/metrics/confidence_interval.h"
 #include "core/metrics/scene_consistency.h"
 #include "core/metrics/view_scores.h"
 #include "core/scene/import/hold_out.h"
@@ -173,6 +174,7 @@ class HeldOutScores {
     for (const auto& [name, value] : scores) entry[name] = value;
     views_.push_back(std::move(entry));
     all_.Add(scores);
+    for (const auto& [name, value] : scores) values_[name].push_back(value);
     if (!how.empty()) by_how_[how].Add(scores);
     const Image colored = SrgbFromLab(JoinLab(LuminanceOfLab(LabFromSrgb(true_srgb)),
                                               Resize(ab, true_srgb.width, true_srgb.height)));
@@ -188,6 +190,16 @@ class HeldOutScores {
     for (const auto& [how, sum] : by_how_) {
       json[how] = {{"views", sum.views}};
       for (const auto& [name, value] : MeanOf(sum)) json[how][name] = value;
+    }
+    return json;
+  }
+  // 95 % confidence interval of each mean over the views; empty for fewer than two views.
+  ordered_json Intervals() const {
+    ordered_json json = ordered_json::object();
+    if (all_.views < 2) return json;
+    for (const auto& [name, values] : values_) {
+      const MeanWithInterval interval = BootstrapMean(values);
+      json[name] = {interval.low, interval.high};
     }
     return json;
   }
@@ -227,22 +239,28 @@ class HeldOutScores {
   StageContext& context_;
   ordered_json views_ = ordered_json::array();
   Sum all_;
+  std::map<std::string, std::vector<double>> values_;  // of the views, by metric
   std::map<std::string, Sum> by_how_;
   SourceErrors sources_;
 };
 
-ordered_json JsonOf(const Consistency& c) {
+// `common`: the same pictures on common matches, or nullptr.
+ordered_json JsonOf(const Consistency& c, const Consistency* common) {
   ordered_json json{{"pairs", c.pairs}, {"matches", c.matches}};
   for (const auto& [name, value] : c.Figures()) json[name] = value;
+  if (common == nullptr || common->matches == 0) return json;
+  json["matches_common"] = common->matches;
+  for (const auto& [name, value] : common->Figures()) json[name + "_common"] = value;
   return json;
 }
 
 ordered_json JsonOf(const SceneConsistency& scores) {
   ordered_json json = ordered_json::object();
   if (scores.rendered.pairs > 0) {
-    json["rendered"] = JsonOf(scores.rendered);
-    json["colored_views"] = JsonOf(scores.colored);
-    if (scores.truth) json["truth"] = JsonOf(*scores.truth);
+    const SceneConsistency::Common* common = scores.common ? &*scores.common : nullptr;
+    json["rendered"] = JsonOf(scores.rendered, common ? &common->rendered : nullptr);
+    json["colored_views"] = JsonOf(scores.colored, common ? &common->colored : nullptr);
+    if (scores.truth) json["truth"] = JsonOf(*scores.truth, common ? &common->truth : nullptr);
   }
   return json;
 }
@@ -284,6 +302,9 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   const Scores mean = scores.Mean();
   for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
   ordered_json json{{"mean", mean}, {"views", scores.views()}};
+  if (ordered_json intervals = scores.Intervals(); !intervals.empty()) {
+    json["interval_95"] = std::move(intervals);
+  }
   if (ordered_json by_how = scores.MeansByHoldOutKind(); !by_how.empty()) {
     json["held_out"] = std::move(by_how);
   }

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "core/catalogue/metrics.h"
@@ -56,6 +57,39 @@ TEST_F(EvaluateTest, ScoresTheBoundOfTheReconstruction) {
   }
   options.training_truth.clear();
   EXPECT_THROW(Evaluated(options), Error);
+}
+
+TEST_F(EvaluateTest, ComparesViewsOnCommonMatches) {
+  EvaluateOptions options;
+  options.truth = {TruthOf("p0.png")};
+  EXPECT_FALSE(Evaluated(options).at("consistency").at("rendered").contains("me_common"));
+  options.training_truth = {TruthOf("p1.png"), TruthOf("p2.png")};
+  const json consistency = Evaluated(options).at("consistency");
+  const json& colored = consistency.at("colored_views");
+  // p2 is redder.
+  EXPECT_GT(colored.at("me_de00_common"), 3.0);
+  EXPECT_LT(consistency.at("truth").at("me_de00_common"), colored.at("me_de00_common"));
+  for (const char* pictures : {"rendered", "truth"}) {
+    EXPECT_EQ(consistency.at(pictures).at("matches_common"), colored.at("matches_common"));
+  }
+}
+
+TEST_F(EvaluateTest, HasIntervalsOfTwoViewsAndMore) {
+  EvaluateOptions options;
+  options.truth = {TruthOf("p0.png")};
+  EXPECT_FALSE(Evaluated(options).contains("interval_95"));
+  scene_.views[1].held_out = true;
+  AddInput(artifact::kScene, SceneToJson(scene_));
+  options.truth.push_back(TruthOf("p1.png"));
+  const json scores = Evaluated(options);
+  const json& intervals = scores.at("interval_95");
+  EXPECT_FALSE(intervals.empty());
+  // More than 2.5 % of the samples of two views have one of them alone.
+  for (const auto& [name, interval] : intervals.items()) {
+    const double first = scores.at("views")[0].at(name), second = scores.at("views")[1].at(name);
+    EXPECT_NEAR(interval.at(0).get<double>(), std::min(first, second), 1e-9) << name;
+    EXPECT_NEAR(interval.at(1).get<double>(), std::max(first, second), 1e-9) << name;
+  }
 }
 
 TEST_F(EvaluateTest, ComparesCamerasOfOneTimeInDynamicScenes) {

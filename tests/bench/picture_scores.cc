@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "core/base/error.h"
 #include "core/base/file_kind.h"
@@ -19,7 +18,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kShapeTolerance = 0.02;
-constexpr int kBootstrapSamples = 2000;
 
 // Pictures directly in the folder, by stem.
 std::map<std::string, fs::path> PicturesByStem(const fs::path& folder) {
@@ -129,27 +127,10 @@ std::vector<PictureScores> ScorePictures(const fs::path& truth,
   pool.ForEach(static_cast<int64_t>(selected.size()), [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
     const std::string& stem = selected[static_cast<size_t>(i)];
-    scores[static_cast<size_t>(i)] = {stem, Score(photos.at(stem), given.at(stem))};
+    scores[static_cast<size_t>(i)] = {
+        stem, Score(photos.at(stem), given.at(stem)), photos.at(stem), given.at(stem)};
   });
   return scores;
-}
-
-MeanWithInterval BootstrapMean(const std::vector<double>& values) {
-  const size_t count = values.size();
-  const auto mean_of = [count](auto&& value) {
-    double sum = 0.0;
-    for (size_t i = 0; i < count; ++i) sum += value(i);
-    return sum / static_cast<double>(count);
-  };
-  std::mt19937 random(1);
-  std::vector<double> means(kBootstrapSamples);
-  for (double& mean : means) {
-    mean = mean_of([&](size_t) { return values[random() % count]; });
-  }
-  std::sort(means.begin(), means.end());
-  return {mean_of([&](size_t i) { return values[i]; }),
-          means[static_cast<size_t>(0.025 * kBootstrapSamples)],
-          means[static_cast<size_t>(0.975 * kBootstrapSamples) - 1]};
 }
 
 }  // namespace color3d

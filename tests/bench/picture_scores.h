@@ -15,6 +15,8 @@ namespace color3d {
 struct PictureScores {
   std::string view;                      // stem of the file
   std::map<std::string, double> scores;  // ScoreView (core/metrics/view_scores.h)
+  std::filesystem::path photo;
+  std::filesystem::path picture;
 };
 
 // Pairs the pictures with the photos of the same stem, and scores each at the size of ScoreView.
@@ -26,15 +28,5 @@ std::vector<PictureScores> ScorePictures(const std::filesystem::path& truth,
                                          const std::vector<std::string>& views,
                                          ThreadPool& pool,
                                          const CancellationToken& cancel);
-
-// Mean over views with its 95 % confidence interval: percentile bootstrap over the views, 2,000
-// samples, seed 1. The interval of one value is that value.
-struct MeanWithInterval {
-  double mean = 0.0;
-  double low = 0.0;
-  double high = 0.0;
-};
-// Requires: there are values.
-MeanWithInterval BootstrapMean(const std::vector<double>& values);
 
 }  // namespace color3d

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/bench/picture_scores.h"
+#include "core/metrics/confidence_interval.h"
 #include "tests/bench/suite/suite_plan.h"
 #include "tests/bench/suite/suite_rows.h"
 
