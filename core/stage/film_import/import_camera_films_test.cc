@@ -36,11 +36,9 @@ class ImportCameraFilmsTest : public StageTest {
   // Frames at multiples of 0.1 s, without one dropped frame.
   void WriteFilmWithout(int camera, int frames, int dropped) {
     ThreadPool pool(1);
-    Mp4Writer writer(scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
-                     {.width = kWidth,
-                      .height = kHeight,
-                      .frames_per_second = 10,
-                      .ticks_per_second = 1000});
+    Mp4Writer writer(
+        scratch_.path() / ("cam0" + std::to_string(camera) + ".mp4"),
+        {.width = kWidth, .height = kHeight, .frames_per_second = 10, .ticks_per_second = 1000});
     for (int i = 0; i < frames; ++i) {
       if (i == dropped) continue;
       writer.AddAt(
