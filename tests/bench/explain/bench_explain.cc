@@ -89,7 +89,8 @@ ExplainFacts FactsOf(const ExplainArguments& args,
                      const TapEncoder& encoder,
                      const PersonalModel& model) {
   ExplainFacts facts;
-  facts.scene = fs::path(args.scene_folder).lexically_normal().filename().string();
+  const fs::path folder = fs::path(args.scene_folder).lexically_normal();
+  facts.scene = (folder.has_filename() ? folder : folder.parent_path()).filename().string();
   facts.key_view = scene.views[scene.key].name;
   facts.encoder = encoder.description();
   facts.views = static_cast<int>(scene.views.size());

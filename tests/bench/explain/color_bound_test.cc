@@ -66,7 +66,7 @@ TEST_F(ColorBoundTest, EqualPatchesHaveNoDistance) {
   const auto points = MeasurePoints(colorizer, {first, second, first});
   ASSERT_EQ(points.size(), 4u);
   for (const PointDistances& point : points) {
-    EXPECT_EQ(point.equivariance, 0.0);
+    EXPECT_NEAR(point.equivariance, 0.0, 1e-4);
     EXPECT_GT(point.image, 0.0);
     EXPECT_NEAR(point.rest_image, point.image, 1e-6);
     EXPECT_NEAR(point.rest_feature, point.feature, 1e-4 * point.feature);

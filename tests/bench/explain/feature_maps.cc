@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/base/random.h"
 #include "core/image/plane_sampling.h"
 
 namespace color3d {
@@ -102,9 +103,11 @@ void FeatureDistanceMeter::Add(const FeatureMap& from,
                                const FeatureMap& to,
                                const std::vector<PixelMatch>& matches) {
   if (matches.size() < 2) return;
+  Random random(1);
+  const uint32_t others = static_cast<uint32_t>(matches.size() - 1);
   for (size_t i = 0; i < matches.size(); ++i) {
     const PixelMatch& match = matches[i];
-    const PixelMatch& other = matches[(i + matches.size() / 2) % matches.size()];
+    const PixelMatch& other = matches[(i + 1 + random.NextBelow(others)) % matches.size()];
     const std::vector<float> here = FeaturesAt(from, match.x + 0.5, match.y + 0.5);
     matched_ += Distance(here, FeaturesAt(to, match.u, match.v));
     unmatched_ += Distance(here, FeaturesAt(to, other.u, other.v));

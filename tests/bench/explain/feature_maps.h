@@ -30,8 +30,8 @@ struct FeatureDistance {
 // Accumulates pairs of views. A plain value.
 class FeatureDistanceMeter {
  public:
-  // Each match is also compared with the one half of the list away, as a different surface.
-  // Ignores fewer than two matches.
+  // Each match is also compared with a random other one, as a different surface. Ignores fewer
+  // than two matches.
   void Add(const FeatureMap& from, const FeatureMap& to, const std::vector<PixelMatch>& matches);
   FeatureDistance Result() const;
 

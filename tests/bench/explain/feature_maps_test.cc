@@ -87,7 +87,7 @@ TEST(FeatureDistanceTest, ComparesMatchedPlaces) {
   shifted.Add(from, to, wrong);
   EXPECT_NEAR(good.Result().matched, 0.0, 1e-5);
   EXPECT_NEAR(shifted.Result().matched, 3.0, 1e-5);
-  EXPECT_GT(good.Result().unmatched, 8.0);
+  EXPECT_GT(good.Result().unmatched, 6.0);
   EXPECT_EQ(good.Result().places, 30);
   EXPECT_NEAR(good.Result().Ratio(), 0.0, 1e-6);
 }
