@@ -80,7 +80,7 @@ for part in model neighbors training personal; do
   allow "core/colorizer/$part" "core/($colorizer)"
 done
 lower=
-for part in model hexplane motion raster training geometry chroma export import; do
+for part in model hexplane motion raster training movers geometry chroma export import; do
   lower="$lower${lower:+|}$part"
   allow "core/splat/$part" "core/(base|zip|simd|color|image|scene|splat/($lower))"
 done

@@ -1,7 +1,6 @@
 // color3d-bench plot: draws error against seconds of several results, with a panel per scene.
-// `reconstruct`: a line per label. `suite`: a line per variant from its curves or, with --metric,
-// through the variants whose names agree up to '@' (fast@100, fast@300, ...). `choices`: a panel
-// per choice with means over the scenes.
+// `reconstruct`: a line per label. `suite`: a line per preset from the curves of its runs or,
+// with --metric, through its runs. `choices`: a panel per choice with means over the scenes.
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -12,7 +11,7 @@
 #include "core/stage/formats/artifact_io.h"
 #include "tests/bench/colorizer/choice_results.h"
 #include "tests/bench/commands.h"
-#include "tests/bench/suite_results.h"
+#include "tests/bench/suite/suite_rows.h"
 
 namespace color3d {
 namespace {
@@ -62,27 +61,26 @@ void AddResult(const std::string& file, const PlotArguments& args, std::vector<P
 }
 
 // The curve of one run.
-void AddCurve(const SuiteRun& run, const PlotArguments& args, std::vector<Plot>& plots) {
+void AddCurve(const SuiteRow& run, const PlotArguments& args, std::vector<Plot>& plots) {
   const size_t colon = args.curve.find(':');
   if (colon == std::string::npos) {
     throw InvalidArgument("\"" + args.curve + "\" is not a curve; give STAGE:ERROR_NAME");
   }
   const std::string stage = args.curve.substr(0, colon), error = args.curve.substr(colon + 1);
-  const std::filesystem::path file = std::filesystem::path(args.suite_folder) / run.SceneName() /
-                                     run.variant / artifact::kAllCurves;
-  Plot& plot = PlotOfTitle(run.SceneName() + ": " + error, !args.linear, plots);
+  const std::filesystem::path file = std::filesystem::path(args.suite_folder) / run.scene /
+                                     run.preset / std::to_string(run.seed) / artifact::kAllCurves;
+  Plot& plot = PlotOfTitle(run.scene + ": " + error, !args.linear, plots);
   for (const CurvePoint& point : CurvesFromCsv(ReadFile(file))) {
     if (point.stage != stage || point.error_name != error) continue;
-    SeriesOf(run.variant, plot).points.push_back(point);
+    SeriesOf(run.preset, plot).points.push_back(point);
   }
 }
 
-// A run as a point of the line of its variant.
-void AddPoint(const SuiteRun& run, const PlotArguments& args, std::vector<Plot>& plots) {
-  Plot& plot = PlotOfTitle(run.SceneName() + ": " + args.metric, !args.linear, plots);
+// A run as a point of the line of its preset.
+void AddPoint(const SuiteRow& run, const PlotArguments& args, std::vector<Plot>& plots) {
+  Plot& plot = PlotOfTitle(run.scene + ": " + args.metric, !args.linear, plots);
   const double seconds = run.metrics.at(args.seconds), value = run.metrics.at(args.metric);
-  SeriesOf(run.variant.substr(0, run.variant.find('@')), plot)
-      .points.push_back({"", seconds, 0, args.metric, value});
+  SeriesOf(run.preset, plot).points.push_back({"", seconds, 0, args.metric, value});
 }
 
 void AddSuite(const PlotArguments& args, std::vector<Plot>& plots) {
@@ -90,7 +88,8 @@ void AddSuite(const PlotArguments& args, std::vector<Plot>& plots) {
     throw InvalidArgument("a figure of a suite shows either --curve or --metric");
   }
   const std::filesystem::path jsonl = std::filesystem::path(args.suite_folder) / "results.jsonl";
-  for (const SuiteRun& run : ReadSuiteResults(jsonl)) {
+  for (const SuiteRow& run : ReadRows(jsonl)) {
+    if (run.Failed()) continue;
     args.curve.empty() ? AddPoint(run, args, plots) : AddCurve(run, args, plots);
   }
   for (Plot& plot : plots) {

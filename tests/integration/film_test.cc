@@ -352,12 +352,9 @@ TEST_F(FilmTest, SelectionTakesFramesOfAFilm) {
 
 TEST_F(FilmTest, KeepsSoundAndUnevenTimes) {
   ThreadPool pool(1);
-  Mp4Writer writer(Path("silent.mp4"),
-                   {.width = kWidth,
-                    .height = kHeight,
-                    .frames_per_second = 12,
-                    .ticks_per_second = 24000,
-                    .threads = 1});
+  Mp4Writer writer(
+      Path("silent.mp4"),
+      {.width = kWidth, .height = kHeight, .frames_per_second = 12, .ticks_per_second = 24000});
   std::vector<double> times;
   for (int i = 0; i < kFrames; ++i) {
     times.push_back(i < 8 ? i / 24.0 : i / 8.0 - 2.0 / 3.0);

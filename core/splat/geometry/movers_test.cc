@@ -6,10 +6,10 @@
 #include <memory>
 #include <set>
 
-#include "core/splat/geometry/motion_survey.h"
-#include "core/splat/geometry/mover_seeds.h"
 #include "core/splat/geometry/moving_part.h"
 #include "core/splat/motion/motion.h"
+#include "core/splat/movers/motion_survey.h"
+#include "core/splat/movers/mover_seeds.h"
 
 namespace color3d {
 namespace {

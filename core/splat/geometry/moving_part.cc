@@ -4,10 +4,10 @@
 #include <set>
 
 #include "core/scene/photo_masks.h"
-#include "core/splat/geometry/motion_survey.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/motion/motion.h"
+#include "core/splat/movers/motion_survey.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 

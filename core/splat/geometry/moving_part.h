@@ -13,10 +13,10 @@
 #include "core/splat/geometry/densify.h"
 #include "core/splat/geometry/geometry_options.h"
 #include "core/splat/geometry/geometry_problem.h"
-#include "core/splat/geometry/mover_seeds.h"
 #include "core/splat/model/color_layout.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/model/parameter_block.h"
+#include "core/splat/movers/mover_seeds.h"
 #include "core/splat/training/adam.h"
 
 namespace color3d {

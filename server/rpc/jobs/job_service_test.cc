@@ -26,10 +26,9 @@ TEST_F(JobServiceTest, RefusesBadJobs) {
   const std::string scene = client_->MakeScene().name();
   v1::JobSpec spec;
   spec.set_scene(scene);
-  spec.mutable_reconstruct_dense();
   grpc::Status status = CreateStatus(spec);
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
-  EXPECT_THAT(status.error_message(), HasSubstr("reconstruct_dense"));
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_THAT(status.error_message(), HasSubstr("spec has no stage"));
   *spec.mutable_colorize_scene()->mutable_key_color()->mutable_image() = DigestOf("absent");
   status = CreateStatus(spec);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);

@@ -11,12 +11,14 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
+#include "core/carry/view_color.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/colorizer/personal/train_colorizer.h"
 #include "core/colorizer/scene_batch.h"
 #include "core/metrics/view_scores.h"
 #include "core/scene/view_images.h"
+#include "core/stage/coloring/view_coloring.h"
 #include "core/stage/formats/artifact_io.h"
 #include "tests/bench/colorizer/bench_encoder.h"
 #include "tests/bench/colorizer/choice_results.h"

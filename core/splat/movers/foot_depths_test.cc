@@ -1,4 +1,4 @@
-#include "core/splat/geometry/foot_depths.h"
+#include "core/splat/movers/foot_depths.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "core/splat/geometry/mover_velocity.h"
+#include "core/splat/movers/mover_velocity.h"
 
 #include <algorithm>
 #include <cmath>

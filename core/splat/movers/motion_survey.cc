@@ -1,4 +1,4 @@
-#include "core/splat/geometry/motion_survey.h"
+#include "core/splat/movers/motion_survey.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,14 +1,14 @@
-#include "core/splat/geometry/mover_seeds.h"
+#include "core/splat/movers/mover_seeds.h"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <optional>
 
-#include "core/splat/geometry/foot_depths.h"
-#include "core/splat/geometry/mover_velocity.h"
 #include "core/splat/model/spherical_harmonics.h"
 #include "core/splat/motion/motion.h"
+#include "core/splat/movers/foot_depths.h"
+#include "core/splat/movers/mover_velocity.h"
 #include "core/splat/raster/raster_constants.h"
 
 namespace color3d {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/base/parallel.h"
-#include "core/splat/geometry/motion_survey.h"
 #include "core/splat/model/parameter_block.h"
+#include "core/splat/movers/motion_survey.h"
 
 namespace color3d {
 
