@@ -161,11 +161,11 @@ TEST_F(ViewColoringTest, JointTrainingKeepsEachKeyView) {
   const std::string alone = ReadFile(inputs_.at(artifact::kColorizer));
   const std::string folder = std::string(artifact::kKeyViews) + "1/";
   AddInput(folder + artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, -20.0f)));
-  AddInput(folder + artifact::kKeyColorFacts, R"({"view": "p0.png"})");
+  AddInput(folder + artifact::kKeyColorFacts, R"({"view": "p2.png"})");
   Train(options);
   EXPECT_NE(ReadFile(inputs_.at(artifact::kColorizer)), alone);
   Color(Method::kPersonalized);
-  EXPECT_LT(MeanDistance(AbOf(0), Image(kWidth, kHeight, 2, -20.0f)), kStored);
+  EXPECT_LT(MeanDistance(AbOf(2), Image(kWidth, kHeight, 2, -20.0f)), kStored);
   EXPECT_LT(MeanDistance(AbOf(1), GivenColor()), kStored);
   AddInput(folder + artifact::kKeyColorFacts, R"({"view": "p1.png"})");
   EXPECT_THROW(Train(options), Error) << "named twice";
