@@ -8,6 +8,7 @@ namespace color3d {
 void AddAugmentationsCommand(CLI::App& app);
 void AddAutomaticCommand(CLI::App& app);
 void AddChoicesCommand(CLI::App& app);
+void AddExplainCommand(CLI::App& app);
 void AddFilmCommand(CLI::App& app);
 void AddDynamicScenesCommand(CLI::App& app);
 void AddFloorCommand(CLI::App& app);

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   color3d::AddAugmentationsCommand(app);
   color3d::AddAutomaticCommand(app);
   color3d::AddChoicesCommand(app);
+  color3d::AddExplainCommand(app);
   color3d::AddFilmCommand(app);
   color3d::AddDynamicScenesCommand(app);
   color3d::AddFloorCommand(app);

@@ -217,6 +217,11 @@ std::vector<torch::Tensor> PersonalModel::Taps(const torch::Tensor& luminance) c
     torch::NoGradGuard no_grad;
     return config_.half_products ? encoder_.FastTaps(input) : encoder_.Taps(input);
   }
+  return TapsOfInput(input);
+}
+
+std::vector<torch::Tensor> PersonalModel::TapsOfInput(const torch::Tensor& input) const {
+  if (!config_.HasAdapters()) return encoder_.Taps(input);
   return encoder_.Taps(input, [this](int stage, int block, const torch::Tensor& x) {
     return Adapt(stage, block, x);
   });
@@ -246,8 +251,8 @@ torch::Tensor PersonalModel::Fuse(const Level& level,
   return frozen ? x : Normalize(level.norm, x);
 }
 
-torch::Tensor PersonalModel::Decode(const std::vector<torch::Tensor>& taps,
-                                    const torch::Tensor& luminance) const {
+torch::Tensor PersonalModel::Features(const std::vector<torch::Tensor>& taps,
+                                      const torch::Tensor& luminance) const {
   torch::Tensor x;
   for (int i = static_cast<int>(levels_.size()) - 1; i >= 0; --i) {
     const Level& level = levels_[i];
@@ -259,6 +264,12 @@ torch::Tensor PersonalModel::Decode(const std::vector<torch::Tensor>& taps,
     x = LeakyRelu(Fuse(level, taps[i], x, l));
     for (const ResidualBlock& block : level.blocks) x = RunBlock(block, x);
   }
+  return x;
+}
+
+torch::Tensor PersonalModel::Decode(const std::vector<torch::Tensor>& taps,
+                                    const torch::Tensor& luminance) const {
+  const torch::Tensor x = Features(taps, luminance);
   const torch::Tensor ab = Conv(x, head_, head_bias_).to(torch::kFloat32);
   return config_.full_resolution ? torch::pixel_shuffle(ab, encoder_.config().stem_stride) : ab;
 }

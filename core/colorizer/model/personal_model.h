@@ -54,6 +54,12 @@ class PersonalModel {
   torch::Tensor Decode(const std::vector<torch::Tensor>& taps,
                        const torch::Tensor& luminance) const;
   std::vector<torch::Tensor> Taps(const torch::Tensor& luminance) const;
+  // Taps for TapEncoder::Input(luminance), with gradients to it.
+  std::vector<torch::Tensor> TapsOfInput(const torch::Tensor& input) const;
+  // The decoder's last activation, [B,C,H/t,W/t] with t the stride of the first tap. Decode applies
+  // the head to it.
+  torch::Tensor Features(const std::vector<torch::Tensor>& taps,
+                         const torch::Tensor& luminance) const;
 
   // Measures mean and deviation of every normalised activation on this picture, layer after layer,
   // and freezes them. No effect with instance norm.

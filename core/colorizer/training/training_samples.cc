@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/base/digest.h"
+#include "core/colorizer/training/view_change.h"
 #include "core/encoder/image_tensors.h"
 
 namespace color3d {
@@ -75,6 +76,23 @@ TrainingSample TrainingSamples::Draw(int64_t number) const {
   Random random(MixedBits(seed_ + kSeedStep * static_cast<uint64_t>(number)), /*stream=*/1);
   const TrainingPicture& picture = Choose(random);
   return Make(picture, augment_, random);
+}
+
+ChangedSample TrainingSamples::Change(const TrainingSample& sample, int64_t number) const {
+  torch::NoGradGuard no_grad;
+  Random random(MixedBits(seed_ + kSeedStep * static_cast<uint64_t>(number)), /*stream=*/4);
+  const ViewChange change = ViewChange::Draw(random);
+  const auto grid = [&change](const torch::Tensor& picture) {
+    const int64_t height = picture.size(2), width = picture.size(3);
+    return SamplingGrid(change.Positions(height, width), height, width);
+  };
+  ChangedSample changed;
+  changed.luminance =
+      change.InLight(Warp(sample.luminance, grid(sample.luminance), Border::kReflect));
+  changed.grid = grid(sample.weight);
+  changed.weight = Warp(sample.weight, changed.grid, Border::kZero);
+  if (!model_.config().HasAdapters()) changed.taps = model_.Taps(changed.luminance);
+  return changed;
 }
 
 std::string TrainingSamples::Digest() const {

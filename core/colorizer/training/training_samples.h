@@ -23,6 +23,14 @@ struct TrainingSample {
   std::vector<torch::Tensor> taps;  // taps of the frozen encoder; empty with adapters
 };
 
+// A second augmentation of a sample (ViewChange).
+struct ChangedSample {
+  torch::Tensor luminance;          // [1,1,c,c]
+  torch::Tensor grid;               // [1,c/s,c/s,2]: position of each answer in the sample's
+  torch::Tensor weight;             // [1,1,c/s,c/s]: of the sample at these positions, 0 outside
+  std::vector<torch::Tensor> taps;  // as TrainingSample::taps
+};
+
 class TrainingSamples {
  public:
   // The references must outlive the object.
@@ -33,6 +41,8 @@ class TrainingSamples {
 
   // Returns the sample of iteration `number`.
   TrainingSample Draw(int64_t number) const;
+  // Returns a second augmentation of it. Depends on the seed and `number`, too.
+  ChangedSample Change(const TrainingSample& sample, int64_t number) const;
   // Held-out crops of the key view.
   const std::vector<TrainingSample>& held_out() const { return held_out_; }
   // SHA-256 over all pictures.

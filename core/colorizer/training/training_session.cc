@@ -14,6 +14,7 @@
 #include "core/color/difference.h"
 #include "core/colorizer/model/named_tensors.h"
 #include "core/colorizer/training/options_json.h"
+#include "core/colorizer/training/view_change.h"
 #include "core/encoder/image_tensors.h"
 #include "core/encoder/torch_threads.h"
 
@@ -32,6 +33,13 @@ constexpr double kLossMemory = 0.95;
 constexpr double kMinWeightShare =
     0.25;  // minimum share of a crop's area in the denominator of the loss
 constexpr char kAverage[] = "average.";
+
+// Mean of two channels. A crop with few valid pixels counts less than a full one.
+torch::Tensor WeightedMean(const torch::Tensor& values, const torch::Tensor& weight) {
+  const double area = static_cast<double>(weight.numel());
+  const double total = 2.0 * std::max(weight.sum().item<double>(), kMinWeightShare * area);
+  return (values * weight).sum() / total;
+}
 
 }  // namespace
 
@@ -53,25 +61,24 @@ TrainingSession::TrainingSession(const std::vector<TrainingPicture>& pictures,
   KeepGoodState();
 }
 
-torch::Tensor TrainingSession::Predict(const TrainingSample& sample) const {
-  return sample.taps.empty() ? model_.Forward(sample.luminance)
-                             : model_.Decode(sample.taps, sample.luminance);
+torch::Tensor TrainingSession::Predict(const std::vector<torch::Tensor>& taps,
+                                       const torch::Tensor& luminance) const {
+  return taps.empty() ? model_.Forward(luminance) : model_.Decode(taps, luminance);
 }
 
 torch::Tensor TrainingSession::Loss(const TrainingSample& sample) const {
-  const torch::Tensor predicted = Predict(sample);
-  // A crop with few valid pixels counts less than a full one.
-  const double area = static_cast<double>(sample.weight.numel());
-  const double total = 2.0 * std::max(sample.weight.sum().item<double>(), kMinWeightShare * area);
-  torch::Tensor loss = ((predicted - sample.ab).abs() * sample.weight).sum() / total;
-  if (options_.consistency_weight > 0.0) {
-    // The paper's A4: two augmentations of one picture must agree where they show the same point.
-    // The second one is the mirror image, which maps back without interpolation.
-    const torch::Tensor mirrored = model_.Forward(sample.luminance.flip({3})).flip({3});
-    loss = loss + options_.consistency_weight *
-                      (((predicted - mirrored).square() * sample.weight).sum() / total);
-  }
-  return loss;
+  const torch::Tensor predicted = Predict(sample.taps, sample.luminance);
+  const torch::Tensor loss = WeightedMean((predicted - sample.ab).abs(), sample.weight);
+  if (options_.consistency_weight <= 0.0) return loss;
+  return loss + options_.consistency_weight * Inconsistency(predicted, sample);
+}
+
+torch::Tensor TrainingSession::Inconsistency(const torch::Tensor& predicted,
+                                             const TrainingSample& sample) const {
+  const ChangedSample changed = samples_.Change(sample, course_.iteration);
+  const torch::Tensor again = Predict(changed.taps, changed.luminance);
+  const torch::Tensor before = Warp(predicted, changed.grid, Border::kRepeat);
+  return WeightedMean((again - before).square(), changed.weight);
 }
 
 double TrainingSession::Progress() const {
@@ -193,7 +200,7 @@ double TrainingSession::ValidationDeltaE00() const {
   const int stride = model_.OutputStride();
   for (const TrainingSample& sample : samples_.held_out()) {
     const Image l = ImageFromTensor(torch::avg_pool2d(sample.luminance, {stride, stride}));
-    const Image predicted = ImageFromTensor(Predict(sample) * kAbScale);
+    const Image predicted = ImageFromTensor(Predict(sample.taps, sample.luminance) * kAbScale);
     const Image truth = ImageFromTensor(sample.ab * kAbScale);
     const Image weight = ImageFromTensor(sample.weight);
     for (size_t i = 0; i < l.PlaneSize(); ++i) {

@@ -75,8 +75,13 @@ class TrainingSession {
     double running_loss = 0.0;
   };
 
-  torch::Tensor Predict(const TrainingSample& sample) const;
+  // `taps` may be empty.
+  torch::Tensor Predict(const std::vector<torch::Tensor>& taps,
+                        const torch::Tensor& luminance) const;
   torch::Tensor Loss(const TrainingSample& sample) const;
+  // The consistency term: mean squared difference of `predicted`, the answer to `sample`, from the
+  // answer to a second augmentation, where both show the same point.
+  torch::Tensor Inconsistency(const torch::Tensor& predicted, const TrainingSample& sample) const;
   // Runs one iteration. Returns false, without changes, if loss or gradient are unusable.
   bool TrainOn(const TrainingSample& sample);
   bool HasDrifted() const;

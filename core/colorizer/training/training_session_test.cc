@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/error.h"
+#include "core/colorizer/training/view_change.h"
 #include "tests/support/networks/small_colorizer.h"
 
 namespace color3d {
@@ -159,6 +160,62 @@ TEST_F(TrainingTest, ConsistencyAndPaperRecipesTrain) {
     Train(model, checkpoints, progress);
     EXPECT_FALSE(progress.train.empty());
   }
+}
+
+// Mean variance of the answers to changes of the key view, mapped back.
+double VarianceOfAnswers(const PersonalModel& model, const torch::Tensor& key) {
+  torch::NoGradGuard no_grad;
+  Random random(9);
+  std::vector<torch::Tensor> answers;
+  for (int i = 0; i < 16; ++i) {
+    const ViewChange change = ViewChange::Draw(random);
+    const AffineMap map = change.Positions(key.size(2), key.size(3));
+    const torch::Tensor grid = SamplingGrid(map, key.size(2), key.size(3));
+    const torch::Tensor answer = model.Forward(change.InLight(Warp(key, grid, Border::kReflect)));
+    const torch::Tensor back = SamplingGrid(Inverse(map), answer.size(2), answer.size(3));
+    answers.push_back(Warp(answer, back, Border::kRepeat));
+  }
+  return torch::cat(answers).var(0, /*unbiased=*/true).mean().item<double>();
+}
+
+TEST_F(TrainingTest, ConsistencyReducesVarianceOfAnswers) {
+  NoCheckpoints none;
+  NullObserver progress;
+  PersonalModel plain = MakeModel();
+  Train(plain, none, progress);
+  options_.consistency_weight = 100.0;
+  PersonalModel consistent = MakeModel();
+  Train(consistent, none, progress);
+  EXPECT_LT(VarianceOfAnswers(consistent, KeyTensor()),
+            0.8 * VarianceOfAnswers(plain, KeyTensor()));
+}
+
+TEST_F(TrainingTest, ChangedSampleShowsSamePoints) {
+  Image& smooth = pictures_[0].luminance;
+  for (int y = 0; y < smooth.height; ++y) {
+    for (int x = 0; x < smooth.width; ++x) {
+      smooth.At(0, y, x) = 50.0f + 15.0f * std::sin(0.15f * x) + 15.0f * std::cos(0.2f * y);
+    }
+  }
+  PersonalModel model = MakeModel();
+  const TrainingSamples samples(pictures_, recipe_.augment, options_, model);
+  const TrainingSample sample = samples.Draw(3);
+  const ChangedSample changed = samples.Change(sample, 3);
+  const torch::Tensor luminance =
+      Warp(torch::avg_pool2d(sample.luminance, {2, 2}), changed.grid, Border::kRepeat);
+  const torch::Tensor shown = torch::avg_pool2d(changed.luminance, {2, 2});
+  const torch::Tensor inside = changed.weight > 0.99;
+  ASSERT_GT(inside.sum().item<double>(), 100.0);
+  // Light is an affine change of the values, which leaves their correlation.
+  const torch::Tensor x = luminance.masked_select(inside), y = shown.masked_select(inside);
+  const torch::Tensor dx = x - x.mean(), dy = y - y.mean();
+  const double correlation =
+      (dx * dy).sum().item<double>() /
+      std::sqrt(dx.square().sum().item<double>() * dy.square().sum().item<double>());
+  EXPECT_GT(correlation, 0.9);
+  // Other numbers have other changes, equal numbers the same.
+  EXPECT_FALSE(torch::equal(samples.Change(sample, 4).luminance, changed.luminance));
+  EXPECT_TRUE(torch::equal(samples.Change(sample, 3).luminance, changed.luminance));
 }
 
 TEST_F(TrainingTest, ResumesWithSameResult) {
