@@ -160,6 +160,9 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
   if (spec.has_full_resolution()) options.full_resolution = spec.full_resolution();
   if (spec.has_adapter_stages()) options.adapter_stages = spec.adapter_stages();
   if (spec.has_instance_norm()) options.instance_norm = spec.instance_norm();
+  if (spec.recipe() == v1::PersonalizeSpec::RECIPE_FEED_FORWARD) {
+    options.recipe = ColorizerOptions::Recipe::kFeedForward;
+  }
   if (spec.has_iterations()) options.iterations = spec.iterations();
   if (spec.has_time_limit_seconds()) options.time_limit_seconds = spec.time_limit_seconds();
   if (spec.has_max_side_px()) options.max_side_px = spec.max_side_px();

@@ -25,6 +25,7 @@ struct PipelineArguments {
   ColorizerOptions colorizer{.iterations = 800};
   ChromaOptions chroma{.iterations = 600};
   bool paper = false;
+  bool feed_forward = false;
   bool carry = true;
   bool bound = false;
   bool rescore = false;
@@ -111,6 +112,7 @@ void RunPipeline(const PipelineArguments& args) {
   }
   ColorizerOptions colorizer = args.colorizer;
   if (args.paper) colorizer.UsePaperRecipe();
+  if (args.feed_forward) colorizer.recipe = ColorizerOptions::Recipe::kFeedForward;
   run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
   run(kind::kColorizeViews,
       [&](StageContext& c) { RunColorizeViews({.max_side_px = args.max_side_px}, c); });
@@ -158,6 +160,8 @@ void AddPipelineCommand(CLI::App& app) {
   command->add_flag("--carry,!--no-carry",
                     args->carry,
                     "Carry the key view's colours through the geometry (default), or not");
+  command->add_flag(
+      "--feed-forward", args->feed_forward, "Use the general colorizer, without training");
   command->add_flag("--paper", args->paper, "Use the paper's colorizer recipe");
   command
       ->add_option("--geometry",

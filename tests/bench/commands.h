@@ -9,6 +9,7 @@ void AddAugmentationsCommand(CLI::App& app);
 void AddAutomaticCommand(CLI::App& app);
 void AddChoicesCommand(CLI::App& app);
 void AddExplainCommand(CLI::App& app);
+void AddExemplarCommand(CLI::App& app);
 void AddFilmCommand(CLI::App& app);
 void AddDynamicScenesCommand(CLI::App& app);
 void AddFloorCommand(CLI::App& app);

@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   color3d::AddAutomaticCommand(app);
   color3d::AddChoicesCommand(app);
   color3d::AddExplainCommand(app);
+  color3d::AddExemplarCommand(app);
   color3d::AddFilmCommand(app);
   color3d::AddDynamicScenesCommand(app);
   color3d::AddFloorCommand(app);

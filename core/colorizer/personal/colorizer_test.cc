@@ -150,6 +150,21 @@ TEST(ColorizerTest, FullSizeDoesNotReducePictures) {
   EXPECT_NE(answer(large, true), answer(large, false));
 }
 
+TEST(ColorizerTest, FeedForwardRecipeTrainsNothing) {
+  const Key key = MakeKey(96, 80);
+  ColorizerOptions options = Quick(20);
+  options.recipe = ColorizerOptions::Recipe::kFeedForward;
+  const auto general = Train(key, options);
+  const std::string bytes = general->Serialize();
+  options.iterations = 0;
+  EXPECT_EQ(Train(key, options)->Serialize(), bytes) << "iterations are ignored";
+  const Image ab = general->Colorize(key.luminance);
+  EXPECT_EQ(LoadColorizer(bytes, TheEncoder(), 1)->Colorize(key.luminance).data, ab.data);
+  EXPECT_NE(Train(key, Quick(0))->Colorize(key.luminance).data, ab.data) << "the head corrects";
+  const double gray = MeanError(key.luminance, key.ab, Image(96, 80, 2));
+  EXPECT_LT(MeanError(key.luminance, key.ab, ab), 0.4 * gray);
+}
+
 TEST(ColorizerTest, FileKeepsNetworkSize) {
   const Key key = MakeKey(96, 80);
   ColorizerOptions options = Quick(3);

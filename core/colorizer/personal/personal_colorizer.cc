@@ -76,6 +76,11 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
   const NeighborColors found = parts_.neighbors->Lookup(taps, luminance, wanted, position);
   Image cells = ImageFromTensor(found.ab);
   if (wanted.defined()) FillHoles(ImageFromTensor(wanted.to(torch::kFloat32).unsqueeze(0)), &cells);
+  if (parts_.head) {
+    const NeighborColors filled{
+        TensorFromImage(cells).squeeze(0), found.distance, found.variance};
+    cells = ImageFromTensor(parts_.head->Refine(taps, luminance, filled));
+  }
   const int stride = model.OutputStride();
   const torch::Tensor guide = torch::avg_pool2d(luminance, {stride, stride});
   const Image coarse_luminance = ImageFromTensor(guide);
@@ -233,6 +238,7 @@ std::shared_ptr<const Colorizer> PersonalColorizer::Deserialize(
   if (has_neighbors) {
     parts.neighbors = FeatureNeighbors::TakeFrom(*encoder, recipe.neighbor_options, kWhat, &file);
   }
+  if (recipe.exemplar_head) parts.head = ExemplarHead::Embedded(*encoder);
   if (!file.arrays.empty()) {
     throw InvalidArgument(
         "{} has an unknown array {}", kWhat, QuotedName(file.arrays.begin()->first));

@@ -10,6 +10,7 @@
 
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/corrector.h"
+#include "core/colorizer/exemplar/exemplar_head.h"
 #include "core/colorizer/model/personal_model.h"
 #include "core/colorizer/neighbors/feature_neighbors.h"
 #include "core/colorizer/personal/train_colorizer.h"
@@ -25,6 +26,7 @@ class PersonalColorizer : public Colorizer {
     ColorizerOptions options;
     std::unique_ptr<PersonalModel> model;         // refers to *encoder
     std::unique_ptr<FeatureNeighbors> neighbors;  // may be null
+    std::shared_ptr<const ExemplarHead> head;     // corrects the neighbours; may be null
     RelativeChroma relative_chroma;
     std::vector<TrainingPoint> curve;
     int threads = 0;         // for prediction; 0: one per core

@@ -140,6 +140,7 @@ PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
     parts.neighbors = std::make_unique<FeatureNeighbors>(
         *parts.encoder, pictures, neighbors, Random(options.seed, /*stream=*/3), cancel);
   }
+  if (recipe.exemplar_head) parts.head = ExemplarHead::Embedded(*parts.encoder);
   Random start(options.seed, /*stream=*/0);
   parts.model =
       std::make_unique<PersonalModel>(*parts.encoder, recipe.model, MeanAb(key.ab), start);
@@ -170,10 +171,12 @@ void Train(TrainingSession& session,
 
 std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> encoder,
                                                 std::vector<TrainingPicture> pictures,
-                                                const ColorizerOptions& options,
+                                                const ColorizerOptions& given_options,
                                                 const RunControl& control,
                                                 const std::optional<BatchPlace>& place) {
-  options.Validate();
+  given_options.Validate();
+  ColorizerOptions options = given_options;
+  if (RecipeFor(options).exemplar_head) options.iterations = 0;
   CheckPictures(pictures);
   auto taps = RequireTaps(encoder);
   CheckTaps(taps->config());

@@ -28,6 +28,7 @@ TrainingRecipe RecipeFor(const ColorizerOptions& options) {
   recipe.neighbors = recipe.neighbors && options.neighbors;
   recipe.augment.elastic = options.elastic;
   if (!options.augment) recipe.augment = AugmentOptions::CropsOnly();
+  recipe.exemplar_head = options.recipe == ColorizerOptions::Recipe::kFeedForward;
   if (options.adapter_stages >= 0) recipe.model.adapter_stages = options.adapter_stages;
   recipe.model.decoder_width = options.decoder_width;
   recipe.model.full_resolution = options.full_resolution;

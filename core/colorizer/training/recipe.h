@@ -16,6 +16,7 @@ struct TrainingRecipe {
   double last_learning_rate = 1e-6;  // cosine
   int warmup_iterations = 20;
   bool neighbors = true;
+  bool exemplar_head = false;  // corrects the neighbours' colours
   FeatureNeighborsOptions neighbor_options;
   // Share of the neighbors in the blend with the decoder, by their agreement on a colour:
   // certainty = doubt^2 / (doubt^2 + variance of the matches' ab). A decoder trained for few
