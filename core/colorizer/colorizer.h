@@ -23,8 +23,8 @@ inline constexpr int kMaxAdapterStages = 8;
 // The defaults are those of the service's preset "fast".
 struct ColorizerOptions {
   enum class Recipe {
-    kColor3d,  // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
-    kPaper,    // adapters, rot90 + grid shuffle, lr 1e-4 -> 1e-6
+    kColor3d,      // frozen normalisation statistics, mild augmentation, lr 1e-3 -> 1e-6
+    kPaper,        // adapters, rot90 + grid shuffle, lr 1e-4 -> 1e-6
     kFeedForward,  // no training: neighbours, corrected by a general head (exemplar_head.h)
   };
   // Precision of matrix products and convolutions in training. All else is float32.

@@ -59,8 +59,8 @@ StageWork WorkOf(const v1::JobSpec& stage,
   return work;
 }
 
-// `geometry`: options of the geometry stage in the same graph, which decide the cost of later stages
-// too; nullptr if there is none.
+// `geometry`: options of the geometry stage in the same graph, which decide the cost of later
+// stages too; nullptr if there is none.
 double EstimateWithGeometry(const v1::JobSpec& stage,
                             const v1::ReconstructGeometrySpec* geometry,
                             const SceneFacts& facts,

@@ -85,8 +85,8 @@ torch::Tensor ExemplarHead::Refine(const std::vector<torch::Tensor>& taps,
   }
   torch::Tensor x = torch::cat(inputs, 1);
   x = torch::relu(torch::conv2d(x, parameter(2), parameter(3), /*stride=*/1, /*padding=*/1));
-  x = torch::relu(torch::conv2d(
-      x, parameter(4), parameter(5), /*stride=*/1, /*padding=*/2, /*dilation=*/2));
+  x = torch::relu(
+      torch::conv2d(x, parameter(4), parameter(5), /*stride=*/1, /*padding=*/2, /*dilation=*/2));
   x = torch::conv2d(x, parameter(6), parameter(7), /*stride=*/1, /*padding=*/1);
   const torch::Tensor gain = 2.0 * torch::sigmoid(x.slice(1, 2, 3));
   return (ab * gain + kAbScale * x.slice(1, 0, 2)).squeeze(0);
@@ -105,9 +105,10 @@ void ExemplarHead::SetWeights(const WeightMap& weights) {
   for (auto& [name, tensor] : parameters_) {
     const auto found = weights.find(name);
     if (found == weights.end() || found->second.shape != tensor.sizes().vec()) {
-      throw InvalidArgument("the weights of the feed-forward colorizer have no array {} of {} values",
-                            name,
-                            tensor.numel());
+      throw InvalidArgument(
+          "the weights of the feed-forward colorizer have no array {} of {} values",
+          name,
+          tensor.numel());
     }
     torch::Tensor target = tensor;
     target.copy_(torch::tensor(found->second.values).reshape(tensor.sizes()));

@@ -1,7 +1,7 @@
 // The general part of the feed-forward colorizer (STILL.md "Feed-forward variant"): a small network
 // that corrects the colours which the feature neighbours take from the key view. Trained once, on
-// photographs, not on the scene (CARD.md). Torch in the interface; used inside core/colorizer and by
-// its pre-training. Thread-safe while nothing trains it.
+// photographs, not on the scene (CARD.md). Torch in the interface; used inside core/colorizer and
+// by its pre-training. Thread-safe while nothing trains it.
 #pragma once
 
 #include <torch/types.h>

@@ -12,9 +12,8 @@ namespace {
 struct Input {
   std::vector<torch::Tensor> taps;
   torch::Tensor luminance = torch::full({1, 1, 64, 64}, 60.0);
-  NeighborColors found{torch::full({2, 16, 16}, 12.0),
-                       torch::full({16, 16}, 1.0),
-                       torch::full({16, 16}, 9.0)};
+  NeighborColors found{
+      torch::full({2, 16, 16}, 12.0), torch::full({16, 16}, 1.0), torch::full({16, 16}, 9.0)};
 };
 
 std::shared_ptr<const TapEncoder> TheEncoder() {

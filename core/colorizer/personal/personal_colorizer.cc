@@ -77,8 +77,7 @@ PersonalColorizer::Answer PersonalColorizer::Blend(std::vector<torch::Tensor> ta
   Image cells = ImageFromTensor(found.ab);
   if (wanted.defined()) FillHoles(ImageFromTensor(wanted.to(torch::kFloat32).unsqueeze(0)), &cells);
   if (parts_.head) {
-    const NeighborColors filled{
-        TensorFromImage(cells).squeeze(0), found.distance, found.variance};
+    const NeighborColors filled{TensorFromImage(cells).squeeze(0), found.distance, found.variance};
     cells = ImageFromTensor(parts_.head->Refine(taps, luminance, filled));
   }
   const int stride = model.OutputStride();

@@ -14,9 +14,10 @@ template <typename T>
 using Names = std::vector<std::pair<T, const char*>>;
 
 // Names in colorizer files. They must not change, even if the enumerators do.
-const Names<ColorizerOptions::Recipe> kRecipes = {{ColorizerOptions::Recipe::kColor3d, "color3d"},
-                                                  {ColorizerOptions::Recipe::kPaper, "paper"},
-                                                  {ColorizerOptions::Recipe::kFeedForward, "feed_forward"}};
+const Names<ColorizerOptions::Recipe> kRecipes = {
+    {ColorizerOptions::Recipe::kColor3d, "color3d"},
+    {ColorizerOptions::Recipe::kPaper, "paper"},
+    {ColorizerOptions::Recipe::kFeedForward, "feed_forward"}};
 const Names<ColorizerOptions::Precision> kPrecisions = {
     {ColorizerOptions::Precision::kAuto, "auto"},
     {ColorizerOptions::Precision::kFloat32, "float32"},

@@ -152,7 +152,8 @@ void AddExemplarCommand(CLI::App& app) {
   command->add_option("-o,--out", args->out_file, "File for the weights (safetensors)")->required();
   command->add_option("--pairs", args->pairs, "Number of pairs to train on")
       ->check(CLI::Range(1, 100000));
-  command->add_option("--validation-pairs", args->validation_pairs, "Number of pairs to validate on")
+  command
+      ->add_option("--validation-pairs", args->validation_pairs, "Number of pairs to validate on")
       ->check(CLI::Range(1, 100000));
   command->add_option("--passes", args->passes, "Passes over the pairs")
       ->check(CLI::Range(1, 10000));
