@@ -11,9 +11,9 @@ namespace color3d {
 namespace {
 
 constexpr int64_t kSidePx = 299;
-constexpr int64_t kStemChannels = 32;  // of the published first layer
-constexpr int64_t kMaxDivisor = 16;    // divides all channel counts
-constexpr int64_t kFidClasses = 1008;  // of the network of the original FID
+constexpr int64_t kStemChannels = 32;         // of the published first layer
+constexpr int64_t kMaxInceptionDivisor = 16;  // divides all channel counts
+constexpr int64_t kFidClasses = 1008;         // of the network of the original FID
 constexpr double kNormEpsilon = 1e-3;
 
 torch::Tensor MaxPool(const torch::Tensor& x, int64_t stride, int64_t padding) {
@@ -23,7 +23,8 @@ torch::Tensor MaxPool(const torch::Tensor& x, int64_t stride, int64_t padding) {
 int64_t DivisorOf(const WeightReader& reader) {
   const std::string first = "Conv2d_1a_3x3.conv.weight";
   const int64_t channels = StoredSize(reader, first, 0);
-  if (channels < 1 || kStemChannels % channels != 0 || kStemChannels / channels > kMaxDivisor) {
+  if (channels < 1 || kStemChannels % channels != 0 ||
+      kStemChannels / channels > kMaxInceptionDivisor) {
     throw InvalidArgument(
         "the Inception weights do not fit the network: {} {}; expected the names of torchvision's "
         "inception_v3 or of pytorch-fid, with {} channels",

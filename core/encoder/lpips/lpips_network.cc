@@ -9,8 +9,8 @@
 namespace color3d {
 namespace {
 
-constexpr int64_t kFirstChannels = 64;  // of both published backbones
-constexpr int64_t kMaxDivisor = 16;     // divides all channel counts
+constexpr int64_t kFirstChannels = 64;    // of both published backbones
+constexpr int64_t kMaxLpipsDivisor = 16;  // divides all channel counts
 constexpr int64_t kAlexNetKernel = 11;
 
 struct LayerShape {
@@ -58,7 +58,8 @@ void LpipsNetwork::TakeBackbone(WeightMap weights) {
   WeightReader reader(std::move(weights), "the weights of the backbone of LPIPS");
   const std::string first = "features.0.weight";
   const int64_t channels = StoredSize(reader, first, 0);
-  if (channels < 1 || kFirstChannels % channels != 0 || kFirstChannels / channels > kMaxDivisor) {
+  if (channels < 1 || kFirstChannels % channels != 0 ||
+      kFirstChannels / channels > kMaxLpipsDivisor) {
     throw InvalidArgument(
         "the weights of the backbone of LPIPS do not fit the network: {} {}; expected those of "
         "torchvision's alexnet or vgg16, with {} channels",
