@@ -29,7 +29,9 @@ TEST(RunCurveTest, FallsWhenColorsAreCarriedAndLearnt) {
   for (size_t i = 1; i < curve.points.size(); ++i) {
     EXPECT_GE(curve.points[i].seconds, curve.points[i - 1].seconds);
     EXPECT_LE(curve.points[i].error, curve.points[i - 1].error);
-    if (curve.points[i].seconds < 28.0) EXPECT_EQ(curve.points[i].error, 10.0);
+    if (curve.points[i].seconds < 28.0) {
+      EXPECT_EQ(curve.points[i].error, 10.0);
+    }
   }
   EXPECT_EQ(curve.true_error, 1.64);
 }

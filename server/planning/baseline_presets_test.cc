@@ -19,11 +19,11 @@ namespace fs = std::filesystem;
 
 const fs::path kFolder = fs::path(COLOR3D_SOURCE_DIR) / "tests/bench/baselines";
 
-// File by name, as in the table.
+// File by name, as in the table. Options of the client may follow the file.
 std::map<std::string, std::string> FilesOfTable() {
   const std::string table = ReadFile(kFolder / "README.md");
   const std::regex row(
-      "\\n\\| ([a-z0-9_]+) \\| ([a-z0-9_.]+|-) \\| "
+      "\\n\\| ([a-z0-9_]+) \\| ((?:[a-z0-9_]+.textproto|-)[^|]*) \\| "
       "(ours|baseline|paper|ablation) \\| (yes|no) \\| [^|]+ \\|(?=\\n)");
   std::map<std::string, std::string> files;
   for (std::sregex_iterator it(table.begin(), table.end(), row), end; it != end; ++it) {
@@ -57,9 +57,10 @@ std::set<std::string> WorkOf(const v1::JobSpec& spec) {
 TEST(BaselinePresetsTest, EachFileHasOneRow) {
   std::set<std::string> listed;
   for (const auto& [name, file] : FilesOfTable()) {
-    if (file == "-") continue;
-    EXPECT_EQ(file, name + ".textproto");
-    listed.insert(file);
+    if (file[0] == '-') continue;
+    const size_t options = file.find(' ');
+    if (options == std::string::npos) EXPECT_EQ(file, name + ".textproto");
+    listed.insert(file.substr(0, options));
   }
   std::set<std::string> present;
   for (const fs::directory_entry& entry : fs::directory_iterator(kFolder)) {
@@ -76,7 +77,7 @@ TEST(BaselinePresetsTest, EachIsWorkOfItsOwn) {
     seen[WorkOf(spec)] = v1::Preset_Name(preset);
   }
   for (const auto& [name, file] : FilesOfTable()) {
-    if (file == "-") continue;
+    if (file[0] == '-' || file.find(' ') != std::string::npos) continue;
     const auto [other, is_new] = seen.emplace(WorkOf(SpecOfPreset(kFolder / file)), name);
     EXPECT_TRUE(is_new) << name << " does the same as " << other->second;
   }

@@ -1,6 +1,7 @@
 #include "tests/bench/suite/suite_plan.h"
 
 #include <algorithm>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -27,10 +28,22 @@ std::vector<std::string> Cells(const std::string& line) {
   return cells;
 }
 
+std::vector<std::string> Words(const std::string& text) {
+  std::istringstream stream(text);
+  return {std::istream_iterator<std::string>(stream), {}};
+}
+
 std::string Joined(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
+}
+
+bool ChoosesKeyView(const SuitePreset& preset) {
+  const auto& options = preset.arguments;
+  return std::find(options.begin(), options.end(), "--keys") != options.end() ||
+         (!preset.file.empty() &&
+          ReadFile(preset.file).find("\nselect_key_view {") != std::string::npos);
 }
 
 template <class T>
@@ -68,9 +81,17 @@ std::vector<SuitePreset> ReadPresetTable(const fs::path& markdown) {
                             markdown.string(),
                             number);
     }
-    SuitePreset preset{cells[0], {}, cells[2], cells[3] == "yes", cells[4]};
-    if (cells[1] != "-") {
-      preset.file = markdown.parent_path() / cells[1];
+    SuitePreset preset{cells[0], {}, cells[2], cells[3] == "yes", cells[4], Words(cells[1])};
+    if (preset.arguments.empty()) {
+      throw InvalidArgument("{}:{}: the file of {} is missing; `-` is a preset of the server",
+                            markdown.string(),
+                            number,
+                            preset.name);
+    }
+    const std::string file = preset.arguments.front();
+    preset.arguments.erase(preset.arguments.begin());
+    if (file != "-") {
+      preset.file = markdown.parent_path() / file;
       if (!fs::exists(preset.file)) {
         throw InvalidArgument(
             "{}:{}: there is no file {}", markdown.string(), number, preset.file.string());
@@ -118,8 +139,11 @@ std::vector<std::string> SuiteTask::Arguments(const fs::path& out) const {
                                         std::to_string(seed),
                                         "--preset",
                                         preset.file.empty() ? preset.name : preset.file.string()};
-  if (!scene.key_view.empty()) arguments.insert(arguments.end(), {"--key-view", scene.key_view});
+  if (!scene.key_view.empty() && !ChoosesKeyView(preset)) {
+    arguments.insert(arguments.end(), {"--key-view", scene.key_view});
+  }
   if (preset.name == kBoundSource) arguments.push_back("--bound");
+  arguments.insert(arguments.end(), preset.arguments.begin(), preset.arguments.end());
   arguments.insert(arguments.end(), scene.arguments.begin(), scene.arguments.end());
   return arguments;
 }
@@ -135,6 +159,7 @@ std::vector<SuiteTask> PlanSuite(const std::vector<SuiteScene>& scenes,
         SuiteTask task{scene, preset, static_cast<uint64_t>(seed), {}};
         nlohmann::json facts = {scene.name, scene.key_view, scene.arguments, preset.name};
         if (!preset.file.empty()) facts.push_back(ReadFile(preset.file));
+        if (!preset.arguments.empty()) facts.push_back(preset.arguments);
         task.options_digest = Sha256Hex(facts.dump()).substr(0, 12);
         tasks.push_back(std::move(task));
       }

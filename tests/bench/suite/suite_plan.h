@@ -12,17 +12,19 @@ namespace color3d {
 // A row of the table of baselines (tests/bench/baselines/README.md).
 struct SuitePreset {
   std::string name;
-  std::filesystem::path file;  // empty: a preset of the server
-  std::string kind;            // ours, baseline, paper, ablation
-  bool oracle = false;         // uses true colours that a user does not have
-  std::string claim;           // one sentence
+  std::filesystem::path file;               // empty: a preset of the server
+  std::string kind;                         // ours, baseline, paper, ablation
+  bool oracle = false;                      // uses true colours that a user does not have
+  std::string claim;                        // one sentence
+  std::vector<std::string> arguments = {};  // further options of `color3d colorize`
 };
 
 // The preset whose figure comes from runs of kBoundSource with `--bound`.
 inline constexpr char kBoundPreset[] = "bound";
 inline constexpr char kBoundSource[] = "fast";
 
-// Reads the rows of a Markdown table "| name | file | kind | oracle | claim |". Throws
+// Reads the rows of a Markdown table "| name | file | kind | oracle | claim |"; options of `color3d
+// colorize` may follow the file, as in "paper.textproto --keys 2". Throws
 // Error{kInvalidArgument} with the line if one cannot be read or a file is missing.
 std::vector<SuitePreset> ReadPresetTable(const std::filesystem::path& markdown);
 
@@ -49,7 +51,8 @@ struct SuiteTask {
   uint64_t seed = 1;
   std::string options_digest;  // of all that decides the result but the program
 
-  // Arguments of `color3d`, with results in `out`.
+  // Arguments of `color3d`, with results in `out`. A preset with select_key_view or `--keys`
+  // chooses the key view itself.
   std::vector<std::string> Arguments(const std::filesystem::path& out) const;
 };
 

@@ -58,15 +58,24 @@ TEST_F(SuitePlanTest, ReadsTableOfPresets) {
       Write("README.md",
             "# Title\n| name | file | kind | oracle | claim |\n|---|---|---|---|---|\n"
             "| fast | - | ours | no | Best. |\n| gray | gray.textproto | baseline | no | C. |\n"
-            "| bound | - | baseline | yes | B. |\n");
+            "| bound | - | baseline | yes | B. |\n"
+            "| two_keys | gray.textproto --keys 2 | ours | no | K. |\n");
   const std::vector<SuitePreset> presets = ReadPresetTable(table);
-  ASSERT_EQ(presets.size(), 3u);
+  ASSERT_EQ(presets.size(), 4u);
   EXPECT_TRUE(presets[0].file.empty());
   EXPECT_EQ(presets[1].file, folder_.path() / "gray.textproto");
   EXPECT_TRUE(presets[2].oracle);
   EXPECT_EQ(presets[2].claim, "B.");
+  EXPECT_TRUE(presets[1].arguments.empty());
+  const auto tasks = PlanSuite({{"fern", folder_.path(), "7"}}, {presets[1], presets[3]}, 1);
+  EXPECT_THAT(tasks[0].Arguments("out"), testing::Contains("--key-view"));
+  EXPECT_THAT(tasks[1].Arguments("out"), testing::Contains("--keys"));
+  EXPECT_THAT(tasks[1].Arguments("out"), Not(testing::Contains("--key-view")));
+  EXPECT_NE(tasks[0].options_digest, tasks[1].options_digest);
+  Write("gray.textproto", "# random\nselect_key_view {\n}\n");
+  EXPECT_THAT(tasks[0].Arguments("out"), Not(testing::Contains("--key-view")));
   EXPECT_THAT(MessageOf([&] { SelectPresets(presets, {"paper"}); }),
-              HasSubstr("there is no preset paper; there are fast, gray, bound"));
+              HasSubstr("there is no preset paper; there are fast, gray, bound, two_keys"));
 }
 
 TEST_F(SuitePlanTest, RefusesTableWithMissingFileOrCell) {
