@@ -59,7 +59,9 @@ TEST(BaselinePresetsTest, EachFileHasOneRow) {
   for (const auto& [name, file] : FilesOfTable()) {
     if (file[0] == '-') continue;
     const size_t options = file.find(' ');
-    if (options == std::string::npos) EXPECT_EQ(file, name + ".textproto");
+    if (options == std::string::npos) {
+      EXPECT_EQ(file, name + ".textproto");
+    }
     listed.insert(file.substr(0, options));
   }
   std::set<std::string> present;

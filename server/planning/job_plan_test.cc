@@ -92,7 +92,9 @@ TEST(JobPlanTest, EqualsGraph) {
         EXPECT_EQ(stage.kind(), job.kind);
         EXPECT_EQ(stage.runs(), job.skip_reason.empty());
         EXPECT_FALSE(stage.reason().empty()) << stage.kind();
-        if (!stage.runs()) EXPECT_EQ(stage.reason(), job.skip_reason);
+        if (!stage.runs()) {
+          EXPECT_EQ(stage.reason(), job.skip_reason);
+        }
         EXPECT_TRUE(std::isfinite(stage.expected_seconds()) && stage.expected_seconds() >= 0.0);
         (stage.runs() ? expected : saved) += stage.expected_seconds();
       }
