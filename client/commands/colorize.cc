@@ -194,12 +194,21 @@ class Colorize {
     });
   }
 
-  // The line that compares the plan with the seconds of the results; empty if one is unknown.
+  // The lines that compare the plan with seconds and peak memory of the results; without those
+  // that are unknown.
   std::string PlanCheck(const std::optional<v1::JobPlan>& plan) const {
+    if (!plan) return "";
     const auto metrics = ReadResult(out_, artifact::kMetrics);
+    std::string text;
     const auto seconds = metrics.find("seconds_total");
-    if (!plan || seconds == metrics.end() || !seconds->is_number()) return "";
-    return PlanCheckText(plan->expected_seconds(), seconds->get<double>()) + "\n";
+    if (seconds != metrics.end() && seconds->is_number()) {
+      text += PlanCheckText(plan->expected_seconds(), seconds->get<double>()) + "\n";
+    }
+    const auto peak = metrics.find("peak_memory_bytes");
+    if (peak != metrics.end() && peak->is_number() && plan->expected_peak_memory_bytes() > 0) {
+      text += MemoryCheckText(plan->expected_peak_memory_bytes(), peak->get<int64_t>()) + "\n";
+    }
+    return text;
   }
 
   // Submits the job, follows it and `earlier` ones, and downloads its results. With --detach

@@ -18,12 +18,15 @@ std::string InWords(std::string kind) {
 
 // Rows of the stages that run, or of those that are left out.
 std::string StageTable(const v1::JobPlan& plan, bool runs, const std::string& heading) {
-  std::vector<std::vector<std::string>> rows = {{heading, "seconds", "reason"}};
+  std::vector<std::vector<std::string>> rows = {{heading, "seconds", "memory", "reason"}};
   for (const v1::PlannedStage& stage : plan.stages()) {
     if (stage.runs() != runs) continue;
     const double seconds = stage.expected_seconds();
-    rows.push_back(
-        {InWords(stage.kind()), seconds > 0.0 ? HumanSeconds(seconds) : "-", stage.reason()});
+    const int64_t bytes = stage.expected_peak_memory_bytes();
+    rows.push_back({InWords(stage.kind()),
+                    seconds > 0.0 ? HumanSeconds(seconds) : "-",
+                    bytes > 0 ? HumanBytes(bytes) : "-",
+                    stage.reason()});
   }
   return rows.size() > 1 ? Table(std::move(rows)) : "";
 }
@@ -44,11 +47,28 @@ std::string PlanText(const v1::JobPlan& plan) {
                     plan.measured_jobs())
               : " (two cores of the reference machine; this server has not run enough jobs to know "
                 "its own speed)";
+  text += "\n";
+  if (plan.expected_peak_memory_bytes() == 0) return text;  // of an older server
+  text += fmt::format("expected peak memory: {}", HumanBytes(plan.expected_peak_memory_bytes()));
+  if (plan.saved_memory_bytes() > 0) {
+    text += fmt::format("; {} saved", HumanBytes(plan.saved_memory_bytes()));
+  }
   return text + "\n";
 }
 
-bool IsWithinAThird(double expected_seconds, double measured_seconds) {
-  return std::abs(expected_seconds - measured_seconds) <= measured_seconds / 3.0;
+bool IsWithinAThird(double expected, double measured) {
+  return std::abs(expected - measured) <= measured / 3.0;
+}
+
+std::string MemoryCheckText(int64_t expected_bytes, int64_t measured_bytes) {
+  return fmt::format(
+      "expected a peak memory of {}, measured {}{}",
+      HumanBytes(expected_bytes),
+      HumanBytes(measured_bytes),
+      IsWithinAThird(static_cast<double>(expected_bytes), static_cast<double>(measured_bytes))
+          ? ""
+          : ": more than a third off (large photos need more while they are "
+            "decoded)");
 }
 
 std::string PlanCheckText(double expected_seconds, double measured_seconds) {

@@ -10,19 +10,23 @@ using ::testing::Not;
 
 v1::JobPlan SomePlan() {
   v1::JobPlan plan;
-  const auto add = [&](const char* kind, bool runs, const char* reason, double seconds) {
-    v1::PlannedStage* stage = plan.add_stages();
-    stage->set_kind(kind);
-    stage->set_runs(runs);
-    stage->set_reason(reason);
-    stage->set_expected_seconds(seconds);
-  };
-  add("carry_color", true, "colours are carried", 12.0);
-  add("correct_colors", false, "no corrections were given", 0.0);
-  add("solve_chroma", false, "frames are not reconstructed", 27.0);
+  const auto add =
+      [&](const char* kind, bool runs, const char* reason, double seconds, int64_t mb) {
+        v1::PlannedStage* stage = plan.add_stages();
+        stage->set_kind(kind);
+        stage->set_runs(runs);
+        stage->set_reason(reason);
+        stage->set_expected_seconds(seconds);
+        stage->set_expected_peak_memory_bytes(1'000'000 * mb);
+      };
+  add("carry_color", true, "colours are carried", 12.0, 300);
+  add("correct_colors", false, "no corrections were given", 0.0, 0);
+  add("solve_chroma", false, "frames are not reconstructed", 27.0, 560);
   plan.set_expected_seconds(12.0);
   plan.set_saved_seconds(27.0);
   plan.set_machine_factor(1.0);
+  plan.set_expected_peak_memory_bytes(300'000'000);
+  plan.set_saved_memory_bytes(560'000'000);
   return plan;
 }
 
@@ -34,6 +38,16 @@ TEST(PlanTextTest, NamesStagesReasonsAndSeconds) {
   EXPECT_THAT(text, HasSubstr("expected: 12 s of computing; 27 s saved"));
   EXPECT_LT(text.find("carry color"), text.find("left out"));
   EXPECT_GT(text.find("solve chroma"), text.find("left out"));
+}
+
+TEST(PlanTextTest, NamesMemory) {
+  v1::JobPlan plan = SomePlan();
+  EXPECT_THAT(PlanText(plan), HasSubstr("memory"));
+  EXPECT_THAT(PlanText(plan), HasSubstr("expected peak memory: 300.0 MB; 560.0 MB saved\n"));
+  plan.set_saved_memory_bytes(0);
+  EXPECT_THAT(PlanText(plan), HasSubstr("expected peak memory: 300.0 MB\n"));
+  plan.set_expected_peak_memory_bytes(0);
+  EXPECT_THAT(PlanText(plan), Not(HasSubstr("peak memory"))) << "of an older server";
 }
 
 TEST(PlanTextTest, SaysHowSpeedOfServerIsKnown) {
@@ -60,6 +74,12 @@ TEST(PlanTextTest, ComparesWithMeasuredSeconds) {
   EXPECT_FALSE(IsWithinAThird(81.0, 60.0));
   EXPECT_EQ(PlanCheckText(54.0, 57.0), "expected 54 s of computing, took 57 s");
   EXPECT_THAT(PlanCheckText(20.0, 57.0), HasSubstr("more than a third off"));
+}
+
+TEST(PlanTextTest, ComparesWithMeasuredMemory) {
+  EXPECT_EQ(MemoryCheckText(900'000'000, 870'000'000),
+            "expected a peak memory of 900.0 MB, measured 870.0 MB");
+  EXPECT_THAT(MemoryCheckText(200'000'000, 870'000'000), HasSubstr("more than a third off"));
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Expected seconds of a stage as a function of its work. Plans, time budgets and the report share
-// it. Pure functions, thread-safe.
+// Work of a stage, and its expected seconds. Plans, time budgets and the report share it. Pure
+// functions, thread-safe.
 #pragma once
 
 #include <string_view>
@@ -14,6 +14,7 @@ struct StageWork {
   double megapixels = 0.0;  // of one picture at the working size
   int iterations = 0;       // of training
   int gaussians = 0;        // maximum number
+  int sh_degree = 0;        // of their luminance
   CaptureKind kind = CaptureKind::kStatic;
   bool estimates_poses = false;
   bool geometry_given = false;  // the scene is a splat

@@ -15,6 +15,7 @@ struct StageSummary {
   double seconds = 0.0;            // of computing, over all attempts (of the original when cached)
   double expected_seconds = -1.0;  // by the plan, on two cores; < 0: unknown
   int64_t peak_memory_bytes = 0;   // 0: not measured
+  int64_t expected_peak_memory_bytes = 0;  // by the plan, as in PlannedStage; 0: unknown
   std::vector<std::string> warnings;
 };
 

@@ -25,6 +25,7 @@ void ColorizerOptions::Validate() const {
   check("consistency_weight", consistency_weight, 0, 1e3);
   check("average_decay", average_decay, 0, 0.9999);
   check("min_improvement", min_improvement, 0, 0.5);
+  check("min_decoder_share", min_decoder_share, 0, 1);
   check("adapter_stages", adapter_stages, -1, kMaxAdapterStages);
   check("decoder_width", decoder_width, 0.25, 4);
   check("max_gradient_norm", max_gradient_norm, 0, 1e6);

@@ -190,35 +190,67 @@ std::string SectionHtml(const ReportSection& section) {
 
 std::string Seconds(double seconds) { return seconds > 0.0 ? Number(seconds) : std::string(); }
 
-// The estimates beside the measured seconds, over the stages that have both; empty without them.
+std::string MiB(int64_t bytes) {
+  return bytes > 0 ? fmt::format("{}", (bytes + (1 << 19)) >> 20) : std::string();
+}
+
+// The estimates beside the measured seconds and peak memory, over the stages that have both; empty
+// without them.
 std::string PlanCheckHtml(const std::vector<PlanStep>& plan) {
   double estimated = 0.0, measured = 0.0;
+  int64_t estimated_bytes = 0, measured_bytes = 0;
   for (const PlanStep& step : plan) {
+    if (step.needed && step.measured_memory_bytes > 0) {
+      estimated_bytes = std::max(estimated_bytes, step.estimated_memory_bytes);
+      measured_bytes = std::max(measured_bytes, step.measured_memory_bytes);
+    }
     if (!step.needed || step.measured_seconds < 0.0 || !(step.estimated_seconds > 0.0)) continue;
     estimated += step.estimated_seconds;
     measured += step.measured_seconds;
   }
-  if (!(measured > 0.0)) return "";
-  return fmt::format("<p>Expected before the run, on two cores: {:.0f} s; measured: {:.0f} s.</p>",
-                     estimated,
-                     measured);
+  std::string html;
+  if (measured > 0.0) {
+    html =
+        fmt::format("<p>Expected before the run, on two cores: {:.0f} s; measured: {:.0f} s.</p>",
+                    estimated,
+                    measured);
+  }
+  if (estimated_bytes > 0) {
+    html += fmt::format("<p>Expected peak memory: {} MiB; measured: {} MiB.</p>",
+                        MiB(estimated_bytes),
+                        MiB(measured_bytes));
+  }
+  return html;
 }
 
 // Steps left out come first, since no other chapter shows them.
 std::string PlanHtml(const std::vector<PlanStep>& plan) {
   double saved = 0.0;
-  for (const PlanStep& step : plan) saved += step.needed ? 0.0 : step.estimated_seconds;
+  int64_t saved_bytes = 0;
+  for (const PlanStep& step : plan) {
+    if (step.needed) continue;
+    saved += step.estimated_seconds;
+    saved_bytes = std::max(saved_bytes, step.estimated_memory_bytes);
+  }
   std::string html = ChapterStart("Steps left out");
   if (saved >= 0.05) html += fmt::format("<p>Estimated time saved: {:.1f} s.</p>", saved);
-  ReportTable left_out{{"step", "saved, s"}, {}};
-  ReportTable done{{"step", "estimate, s", "measured, s"}, {}};
+  if (saved_bytes > 0) {
+    html += fmt::format("<p>Estimated peak memory saved: {} MiB.</p>", MiB(saved_bytes));
+  }
+  ReportTable left_out{{"step", "saved, s", "saved, MiB"}, {}};
+  ReportTable done{{"step", "estimate, s", "measured, s", "estimate, MiB", "measured, MiB"}, {}};
   for (const PlanStep& step : plan) {
     std::string name = step.step + ": " + step.reason;
     std::replace(name.begin(), name.begin() + static_cast<int>(step.step.size()), '_', ' ');
     if (step.needed) {
-      done.rows.push_back({name, Seconds(step.estimated_seconds), Seconds(step.measured_seconds)});
+      done.rows.push_back({name,
+                           Seconds(step.estimated_seconds),
+                           Seconds(step.measured_seconds),
+                           MiB(step.estimated_memory_bytes),
+                           MiB(step.measured_memory_bytes)});
     } else {
-      left_out.rows.push_back({name, Seconds(step.estimated_seconds)});
+      left_out.rows.push_back(
+          {name, Seconds(step.estimated_seconds), MiB(step.estimated_memory_bytes)});
     }
   }
   if (!left_out.rows.empty()) html += TableHtml(left_out);

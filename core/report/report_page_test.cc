@@ -81,6 +81,23 @@ TEST(ReportPageTest, ComparesPlanWithMeasuredSeconds) {
   EXPECT_EQ(RenderReport(data).find("Expected before the run"), std::string::npos);
 }
 
+TEST(ReportPageTest, ComparesPlanWithMeasuredMemory) {
+  constexpr int64_t kMiB = int64_t{1} << 20;
+  ReportData data;
+  data.plan = {
+      {.step = "luminance_geometry",
+       .estimated_memory_bytes = 400 * kMiB,
+       .measured_memory_bytes = 350 * kMiB},
+      {.step = "chroma", .estimated_memory_bytes = 900 * kMiB, .measured_memory_bytes = 870 * kMiB},
+      {.step = "corrections", .needed = false, .estimated_memory_bytes = 100 * kMiB}};
+  const std::string html = RenderReport(data);
+  EXPECT_NE(html.find("Expected peak memory: 900 MiB; measured: 870 MiB"), std::string::npos);
+  EXPECT_NE(html.find("Estimated peak memory saved: 100 MiB"), std::string::npos);
+  EXPECT_NE(html.find("<td class=\"v\">350</td>"), std::string::npos);
+  for (PlanStep& step : data.plan) step.measured_memory_bytes = 0;
+  EXPECT_EQ(RenderReport(data).find("Expected peak memory"), std::string::npos);
+}
+
 TEST(ReportPageTest, ShowsCurveOfWholeRun) {
   ReportData data;
   EXPECT_EQ(RenderReport(data).find("Error against time"), std::string::npos);

@@ -126,6 +126,13 @@ void AddParts(const PlanFacts& f, const std::string& stage, std::vector<PlanStep
         false,
         "three equal luminance channels are one channel: one is rasterised");
     plan->push_back(TimeStep(f));
+  } else if (stage == kind::kPersonalize && f.untrained_decoder) {
+    add("decoder_training",
+        false,
+        fmt::format("the neighbours agree: a decoder would have {:.1f} % of the inferred colours",
+                    100.0 * f.untrained_decoder->share),
+        EstimateSeconds(stage, {.iterations = f.untrained_decoder->iterations}) -
+            EstimateSeconds(stage, {}));
   } else if (stage == kind::kSolveChroma) {
     add("view_dependent_chroma",
         false,
@@ -169,6 +176,8 @@ std::string PlanToJson(const std::vector<PlanStep>& steps) {
                                  {"reason", s.reason},
                                  {"estimated_seconds", s.estimated_seconds}};
     if (s.measured_seconds >= 0.0) entry["measured_seconds"] = s.measured_seconds;
+    if (s.estimated_memory_bytes > 0) entry["estimated_memory_bytes"] = s.estimated_memory_bytes;
+    if (s.measured_memory_bytes > 0) entry["measured_memory_bytes"] = s.measured_memory_bytes;
     if (s.motion && !MotionClass(*s.motion).empty()) entry["motion"] = MotionClass(*s.motion);
     if (s.motion && s.motion->share) entry["moving_share"] = *s.motion->share;
     array.push_back(std::move(entry));

@@ -2,6 +2,7 @@
 // functions and values.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -28,6 +29,15 @@ struct PlanStep {
   // Kind of the stage that the step is; empty if it is a part of one. Not in the file.
   std::string stage = {};
   std::optional<SceneMotion> motion = {};  // that decides on `needed`
+  // Peak memory; for steps that are left out, the bytes by which this lowers the peak of the run.
+  int64_t estimated_memory_bytes = 0;  // 0: unknown, or none
+  int64_t measured_memory_bytes = 0;   // 0: not run, or not measured
+};
+
+// Decoder that was not trained, because the neighbours agree.
+struct UntrainedDecoder {
+  double share = 0.0;  // that it would have of the inferred colours, 0..1
+  int iterations = 0;  // of the training
 };
 
 struct PlanFacts {
@@ -44,6 +54,7 @@ struct PlanFacts {
   bool has_corrections = false;
   bool key_view_given = false;
   std::string key_view_strategy = {};  // in words, e.g. "feature coverage"; empty: unknown
+  std::optional<UntrainedDecoder> untrained_decoder = {};
   int views = 0;
   double megapixels_per_view = 0.0;  // at working size
 };

@@ -34,6 +34,31 @@ TEST(ScenePlanTest, OmitsUnneededSteps) {
   EXPECT_TRUE(PlanScene(facts)[0].needed);
 }
 
+TEST(ScenePlanTest, FileHasKnownMemoryOnly) {
+  const auto json = nlohmann::json::parse(
+      PlanToJson({{.step = "chroma", .estimated_memory_bytes = 900, .measured_memory_bytes = 870},
+                  {.step = "corrections", .needed = false}}));
+  EXPECT_EQ(json.at(0).at("estimated_memory_bytes"), 900);
+  EXPECT_EQ(json.at(0).at("measured_memory_bytes"), 870);
+  EXPECT_FALSE(json.at(1).contains("estimated_memory_bytes"));
+  EXPECT_FALSE(json.at(1).contains("measured_memory_bytes"));
+}
+
+TEST(ScenePlanTest, NamesDecoderThatWasNotTrained) {
+  const auto training = [](const PlanFacts& facts) {
+    for (const PlanStep& step : PlanScene(facts)) {
+      if (step.step == "decoder_training") return step;
+    }
+    return PlanStep{};
+  };
+  EXPECT_EQ(training({}).step, "");
+  const PlanStep step = training({.untrained_decoder = UntrainedDecoder{0.125, 100}});
+  EXPECT_FALSE(step.needed);
+  EXPECT_EQ(step.reason,
+            "the neighbours agree: a decoder would have 12.5 % of the inferred colours");
+  EXPECT_GT(step.estimated_seconds, 1.0);
+}
+
 TEST(ScenePlanTest, HasOneStepPerStage) {
   const auto plan = PlanScene({});
   for (const Stage& stage : StageCatalogue()) {

@@ -167,6 +167,22 @@ double ExpectedSecondsOf(const std::vector<StageSummary>& stages, const std::str
   return seconds;
 }
 
+// Maxima over the stages of the kind; 0 where unknown.
+struct StageMemory {
+  int64_t expected_bytes = 0;
+  int64_t measured_bytes = 0;
+};
+
+StageMemory MemoryOf(const std::vector<StageSummary>& stages, const std::string& kind) {
+  StageMemory memory;
+  for (const StageSummary& s : stages) {
+    if (s.kind != kind) continue;
+    memory.expected_bytes = std::max(memory.expected_bytes, s.expected_peak_memory_bytes);
+    memory.measured_bytes = std::max(memory.measured_bytes, s.peak_memory_bytes);
+  }
+  return memory;
+}
+
 std::string DescribeMotion(const FilmFindings& film, const Scene& scene) {
   std::string text = scene.relief       ? "the camera stands still, so that depth is unknown"
                      : film.poses_found ? fmt::format("{} frames have poses", film.frames_placed)
@@ -210,8 +226,15 @@ std::vector<PlanStep> CollectPlan(const Scene& scene,
       return s.kind == step.stage && s.state == "SKIPPED";
     });
     // Other stages that are not needed ran without their main work, e.g. import with given poses.
-    if (expected >= 0.0 && (step.needed || skipped)) step.estimated_seconds = expected;
-    if (step.needed) step.measured_seconds = SecondsOf(stages, step.stage);
+    const StageMemory memory = MemoryOf(stages, step.stage);
+    if (expected >= 0.0 && (step.needed || skipped)) {
+      step.estimated_seconds = expected;
+      step.estimated_memory_bytes = memory.expected_bytes;
+    }
+    if (step.needed) {
+      step.measured_seconds = SecondsOf(stages, step.stage);
+      step.measured_memory_bytes = memory.measured_bytes;
+    }
   }
   const auto add_reason = [&plan](const char* stage, const std::string& note) {
     for (PlanStep& step : plan) {
@@ -337,6 +360,7 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
                               std::back_inserter(personalization),
                               std::back_inserter(data.curves),
                               [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
+  facts.untrained_decoder = FindUntrainedDecoder(personalization);
   data.sections = colors.Sections(std::move(personalization));
   const RunCurve run_curve = CollectRunCurve(stages, curves);
   data.run_curve = RunCurvePlot(run_curve);

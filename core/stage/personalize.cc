@@ -15,6 +15,7 @@
 #include "core/scene/photo_masks.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/carry_facts.h"
 #include "core/stage/formats/key_views.h"
 #include "core/stage/formats/training_pictures.h"
 #include "core/stage/run_stages.h"
@@ -124,6 +125,14 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
   return pictures;
 }
 
+// min_decoder_share is one of all pixels, but the decoder has none where colours are carried.
+ColorizerOptions ForOpenPixels(ColorizerOptions options, const StageContext& context) {
+  const double open = 1.0 - ReadCarryFacts(context).coverage.value_or(0.0);
+  options.min_decoder_share =
+      open > options.min_decoder_share ? options.min_decoder_share / open : 1.0;
+  return options;
+}
+
 }  // namespace
 
 void RunPersonalize(const ColorizerOptions& options,
@@ -165,7 +174,7 @@ void RunPersonalize(const ColorizerOptions& options,
   const auto colorizer =
       TrainColorizer(batch.SharedEncoder(encoder, [&] { return context.LoadEncoder(encoder); }),
                      std::move(pictures),
-                     options,
+                     ForOpenPixels(options, context),
                      context.control(),
                      BatchPlace{batch, context.project()});
   context.WriteOutput(artifact::kColorizer, colorizer->Serialize());

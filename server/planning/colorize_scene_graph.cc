@@ -266,6 +266,10 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
       *spec.mutable_personalize() = scene.personalize();
       TrainAtFrameSize(scene.max_side_px(), spec.mutable_personalize());
     }
+    if (kind == kind::kPersonalize &&
+        scene.colorize_views().method() == v1::ColorizeViewsSpec::METHOD_DECODER) {
+      spec.mutable_personalize()->clear_min_decoder_share();
+    }
     std::string skip_reason;
     if (kind == kind::kCarryColor) {
       skip_reason = NoCarryReason(given, scene);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/catalogue/cost_model.h"
+#include "core/catalogue/memory_model.h"
 #include "core/catalogue/stages.h"
 #include "server/planning/job_spec.h"
 #include "server/planning/key_view_jobs.h"
@@ -49,6 +50,7 @@ StageWork WorkOf(const v1::JobSpec& stage,
   work.megapixels = AssumedMegapixels(side, views.are_frames);
   work.iterations = NumberOf<int>(options, "iterations", 0);
   work.gaussians = NumberOf<int>(options, "max_gaussians", 0);
+  work.sh_degree = NumberOf<int>(options, "sh_degree", 0);
   work.kind = views.kind;
   work.estimates_poses = EstimatesPoses(facts, import);
   work.geometry_given = views.have_geometry;
@@ -59,19 +61,25 @@ StageWork WorkOf(const v1::JobSpec& stage,
   return work;
 }
 
-// `geometry`: options of the geometry stage in the same graph, which decide the cost of later
+// `geometry`: options of the geometry stage in the same graph, which decide the work of later
 // stages too; nullptr if there is none.
-double EstimateWithGeometry(const v1::JobSpec& stage,
-                            const v1::ReconstructGeometrySpec* geometry,
-                            const SceneFacts& facts,
-                            const v1::ImportSceneSpec& import) {
+StageWork WorkWithGeometry(const v1::JobSpec& stage,
+                           const v1::ReconstructGeometrySpec* geometry,
+                           const SceneFacts& facts,
+                           const v1::ImportSceneSpec& import) {
   StageWork work = WorkOf(stage, facts, import);
   work.trains_jointly =
       geometry != nullptr && stage.solve_chroma().solver() == v1::SolveChromaSpec::SOLVER_JOINT;
   if (geometry != nullptr && !stage.has_reconstruct_geometry()) {
     work.gaussians = geometry->max_gaussians();
+    work.sh_degree = geometry->sh_degree();
     if (work.trains_jointly) work.iterations = geometry->iterations();
   }
+  return work;
+}
+
+// At most its time limit.
+double SecondsOf(const v1::JobSpec& stage, const StageWork& work) {
   const double seconds = EstimateSeconds(KindOf(stage), work);
   const double limit = NumberOf<double>(OptionsOf(stage), "time_limit_seconds", 0.0);
   return limit > 0.0 ? std::min(seconds, limit) : seconds;
@@ -113,12 +121,28 @@ const v1::JobSpec* FindGeometry(const std::vector<v1::JobSpec>& specs, const New
   return nullptr;
 }
 
+// Sets the peak of the run and, for stages that are left out, the bytes that this saves.
+void SetPeakMemory(v1::JobPlan* plan) {
+  int64_t peak = 0, saved = 0;
+  for (const v1::PlannedStage& stage : plan->stages()) {
+    if (stage.runs()) peak = std::max(peak, stage.expected_peak_memory_bytes());
+  }
+  for (v1::PlannedStage& stage : *plan->mutable_stages()) {
+    if (stage.runs()) continue;
+    const int64_t above = std::max<int64_t>(0, stage.expected_peak_memory_bytes() - peak);
+    stage.set_expected_peak_memory_bytes(above);
+    saved = std::max(saved, above);
+  }
+  plan->set_expected_peak_memory_bytes(peak);
+  plan->set_saved_memory_bytes(saved);
+}
+
 }  // namespace
 
 double EstimateJobSeconds(const v1::JobSpec& stage,
                           const SceneFacts& facts,
                           const v1::ImportSceneSpec& import) {
-  return EstimateWithGeometry(stage, nullptr, facts, import);
+  return SecondsOf(stage, WorkWithGeometry(stage, nullptr, facts, import));
 }
 
 MachineFactor MeasureMachine(const std::vector<MeasuredJob>& jobs) {
@@ -150,21 +174,20 @@ v1::JobPlan DescribeGraph(const NewGraph& graph,
   for (size_t i = 0; i < specs.size(); ++i) {
     if (IsComposite(specs[i])) continue;
     const std::string& skip_reason = graph.jobs[i].skip_reason;
-    const double seconds =
-        machine.factor *
-        EstimateWithGeometry(specs[i],
-                             geometry == nullptr ? nullptr : &geometry->reconstruct_geometry(),
-                             facts,
-                             import);
+    const StageWork work = WorkWithGeometry(
+        specs[i], geometry == nullptr ? nullptr : &geometry->reconstruct_geometry(), facts, import);
+    const double seconds = machine.factor * SecondsOf(specs[i], work);
     v1::PlannedStage* stage = plan.add_stages();
     stage->set_kind(graph.jobs[i].kind);
     stage->set_runs(skip_reason.empty());
     stage->set_reason(skip_reason.empty() ? ReasonToRun(specs[i], facts, import) : skip_reason);
     stage->set_expected_seconds(seconds);
+    stage->set_expected_peak_memory_bytes(EstimatePeakBytes(graph.jobs[i].kind, work));
     (skip_reason.empty() ? expected : saved) += seconds;
   }
   plan.set_expected_seconds(expected);
   plan.set_saved_seconds(saved);
+  SetPeakMemory(&plan);
   return plan;
 }
 

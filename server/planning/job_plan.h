@@ -1,5 +1,5 @@
-// The plan of a job in words and seconds, made from the graph that the planner builds, so that plan
-// and jobs agree. Uses no store and no clock; thread-safe.
+// The plan of a job in words, seconds and bytes, made from the graph that the planner builds, so
+// that plan and jobs agree. Uses no store and no clock; thread-safe.
 #pragma once
 
 #include <vector>

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
@@ -122,6 +123,32 @@ TEST(JobPlanTest, LeftOutStageSavesItsSeconds) {
   EXPECT_NEAR(
       StageIn(plan, kind::kCarryColor).expected_seconds(), carried.expected_seconds(), 1e-9);
   EXPECT_GT(plan.saved_seconds(), 1.0);
+}
+
+TEST(JobPlanTest, PeakMemoryIsMaximumOfStagesThatRun) {
+  const v1::JobPlan plan = PlanOf(SceneSpec(), kTwentyPhotos);
+  int64_t peak = 0;
+  for (const v1::PlannedStage& stage : plan.stages()) {
+    if (!stage.runs()) continue;
+    EXPECT_GT(stage.expected_peak_memory_bytes(), int64_t{100} << 20) << stage.kind();
+    peak = std::max(peak, stage.expected_peak_memory_bytes());
+  }
+  EXPECT_EQ(plan.expected_peak_memory_bytes(), peak);
+  EXPECT_EQ(plan.saved_memory_bytes(), 0) << "the largest stage runs";
+  EXPECT_GT(PlanOf(SceneSpec(), {.pictures = 60, .layout = CaptureLayout::kColmap})
+                .expected_peak_memory_bytes(),
+            peak + (int64_t{100} << 20));
+}
+
+TEST(JobPlanTest, LeftOutStageSavesMemoryAboveThePeakOnly) {
+  const v1::JobPlan film = PlanOf(SceneSpec(), {.pictures = 60, .layout = CaptureLayout::kFilm});
+  EXPECT_EQ(StageIn(film, kind::kCorrectColors).expected_peak_memory_bytes(), 0)
+      << "it would not raise the peak";
+  for (const v1::PlannedStage& stage : film.stages()) {
+    if (!stage.runs()) {
+      EXPECT_LE(stage.expected_peak_memory_bytes(), film.saved_memory_bytes()) << stage.kind();
+    }
+  }
 }
 
 TEST(JobPlanTest, GrowsWithPhotosPixelsAndIterations) {

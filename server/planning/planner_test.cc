@@ -137,6 +137,20 @@ TEST(Planner, RefusesMethodsWithoutTheirInput) {
   EXPECT_THAT(PlanError(spec).message, HasSubstr("name it in personalize.encoder"));
 }
 
+TEST(Planner, MethodDecoderAlwaysTrainsDecoder) {
+  for (const auto layout : {CaptureLayout::kColmap, CaptureLayout::kFilm}) {
+    const SceneFacts facts{.pictures = 20, .layout = layout};
+    v1::JobSpec spec = SceneSpec();
+    spec.mutable_colorize_scene()->mutable_personalize()->set_min_decoder_share(0.5);
+    EXPECT_EQ(SpecOf(PlanJob(spec, {}, facts), "personalize").personalize().min_decoder_share(),
+              0.5);
+    spec.mutable_colorize_scene()->mutable_colorize_views()->set_method(
+        v1::ColorizeViewsSpec::METHOD_DECODER);
+    EXPECT_FALSE(
+        SpecOf(PlanJob(spec, {}, facts), "personalize").personalize().has_min_decoder_share());
+  }
+}
+
 TEST(Planner, ExplicitFieldsWinOverThePreset) {
   v1::JobSpec spec = SceneSpec();
   spec.mutable_colorize_scene()->set_preset(v1::PRESET_PAPER);

@@ -171,6 +171,7 @@ ColorizerOptions ColorizerOptionsFrom(const v1::PersonalizeSpec& spec, uint64_t 
   options.precision = PrecisionFrom(spec.precision());
   if (spec.has_average_decay()) options.average_decay = spec.average_decay();
   if (spec.has_min_improvement()) options.min_improvement = spec.min_improvement();
+  if (spec.has_min_decoder_share()) options.min_decoder_share = spec.min_decoder_share();
   if (spec.has_augment()) options.augment = spec.augment();
   if (spec.has_neighbors()) options.neighbors = spec.neighbors();
   return options;

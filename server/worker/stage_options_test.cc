@@ -110,10 +110,12 @@ TEST(ColorizerOptionsFromTest, ConvertsSetFields) {
   spec.set_precision(v1::PersonalizeSpec::PRECISION_FLOAT32);
   spec.set_average_decay(0.0);
   spec.set_min_improvement(0.02);
+  spec.set_min_decoder_share(0.25);
   ColorizerOptions options = ColorizerOptionsFrom(spec, 1);
   EXPECT_EQ(options.precision, Precision::kFloat32);
   EXPECT_EQ(options.average_decay, 0.0);
   EXPECT_EQ(options.min_improvement, 0.02);
+  EXPECT_EQ(options.min_decoder_share, 0.25);
   spec.set_precision(v1::PersonalizeSpec::PRECISION_BFLOAT16);
   EXPECT_EQ(ColorizerOptionsFrom(spec, 1).precision, Precision::kBfloat16);
   spec.set_precision(v1::PersonalizeSpec::PRECISION_AUTO);

@@ -30,6 +30,7 @@ std::vector<StageSummary> SummarizeStages(const std::vector<JobRecord>& jobs,
                       .seconds = job.usage.seconds,
                       .expected_seconds = plan.stages(i).expected_seconds(),
                       .peak_memory_bytes = job.usage.peak_memory_bytes,
+                      .expected_peak_memory_bytes = plan.stages(i).expected_peak_memory_bytes(),
                       .warnings = job.usage.warnings});
   }
   return stages;

@@ -19,12 +19,13 @@ std::vector<JobRecord> FinishedChildren(const NewGraph& graph) {
     job.skipped_by_plan = !planned.skip_reason.empty();
     if (job.skipped_by_plan) job.state = JobState::kSkipped;
     job.usage.seconds = static_cast<double>(i);
+    job.usage.peak_memory_bytes = static_cast<int64_t>(i);
     jobs.push_back(job);
   }
   return jobs;
 }
 
-TEST(StageSummariesTest, HaveSecondsOfPlan) {
+TEST(StageSummariesTest, HaveSecondsAndMemoryOfPlan) {
   const NewGraph graph = PlanJob(SceneSpec(), {}, kTwentyPhotos);
   const v1::JobPlan plan = DescribeGraph(graph, kTwentyPhotos, {}, {});
   const std::vector<JobRecord> jobs = FinishedChildren(graph);
@@ -34,7 +35,10 @@ TEST(StageSummariesTest, HaveSecondsOfPlan) {
     EXPECT_EQ(stages[i].kind, jobs[i].kind);
     EXPECT_EQ(stages[i].skip_reason, jobs[i].skip_reason);
     EXPECT_EQ(stages[i].seconds, static_cast<double>(i));
+    EXPECT_EQ(stages[i].peak_memory_bytes, static_cast<int64_t>(i));
     EXPECT_EQ(stages[i].expected_seconds, plan.stages(static_cast<int>(i)).expected_seconds());
+    EXPECT_EQ(stages[i].expected_peak_memory_bytes,
+              plan.stages(static_cast<int>(i)).expected_peak_memory_bytes());
   }
   EXPECT_TRUE(SummarizeStages({}, kTwentyPhotos).empty());
 }

@@ -171,6 +171,7 @@ void LimitMemory(int64_t memory_mib) {
 void EnterSandbox(const WorkerArguments& arguments) {
   SetSandboxing(arguments.settings.sandbox);
   if (!arguments.settings.sandbox) return;
+  ResetPeakMemory();     // so that it can be reset in the sandbox, too
   ProcessLimits limits;  // no core dumps: they would contain uploads
   limits.file_bytes = kMaxFileBytes;
   SandboxRules rules;

@@ -18,8 +18,10 @@
 #include <fstream>
 #include <functional>
 #include <thread>
+#include <vector>
 
 #include "core/base/files.h"
+#include "core/base/memory.h"
 #include "core/base/process/landlock.h"
 
 namespace color3d {
@@ -78,6 +80,30 @@ class SandboxTest : public testing::Test {
   ScratchFolder scratch_;
   SandboxRules rules_;
 };
+
+// The worker's peak memory of a job must not include that of the jobs before it.
+TEST_F(SandboxTest, AllowsResetOfPeakMemory) {
+  const Sandbox sandbox(rules_);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ResetPeakMemory();
+    if (!sandbox.Enter()) ::_exit(254);
+    constexpr size_t kBytes = size_t{64} << 20;
+    {
+      const std::vector<char> used(kBytes, 'x');
+      [[maybe_unused]] const volatile char last =
+          used.back();  // keeps the compiler from leaving it out
+    }
+    const bool has_risen = PeakMemoryBytes() > ResidentMemoryBytes() + int64_t{kBytes / 2};
+    ResetPeakMemory();
+    const bool has_fallen = PeakMemoryBytes() < ResidentMemoryBytes() + int64_t{kBytes / 2};
+    ::_exit(has_risen && has_fallen ? 0 : 1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+}
 
 TEST_F(SandboxTest, DeniesFilesOutsideRules) {
   const fs::path own = scratch_.path() / "own";

@@ -14,17 +14,30 @@ namespace color3d {
 namespace {
 
 constexpr char kPrefix[] = "neighbors.";
+constexpr int64_t kOpenCells = 200;  // of a picture, whose matches are measured
 
-// Cells of certain colour of all pictures but the first, the key view, whose cells are `key`. Adds
-// the variation of features of one place between pictures to `view_noise`.
-std::vector<KnownCells> AdditionalCells(const TapEncoder& encoder,
-                                        std::span<const TrainingPicture> pictures,
-                                        const KnownCells& key,
-                                        const FeatureNeighborsOptions& options,
-                                        Random& random,
-                                        const CancellationToken& cancel,
-                                        ViewNoise* view_noise) {
-  std::vector<KnownCells> found;
+// Cells of all pictures but the first, the key view.
+struct AdditionalCells {
+  std::vector<KnownCells> sure;  // of certain colour
+  std::vector<KnownCells> open;  // of none, evenly spread over each picture
+};
+
+torch::Tensor PickRows(const torch::Tensor& rows, int64_t wanted) {
+  const int64_t count = rows.size(0);
+  if (count <= wanted) return rows;
+  return rows.index_select(0, (torch::arange(wanted, torch::kInt64) * count).floor_divide(wanted));
+}
+
+// `key`: cells of the key view. Adds the variation of features of one place between pictures to
+// `view_noise`.
+AdditionalCells FindAdditionalCells(const TapEncoder& encoder,
+                                    std::span<const TrainingPicture> pictures,
+                                    const KnownCells& key,
+                                    const FeatureNeighborsOptions& options,
+                                    Random& random,
+                                    const CancellationToken& cancel,
+                                    ViewNoise* view_noise) {
+  AdditionalCells found;
   const auto further = static_cast<int64_t>(pictures.size()) - 1;
   const auto placed = [](const KnownCells& cells) {
     return PlacedCells{cells.blocks, cells.positions};
@@ -34,11 +47,14 @@ std::vector<KnownCells> AdditionalCells(const TapEncoder& encoder,
     cancel.ThrowIfCancelled();
     KnownCells cells = ComputeKnownCells(encoder, picture, options.relative_chroma);
     view_noise->Add(placed(key), placed(cells), random);
-    if (!found.empty()) view_noise->Add(placed(previous), placed(cells), random);
-    const torch::Tensor sure = (cells.weights > options.min_weight).nonzero().squeeze(1);
+    if (!found.sure.empty()) view_noise->Add(placed(previous), placed(cells), random);
+    const torch::Tensor is_sure = cells.weights > options.min_weight;
+    const torch::Tensor sure = is_sure.nonzero().squeeze(1);
     const torch::Tensor rows =
         sure.index_select(0, SampleRows(sure.size(0), options.further_bank_size / further, random));
-    found.push_back(Select(cells, rows));
+    found.sure.push_back(Select(cells, rows));
+    found.open.push_back(
+        Select(cells, PickRows(is_sure.logical_not().nonzero().squeeze(1), kOpenCells)));
     previous = std::move(cells);
   }
   return found;
@@ -76,8 +92,9 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
   const KnownCells of_key =
       Select(key, colored.index_select(0, SampleRows(colored.size(0), options.bank_size, random)));
   ViewNoise view_noise;
-  std::vector<KnownCells> parts =
-      AdditionalCells(encoder, pictures, key, options, random, cancel, &view_noise);
+  AdditionalCells found =
+      FindAdditionalCells(encoder, pictures, key, options, random, cancel, &view_noise);
+  std::vector<KnownCells> parts = std::move(found.sure);
   parts.insert(parts.begin(), of_key);
   whitening_ = Whitening(
       key.blocks, encoder.config().stem_stride, options.whitening, view_noise.Covariances());
@@ -90,6 +107,12 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
            stored(all.colors),
            stored(all.weights),
            stored(all.positions)};
+  if (found.open.empty()) return;
+  const KnownCells open = Join(found.open);
+  if (open.weights.size(0) == 0) return;
+  open_variance_ =
+      MatchCells({whitening_.Apply(open.blocks), open.positions}, bank_, options.vote, cancel)
+          .variance;
 }
 
 FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,

@@ -60,6 +60,9 @@ class FeatureNeighbors {
 
   const CellBank& bank() const { return bank_; }
   const Whitening& whitening() const { return whitening_; }
+  // [m]: variance of the matches' ab, Lab units squared, of cells without a colour, which are
+  // sampled from all pictures but the key view. Empty if there are none. Not part of the file.
+  const torch::Tensor& open_variance() const { return open_variance_; }
 
   // Adds the arrays "neighbors.*". The bank is in half precision already.
   void PutInto(TensorFile* file) const;
@@ -82,6 +85,7 @@ class FeatureNeighbors {
   FeatureNeighborsOptions options_;
   Whitening whitening_;
   CellBank bank_;
+  torch::Tensor open_variance_ = torch::empty({0});
 };
 
 }  // namespace color3d

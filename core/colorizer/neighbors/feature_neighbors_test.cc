@@ -49,6 +49,30 @@ TEST_F(FeatureNeighborsTest, AgreesWithDefinitionInFloat64) {
   }
 }
 
+// A second picture, coloured in its left half alone.
+TEST_F(FeatureNeighborsTest, MeasuresVarianceOfCellsWithoutColor) {
+  const FeatureNeighbors alone(encoder_, pictures_, {}, Random(1), {});
+  EXPECT_EQ(alone.open_variance().size(0), 0);
+  std::vector<TrainingPicture> pictures = {pictures_.front(), pictures_.front()};
+  Image& weight = pictures[1].weight;
+  weight = Image(pictures[1].luminance.width, pictures[1].luminance.height, 1);
+  for (int y = 0; y < weight.height; ++y) {
+    for (int x = 0; x < weight.width / 2; ++x) weight.At(0, y, x) = 1.0f;
+  }
+  const auto variance = [&] {
+    const FeatureNeighbors neighbors(encoder_, pictures, {}, Random(1), {});
+    EXPECT_EQ(neighbors.open_variance().size(0), 192) << "half of 16 x 24 cells";
+    return neighbors.open_variance().mean().item<double>();
+  };
+  const double clear = variance();
+  Random noise(3);
+  for (float& value : pictures[0].ab.data) {
+    value = static_cast<float>(noise.NextUniform(-60.0, 60.0));
+  }
+  pictures[1].ab = pictures[0].ab;
+  EXPECT_GT(variance(), 2.0 * clear + 1.0);
+}
+
 // A picture with similar halves at distant positions, red and blue.
 TEST_F(FeatureNeighborsTest, SeparatesSimilarPlacesByPosition) {
   constexpr int kSide = 64;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -88,6 +89,43 @@ TEST(ColorizerTest, LearnsTheKeyView) {
   EXPECT_GT(gray, 15.0);
   EXPECT_LT(neighbors, 0.25 * gray);
   EXPECT_LT(trained, 0.25 * gray);
+}
+
+struct ErrorNames : NullObserver {
+  void OnError(int64_t, const std::string& name, double) override { names.insert(name); }
+  std::set<std::string> names;
+};
+
+// The second picture is coloured in its left half alone.
+TEST(ColorizerTest, TrainsDecoderOnlyAboveItsLeastShare) {
+  const Key key = MakeKey(96, 64);
+  Image left(96, 64, 1);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 48; ++x) left.At(0, y, x) = 1.0f;
+  }
+  const TrainingPicture view{"view", key.luminance, key.ab, left};
+  ErrorNames seen;
+  const auto colors = [&](int iterations, double least_share, bool has_view) {
+    std::vector<TrainingPicture> pictures = {{"key", key.luminance, key.ab}};
+    if (has_view) pictures.push_back(view);
+    ColorizerOptions options = Quick(iterations);
+    options.min_decoder_share = least_share;
+    seen.names.clear();
+    ThreadPool pool(1);
+    NoCheckpoints checkpoints;
+    return TrainColorizer(TheEncoder(), pictures, options, {pool, checkpoints, seen, {}})
+        ->Colorize(key.luminance)
+        .data;
+  };
+  const auto untrained = colors(0, 0.0, true), trained = colors(10, 0.0, true);
+  ASSERT_NE(untrained, trained);
+  EXPECT_FALSE(seen.names.contains(kDecoderShareName));
+  EXPECT_EQ(colors(10, 1.0, true), untrained);
+  EXPECT_TRUE(seen.names.contains(kDecoderShareName));
+  EXPECT_TRUE(seen.names.contains("validation_delta_e00"));
+  EXPECT_FALSE(seen.names.contains("train_l1_ab"));
+  EXPECT_EQ(colors(10, 1e-12, true), trained);
+  EXPECT_NE(colors(10, 0.99, false), colors(0, 0.0, false)) << "unknown: it is trained";
 }
 
 TEST(ColorizerTest, RestoresSameColorizerFromFile) {

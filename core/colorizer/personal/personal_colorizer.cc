@@ -51,8 +51,7 @@ PersonalColorizer::PersonalColorizer(Parts parts)
 // Share of the decoder in the blend, [1,1,H/s,W/s]: large where the neighbors disagree.
 torch::Tensor PersonalColorizer::DecoderShare(const torch::Tensor& neighbor_variance,
                                               const torch::Tensor& decoded) const {
-  const double doubt = recipe_.neighbor_doubt * recipe_.neighbor_doubt;
-  const torch::Tensor share = trust_ * neighbor_variance / (doubt + neighbor_variance);
+  const torch::Tensor share = color3d::DecoderShare(recipe_, trust_, neighbor_variance);
   return torch::upsample_bilinear2d(share.unsqueeze(0).unsqueeze(0),
                                     {decoded.size(2), decoded.size(3)},
                                     /*align_corners=*/false);

@@ -149,6 +149,35 @@ PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
   return parts;
 }
 
+// Returns false if the neighbours agree so well that a trained decoder would have less than
+// min_decoder_share of the answers. It is expected to have the mean of the share that it would have
+// in cells without a colour. Without such cells that share is unknown, and it is trained.
+bool DecoderPays(const PersonalColorizer::Parts& parts,
+                 const TrainingRecipe& recipe,
+                 ProgressObserver& progress) {
+  const ColorizerOptions& options = parts.options;
+  if (options.min_decoder_share == 0.0 || !parts.neighbors) return true;
+  const torch::Tensor& variance = parts.neighbors->open_variance();
+  if (variance.size(0) == 0) return options.min_decoder_share < 1.0;
+  const double trust = 1.0 - std::exp(-options.iterations / recipe.trust_iterations);
+  const double share = DecoderShare(recipe, trust, variance).mean().item<double>();
+  progress.OnError(options.iterations, kDecoderShareName, share);
+  return share >= options.min_decoder_share;
+}
+
+// CIEDE2000 of an untrained decoder and of the neighbours on held-out crops of the key view.
+void ReportNeighborErrors(const TrainingSession& session,
+                          const PersonalColorizer& colorizer,
+                          int stride,
+                          ProgressObserver& progress) {
+  progress.OnError(0, "validation_delta_e00", session.HeldOutError());
+  const double error = session.HeldOutError([&](const TrainingSample& sample) {
+    const Image ab = colorizer.Colorize(ImageFromTensor(sample.luminance));
+    return torch::avg_pool2d(TensorFromImage(ab), {stride, stride}) / kAbScale;
+  });
+  progress.OnError(0, "validation_delta_e00", error);
+}
+
 void Train(TrainingSession& session,
            const RunControl& control,
            SceneBatch::Membership& membership) {
@@ -190,6 +219,10 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
       if (options.equal_draws) picture.share = 1.0;
     }
     auto parts = Prepare(std::move(taps), pictures, options, recipe, control.cancel);
+    const bool trains = options.iterations > 0 && DecoderPays(parts, recipe, control.progress);
+    if (!trains) options.iterations = 0;
+    options.min_decoder_share = 0.0;  // decided
+    parts.options = options;
     TrainingSession session(pictures, options, recipe, *parts.model);
     session.Resume(control.checkpoints.Load(), control.progress);
     turn.reset();
@@ -198,7 +231,10 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
     session.KeepBetterParameters(control.progress);
     parts.curve = session.curve();
     parts.threads = control.pool.thread_count();
-    return std::make_shared<const PersonalColorizer>(std::move(parts));
+    const int stride = parts.model->OutputStride();
+    auto colorizer = std::make_shared<const PersonalColorizer>(std::move(parts));
+    if (!trains) ReportNeighborErrors(session, *colorizer, stride, control.progress);
+    return colorizer;
   });
 }
 

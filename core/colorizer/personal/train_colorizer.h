@@ -15,6 +15,11 @@
 
 namespace color3d {
 
+// Error names in the progress of training: expected share of the decoder after all iterations, and
+// CIEDE2000 on held-out crops of the key view. Training that is left out has the first one alone at
+// its iterations, and the second one at iteration 0.
+inline constexpr char kDecoderShareName[] = "decoder_share";
+
 // Trains a colorizer. `pictures`: the undistorted key view first (statistics, neighbors and
 // held-out augmentations are taken from it), then other pictures of the scene, of any size. Reports
 // "train_l1_ab" and "validation_delta_e00", the latter on augmentations of the key view that are

@@ -1,5 +1,7 @@
 #include "core/colorizer/training/recipe.h"
 
+#include <torch/types.h>
+
 namespace color3d {
 namespace {
 
@@ -13,6 +15,13 @@ bool HasBfloat16Products() {
 }
 
 }  // namespace
+
+torch::Tensor DecoderShare(const TrainingRecipe& recipe,
+                           double trust,
+                           const torch::Tensor& neighbor_variance) {
+  const double doubt = recipe.neighbor_doubt * recipe.neighbor_doubt;
+  return trust * neighbor_variance / (doubt + neighbor_variance);
+}
 
 TrainingRecipe RecipeFor(const ColorizerOptions& options) {
   // kColor3d has no adapters: on random features they did not reduce the error (fern 3.77 against

@@ -2,6 +2,8 @@
 // only.
 #pragma once
 
+#include <torch/types.h>
+
 #include "core/augment/augment.h"
 #include "core/colorizer/colorizer.h"
 #include "core/colorizer/model/personal_model.h"
@@ -24,6 +26,12 @@ struct TrainingRecipe {
   double neighbor_doubt = 4.0;  // Lab units
   double trust_iterations = 100.0;
 };
+
+// Share of the decoder in the blend, 0..`trust`, from the variance of the neighbours' colours.
+// `trust`: 0 for an untrained decoder, 1 for one that is trained to the end.
+torch::Tensor DecoderShare(const TrainingRecipe& recipe,
+                           double trust,
+                           const torch::Tensor& neighbor_variance);
 
 TrainingRecipe RecipeFor(const ColorizerOptions& options);
 

@@ -193,14 +193,20 @@ void TrainingSession::RollBack(ProgressObserver& progress) {
                   course_.learning_rate_scale));
 }
 
-double TrainingSession::ValidationDeltaE00() const {
+double TrainingSession::HeldOutError() const {
+  return HeldOutError(
+      [&](const TrainingSample& sample) { return Predict(sample.taps, sample.luminance); });
+}
+
+double TrainingSession::HeldOutError(
+    const std::function<torch::Tensor(const TrainingSample& sample)>& predict) const {
   torch::NoGradGuard no_grad;
   double sum = 0.0;
   double weight_sum = 0.0;
   const int stride = model_.OutputStride();
   for (const TrainingSample& sample : samples_.held_out()) {
     const Image l = ImageFromTensor(torch::avg_pool2d(sample.luminance, {stride, stride}));
-    const Image predicted = ImageFromTensor(Predict(sample.taps, sample.luminance) * kAbScale);
+    const Image predicted = ImageFromTensor(predict(sample) * kAbScale);
     const Image truth = ImageFromTensor(sample.ab * kAbScale);
     const Image weight = ImageFromTensor(sample.weight);
     for (size_t i = 0; i < l.PlaneSize(); ++i) {
@@ -220,7 +226,7 @@ void TrainingSession::Report(ProgressObserver& progress) {
   point.train_l1_ab = course_.running_loss * kAbScale;
   // Error of the parameters that would be returned now.
   if (!average_.empty()) SwapWithAverage();
-  point.validation_delta_e00 = ValidationDeltaE00();
+  point.validation_delta_e00 = HeldOutError();
   if (!average_.empty()) SwapWithAverage();
   course_.curve.push_back(point);
   progress.OnError(course_.iteration, "train_l1_ab", point.train_l1_ab);
@@ -259,9 +265,9 @@ void TrainingSession::KeepBetterParameters(ProgressObserver& progress) {
   if (course_.stopped_early)
     progress.OnError(course_.iteration, "stopped_early_iteration", course_.iteration);
   if (average_.empty() || course_.iteration == 0) return;
-  const double last = ValidationDeltaE00();
+  const double last = HeldOutError();
   SwapWithAverage();
-  if (last < ValidationDeltaE00()) SwapWithAverage();
+  if (last < HeldOutError()) SwapWithAverage();
 }
 
 void TrainingSession::Resume(const std::optional<std::string>& state, ProgressObserver& progress) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,6 +36,13 @@ class TrainingSession {
   // Continues from the bytes of Checkpoint(), with the same result as without an interruption.
   // Warns about a state that is damaged or belongs to other options or pictures, and ignores it.
   void Resume(const std::optional<std::string>& state, ProgressObserver& progress);
+
+  // Mean CIEDE2000 on held-out crops of the key view. `predict` returns the ab of a sample in the
+  // form of TrainingSample::ab.
+  double HeldOutError(
+      const std::function<torch::Tensor(const TrainingSample& sample)>& predict) const;
+  // The same of the present parameters.
+  double HeldOutError() const;
 
   bool Finished() const { return course_.stopped_early || Progress() >= 1.0; }
   // Runs one iteration. `helpers`: null, or a pool whose second thread prepares the next sample
@@ -92,7 +100,6 @@ class TrainingSession {
   void KeepGoodState();
   void RollBack(ProgressObserver& progress);
   void Report(ProgressObserver& progress);
-  double ValidationDeltaE00() const;
   NamedTensors Average() const;  // by name of the parameter
   void LoadState(const std::string& state);
 

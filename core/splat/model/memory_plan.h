@@ -1,12 +1,5 @@
-// Memory estimate of training geometry, and its reduction to the available memory. Pure functions.
-//
-// Per Gaussian, in floats, with R = 11 + channels (degree + 1)^2 parameters: parameters and two
-// Adam moments (3R), the last good state (3R), the gradient (R), one copy while densifying (R), a
-// checkpoint being written (3R), and 32 for splats, sorting keys and statistics; that is 1008 bytes
-// at degree 2 and 1316 at degree 3 in one channel. Each of its (Gaussian, tile) pairs takes 42
-// bytes more: about 8 pairs a Gaussian, and not less than 400 pairs a tile. Measured on fern at
-// degree 2 without checkpoints: 1.2 kB a Gaussian, pairs and all; whole peaks were 14 to 31 % below
-// the estimate.
+// Reduction of training geometry to the available memory, by the estimate of
+// core/catalogue/memory_model.h. Pure functions.
 #pragma once
 
 #include <cstdint>
@@ -40,8 +33,6 @@ struct MemoryPlan {
   int64_t budget_bytes = 0;
   std::string note;  // the reductions and their reason; empty if none
 };
-
-int64_t BytesPerGaussian(int sh_degree, int channels = 1);
 
 // Peak memory of training geometry at this size with this many Gaussians and the smallest caches,
 // bytes.

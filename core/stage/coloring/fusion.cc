@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -16,6 +17,10 @@ ColorSources SourcesOf(const Colorizer& colorizer,
                        std::function<Image(const Image& luminance)> position) {
   return {
       [&colorizer, position = std::move(position)](const Image& luminance, const Image& known) {
+        if (std::ranges::find(known.data, 0.0f) == known.data.end()) {
+          return InferredColor{Image(known.width, known.height, 2),
+                               Image(known.width, known.height, 1)};
+        }
         ColorPrediction predicted =
             colorizer.Predict(luminance, {known, position ? position(luminance) : Image()});
         return InferredColor{std::move(predicted.ab), std::move(predicted.distance)};

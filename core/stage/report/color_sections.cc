@@ -10,6 +10,7 @@
 
 #include "core/carry/confidence.h"
 #include "core/catalogue/metrics.h"
+#include "core/colorizer/personal/train_colorizer.h"
 #include "core/image/codec.h"
 #include "core/scene/view_images.h"
 #include "core/stage/formats/artifact_io.h"
@@ -327,10 +328,28 @@ ReportSection ColorFacts::SteadinessSection() const {
   return section;
 }
 
+std::optional<UntrainedDecoder> FindUntrainedDecoder(
+    const std::vector<CurvePoint>& personalization) {
+  std::optional<UntrainedDecoder> decoder;
+  for (const CurvePoint& point : personalization) {
+    if (point.error_name == "train_l1_ab") return std::nullopt;
+    if (point.error_name == kDecoderShareName) {
+      decoder = {point.value, static_cast<int>(point.iteration)};
+    }
+  }
+  return decoder;
+}
+
 namespace {
 
 // Describes the curves of personalization; empty for fewer than two points of held-out error.
 std::vector<std::string> NotesOnPersonalization(const std::vector<CurvePoint>& curves) {
+  if (const auto decoder = FindUntrainedDecoder(curves)) {
+    return {fmt::format(
+        "Only the nearest neighbours give colours: they agree so well that a trained decoder would "
+        "have {:.1f} % of the inferred colours, so it was not trained.",
+        100.0 * decoder->share)};
+  }
   std::vector<CurvePoint> errors;
   std::string stopped;
   for (const CurvePoint& point : curves) {
@@ -359,6 +378,7 @@ ReportSection ColorFacts::PersonalizationSection(std::vector<CurvePoint> curves)
   ReportSection section;
   section.title = "The personalized colorizer";
   section.notes = NotesOnPersonalization(curves);
+  std::erase_if(curves, [](const CurvePoint& p) { return p.error_name == kDecoderShareName; });
   section.curves = std::move(curves);
   if (context_.HasInput(artifact::kAugmentationSheet)) {
     section.wide = {"training pictures beside the key view",

@@ -24,6 +24,11 @@ namespace color3d {
 // to 1.
 using SourceShares = std::array<double, kProvenancePlanes>;
 
+// nullopt if the decoder was trained, or if that is unknown. `personalization`: the curves of that
+// stage.
+std::optional<UntrainedDecoder> FindUntrainedDecoder(
+    const std::vector<CurvePoint>& personalization);
+
 // Read once from provenance/*, carry.json and scores.json, each of which may be absent. Not
 // thread-safe.
 class ColorFacts {

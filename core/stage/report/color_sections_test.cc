@@ -12,6 +12,18 @@ namespace {
 
 using ColorSectionsTest = EvaluatedSceneTest;
 
+TEST(FindUntrainedDecoderTest, IsOneWithShareButNoTraining) {
+  const CurvePoint share{"personalize", 2.0, 100, "decoder_share", 0.05};
+  const CurvePoint error{"personalize", 2.0, 0, "validation_delta_e00", 2.5};
+  const auto decoder = FindUntrainedDecoder({share, error});
+  ASSERT_TRUE(decoder.has_value());
+  EXPECT_EQ(decoder->share, 0.05);
+  EXPECT_EQ(decoder->iterations, 100);
+  EXPECT_FALSE(FindUntrainedDecoder({error}).has_value());
+  EXPECT_FALSE(
+      FindUntrainedDecoder({share, {"personalize", 3.0, 5, "train_l1_ab", 4.0}}).has_value());
+}
+
 TEST_F(ColorSectionsTest, ReportsSourcesAndNextKeyView) {
   AddProvenance("p1.png", Halves({0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f}));
   AddProvenance("p2.png", Halves({1.0f, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f}));
