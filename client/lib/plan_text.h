@@ -8,7 +8,8 @@
 namespace color3d::client {
 
 // Lines, each with its end: the stages that run with their expected seconds, then those that are
-// left out with the seconds that this saves, with reasons.
+// left out with the seconds that this saves, with reasons, then the expected error for each time
+// budget.
 std::string PlanText(const v1::JobPlan& plan);
 
 // Returns whether the measured seconds lie within a third of the expected ones.

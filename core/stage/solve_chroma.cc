@@ -8,6 +8,7 @@
 #include "core/stage/run_stages.h"
 #include "core/stage/solve_chroma_jointly.h"
 #include "core/stage/sources/chroma_budget.h"
+#include "core/stage/sources/held_out_chroma.h"
 
 namespace color3d {
 namespace {
@@ -45,8 +46,9 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   };
   ChromaOptions fit = ChromaWithinMemory(options, scene, geometry, context.MemoryBytes());
   if (jointly) fit = ForConfidenceAlone(fit);
-  GaussianModel model =
-      FitChroma(geometry, ChromaProblemOf(scene, images, targets), fit, context.control());
+  ChromaProblem problem = ChromaProblemOf(scene, images, targets);
+  if (!jointly) problem.snapshot = ObserveHeldOutChroma(scene, images, context);
+  GaussianModel model = FitChroma(geometry, problem, fit, context.control());
   if (jointly) {
     std::vector<float> confidence = std::move(model.confidence);
     model = geometry;
