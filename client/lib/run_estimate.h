@@ -6,6 +6,7 @@
 #include <string>
 
 #include "color3d/v1/job.pb.h"
+#include "core/catalogue/error_model.h"
 
 namespace color3d::client {
 
@@ -20,8 +21,9 @@ class RunEstimate {
   std::string Text() const;
 
  private:
-  std::optional<double> carried_share_ = 0.0;
-  std::optional<double> uncovered_error_;
+  RunState run_;
+  bool is_carried_known_ = true;  // before colours are carried their share is 0
+  bool is_validated_ = false;
 };
 
 }  // namespace color3d::client

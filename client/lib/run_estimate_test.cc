@@ -34,6 +34,15 @@ TEST(RunEstimateTest, FallsWithCoverageAndValidation) {
   EXPECT_EQ(estimate.Text(), "estimated error 2.0");
 }
 
+TEST(RunEstimateTest, IsReplacedWhenChromaIsSolved) {
+  RunEstimate estimate;
+  estimate.OnJob(Reporting("carry_color", "coverage", 0.5));
+  estimate.OnJob(Reporting("solve_chroma", "view_disagreement_ab", 1.0));
+  EXPECT_FALSE(estimate.error().has_value()) << "no colorizer was validated";
+  estimate.OnJob(Reporting("personalize", "validation_delta_e00", 4.0));
+  EXPECT_EQ(estimate.error(), EstimatedError({0.5, 4.0, 1.0}));
+}
+
 TEST(RunEstimateTest, IgnoresErrorsOfOtherStages) {
   RunEstimate estimate;
   estimate.OnJob(Reporting("personalize", "validation_delta_e00", 4.0));

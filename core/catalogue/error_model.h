@@ -2,21 +2,31 @@
 // Plans, progress and the report share it. Pure functions, thread-safe.
 #pragma once
 
+#include <optional>
 #include <span>
 
 namespace color3d {
 
 // Curves that the estimate is made of, and the chroma solver's error on held-out views.
-inline constexpr char kCoverageCurve[] = "coverage";                // of carry_color
-inline constexpr char kValidationCurve[] = "validation_delta_e00";  // of personalize
-inline constexpr char kHeldOutChromaCurve[] = "heldout_delta_e00";  // of solve_chroma
+inline constexpr char kCoverageCurve[] = "coverage";                  // of carry_color
+inline constexpr char kValidationCurve[] = "validation_delta_e00";    // of personalize
+inline constexpr char kDisagreementCurve[] = "view_disagreement_ab";  // of solve_chroma
+inline constexpr char kHeldOutChromaCurve[] = "heldout_delta_e00";    // of solve_chroma
 // Score of evaluate: error against true colours.
 inline constexpr char kScoreCurve[] = "delta_e00_chroma";
 
-// CIEDE2000 of the colours, as far as a run without truth knows it. `carried_share`: of the pixels
-// with carried colours, 0..1. `uncovered_error`: of the colorizer on parts of the key view that it
-// did not learn from.
-double EstimatedError(double carried_share, double uncovered_error);
+// What a run without truth knows about its colours.
+struct RunState {
+  double carried_share = 0.0;  // of the pixels, 0..1
+  // CIEDE2000 of the colorizer on parts of the key view that it did not learn from.
+  double uncovered_error = 0.0;
+  // Mean difference of a, b between the colours of the training views and renders of their mean on
+  // the Gaussians. nullopt before chroma is solved.
+  std::optional<double> disagreement;
+};
+
+// Estimated CIEDE2000 of the colours.
+double EstimatedError(const RunState& run);
 
 // Shares of the schedules of geometry and personalization that a time budget leaves, 0..1.
 struct ScheduleShares {
@@ -39,8 +49,8 @@ struct ExpectedError {
 // Of a scene about which nothing is known, from the errors of other scenes with one key view.
 // Requires: key_views >= 1.
 ExpectedError ExpectFromOtherScenes(int key_views);
-// Of a scene with an earlier run, whose estimate or score against true colours is given.
-ExpectedError ExpectFromEstimate(double estimate);
+// Of a scene with an earlier run: from its state at the end, or its score against true colours.
+ExpectedError ExpectFromRun(const RunState& run);
 ExpectedError ExpectFromScore(double score);
 
 // Calibration, for the tests and the documents.
@@ -52,8 +62,7 @@ std::span<const CalibrationScene> CalibrationScenes();
 struct CalibrationRun {
   const char* name;
   const char* scene;
-  double carried_share;
-  double uncovered_error;
+  RunState end;
   double error;
 };
 std::span<const CalibrationRun> CalibrationRuns();

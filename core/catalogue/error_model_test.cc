@@ -13,8 +13,14 @@ namespace color3d {
 namespace {
 
 TEST(ErrorModelTest, EstimateFallsWithCoverage) {
-  EXPECT_EQ(EstimatedError(0.0, 4.0), 4.0);
-  EXPECT_NEAR(EstimatedError(0.8, 4.0), 0.8 * 1.5 + 0.2 * 4.0, 1e-12);
+  EXPECT_EQ(EstimatedError({0.0, 4.0, std::nullopt}), 4.0);
+  EXPECT_NEAR(EstimatedError({0.8, 4.0, std::nullopt}), 0.8 * 1.5 + 0.2 * 4.0, 1e-12);
+  EXPECT_GT(EstimatedError({0.2, 4.0, 1.0}), EstimatedError({0.8, 4.0, 1.0}));
+}
+
+TEST(ErrorModelTest, DisagreementOfViewsDecidesOnceKnown) {
+  EXPECT_EQ(EstimatedError({0.5, 4.0, 1.0}), EstimatedError({0.5, 9.0, 1.0}));
+  EXPECT_NEAR(EstimatedError({0.5, 4.0, 4.0}) / EstimatedError({0.5, 4.0, 1.0}), 8.0, 1e-9);
 }
 
 TEST(ErrorModelTest, ShorterSchedulesCostError) {
@@ -44,8 +50,10 @@ TEST(ErrorModelTest, MoreKeyViewsAreExpectedToHelp) {
 
 TEST(ErrorModelTest, KnowledgeNarrowsTheInterval) {
   const auto width = [](const ExpectedError& e) { return e.high / e.low; };
-  EXPECT_LT(width(ExpectFromScore(2.0)), width(ExpectFromEstimate(2.0)));
-  EXPECT_LT(width(ExpectFromEstimate(2.0)), width(ExpectFromOtherScenes(1)));
+  const RunState personalized{0.5, 4.0, std::nullopt}, solved{0.5, 4.0, 1.0};
+  EXPECT_LT(width(ExpectFromRun(solved)), width(ExpectFromRun(personalized)));
+  EXPECT_LT(width(ExpectFromRun(personalized)), width(ExpectFromOtherScenes(1)));
+  EXPECT_LT(width(ExpectFromScore(2.0)), 1.5);
 }
 
 // Each scene predicted from the others: the intervals hold about four of five, and no better is
@@ -65,21 +73,38 @@ TEST(ErrorModelTest, IntervalsHoldScenesLeftOut) {
   EXPECT_GE(5 * held, 3 * scenes);
 }
 
-TEST(ErrorModelTest, EstimatesOfRunsLeftOutAreWithinTheirIntervals) {
-  int held = 0;
+// True error of each run over that which the runs of other scenes predict from its state, before or
+// after chroma is solved.
+std::vector<double> RatiosOfRunsLeftOut(bool solved) {
+  const auto known = [&](const CalibrationRun& run) {
+    RunState state = run.end;
+    if (!solved) state.disagreement.reset();
+    return EstimatedError(state);
+  };
+  std::vector<double> left_out;
   for (const CalibrationRun& run : CalibrationRuns()) {
+    if (solved && !run.end.disagreement) continue;
     std::vector<double> ratios;
     for (const CalibrationRun& other : CalibrationRuns()) {
       if (std::string(other.scene) == run.scene) continue;
-      ratios.push_back(other.error / EstimatedError(other.carried_share, other.uncovered_error));
+      if (solved && !other.end.disagreement) continue;
+      ratios.push_back(other.error / known(other));
     }
-    const ExpectedError expected =
-        PredictNext(ratios).Times(EstimatedError(run.carried_share, run.uncovered_error));
-    held += run.error > expected.low && run.error < expected.high;
-    EXPECT_LT(std::abs(std::log(run.error / expected.error)), std::log(2.0)) << run.name;
+    left_out.push_back(run.error / (PredictNext(ratios).error * known(run)));
   }
-  const auto runs = static_cast<int>(CalibrationRuns().size());
-  EXPECT_GE(5 * held, 3 * runs);
+  return left_out;
+}
+
+TEST(ErrorModelTest, EstimatesAfterTrainingAreWithinAFactorOfTwo) {
+  const std::vector<double> ratios = RatiosOfRunsLeftOut(/*solved=*/false);
+  EXPECT_EQ(ratios.size(), CalibrationRuns().size());
+  for (const double ratio : ratios) EXPECT_LT(std::abs(std::log(ratio)), std::log(2.0)) << ratio;
+}
+
+TEST(ErrorModelTest, EstimatesAfterChromaAreWithinAFifth) {
+  const std::vector<double> ratios = RatiosOfRunsLeftOut(/*solved=*/true);
+  EXPECT_GE(ratios.size(), 6u);
+  for (const double ratio : ratios) EXPECT_NEAR(1.0 / ratio, 1.0, 0.2);
 }
 
 }  // namespace

@@ -40,15 +40,16 @@ RunCurve EstimateRunCurve(const std::vector<RanStage>& stages,
   const double coverage =
       LastValue(PointsOf(curves, kind::kCarryColor, kCoverageCurve)).value_or(0.0);
   RunCurve curve;
-  double start = 0.0, carried = 0.0;
-  double uncovered_error = validation.front().value;  // of a colorizer that has learnt nothing
-  const auto estimate = [&] { return EstimatedError(carried, uncovered_error); };
+  double start = 0.0;
+  RunState run;
+  run.uncovered_error = validation.front().value;  // of a colorizer that has learnt nothing
+  const auto estimate = [&] { return EstimatedError(run); };
   for (const RanStage& stage : stages) {
     curve.points.push_back({start, stage.kind, estimate()});
-    if (stage.kind == kind::kCarryColor) carried = coverage;
+    if (stage.kind == kind::kCarryColor) run.carried_share = coverage;
     if (stage.kind == kind::kPersonalize) {
       for (const CurvePoint& p : validation) {
-        uncovered_error = p.value;
+        run.uncovered_error = p.value;
         curve.points.push_back(
             {start + std::min(p.seconds, stage.seconds), stage.kind, estimate()});
       }
@@ -57,6 +58,9 @@ RunCurve EstimateRunCurve(const std::vector<RanStage>& stages,
       for (const CurvePoint& p : PointsOf(curves, kind::kSolveChroma, kHeldOutChromaCurve)) {
         curve.chroma.push_back({start + std::min(p.seconds, stage.seconds), stage.kind, p.value});
       }
+    }
+    if (stage.kind == kind::kSolveChroma) {
+      run.disagreement = LastValue(PointsOf(curves, kind::kSolveChroma, kDisagreementCurve));
     }
     start += stage.seconds;
     curve.points.push_back({start, stage.kind, estimate()});

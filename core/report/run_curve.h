@@ -29,10 +29,8 @@ struct RunCurve {
   std::optional<double> true_error;  // of held-out views at the end of the run; nullopt: no truth
 };
 
-// The estimate is c E + (1 - c) V (core/METHOD.md, "Plan and error of a run"): c is the share of
-// the pixels that get carried colours, E the usual error of such colours, V the error of the
-// colorizer on parts of the key view that it did not learn from. `points` is empty if no colorizer
-// was trained: V is unknown.
+// Estimates by EstimatedError (core/catalogue/error_model.h). `points` is empty if no colorizer was
+// trained.
 RunCurve EstimateRunCurve(const std::vector<RanStage>& stages,
                           const std::vector<CurvePoint>& curves);
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/catalogue/error_model.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d {
@@ -68,7 +69,9 @@ TEST(RunCurveTest, ShowsChromaSolverOnTheSameClock) {
   curves.push_back({kind::kSolveChroma, 0.5, 0, "heldout_delta_e00", 1.2});
   curves.push_back({kind::kSolveChroma, 2.5, 40, "heldout_delta_e00", 0.7});
   curves.push_back({kind::kSolveChroma, 2.5, 40, "train_l1_ab", 99.0});
+  curves.push_back({kind::kSolveChroma, 2.9, 0, "view_disagreement_ab", 1.1});
   const RunCurve curve = EstimateRunCurve(stages, curves);
+  EXPECT_EQ(curve.points.back().error, EstimatedError({0.8, 4.0, 1.1}));
   ASSERT_EQ(curve.chroma.size(), 2u);
   EXPECT_DOUBLE_EQ(curve.chroma[0].seconds, 44.5);
   EXPECT_DOUBLE_EQ(curve.chroma[1].seconds, 46.5);

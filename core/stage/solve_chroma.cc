@@ -9,6 +9,7 @@
 #include "core/stage/solve_chroma_jointly.h"
 #include "core/stage/sources/chroma_budget.h"
 #include "core/stage/sources/held_out_chroma.h"
+#include "core/stage/sources/view_disagreement.h"
 
 namespace color3d {
 namespace {
@@ -48,7 +49,10 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   if (jointly) fit = ForConfidenceAlone(fit);
   ChromaProblem problem = ChromaProblemOf(scene, images, targets);
   if (!jointly) problem.snapshot = ObserveHeldOutChroma(scene, images, context);
-  GaussianModel model = FitChroma(geometry, problem, fit, context.control());
+  const RunControl control = context.control();
+  ViewDisagreement disagreement(control.progress);
+  GaussianModel model = FitChroma(
+      geometry, problem, fit, {control.pool, control.checkpoints, disagreement, control.cancel});
   if (jointly) {
     std::vector<float> confidence = std::move(model.confidence);
     model = geometry;
@@ -56,6 +60,7 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   }
   AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
+  disagreement.Report();
 }
 
 }  // namespace color3d

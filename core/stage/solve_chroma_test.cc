@@ -97,6 +97,20 @@ TEST_F(HeldOutChromaTest, IsErrorOfUnseenView) {
   EXPECT_GT(wrong.back(), 10.0);
 }
 
+TEST_F(HeldOutChromaTest, ReportsDisagreementOfViewsBeforeSolve) {
+  const auto disagreement = [&] {
+    observer_.errors.clear();
+    Solved();
+    EXPECT_EQ(observer_.errors["view_disagreement_ab"].size(), 1u);
+    EXPECT_EQ(observer_.errors["view_disagreement_ab"],
+              std::vector<double>{observer_.errors["train_l1_ab"].front()});
+    return observer_.errors["view_disagreement_ab"].back();
+  };
+  const double apart = disagreement();  // a is 5 in p1 and 25 in p2
+  Predict("p2.png", 5.0f);
+  EXPECT_GT(apart, 2.0 + disagreement());
+}
+
 TEST_F(HeldOutChromaTest, LeavesTheModelAsItIs) {
   const GaussianModel with = Solved();
   ASSERT_FALSE(observer_.errors["heldout_delta_e00"].empty());

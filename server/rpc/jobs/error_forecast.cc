@@ -22,7 +22,7 @@ int KeyViewsOf(const v1::ColorizeSceneSpec& scene) {
 
 // Errors that the stages of a run reported last.
 struct RunErrors {
-  std::optional<double> score, coverage, validation;
+  std::optional<double> score, coverage, validation, disagreement;
 };
 
 RunErrors ErrorsOf(const JobRecord& run, const ProjectStore& store) {
@@ -34,6 +34,7 @@ RunErrors ErrorsOf(const JobRecord& run, const ProjectStore& store) {
     take(kind::kEvaluate, kScoreCurve, &errors.score);
     take(kind::kCarryColor, kCoverageCurve, &errors.coverage);
     take(kind::kPersonalize, kValidationCurve, &errors.validation);
+    take(kind::kSolveChroma, kDisagreementCurve, &errors.disagreement);
   }
   return errors;
 }
@@ -78,7 +79,7 @@ ErrorForecast ForecastError(const v1::JobSpec& spec, const ProjectStore& store) 
       return {ExpectFromScore(*errors.score), v1::ERROR_BASIS_SCORE, run.name};
     }
     if (errors.coverage && errors.validation) {
-      return {ExpectFromEstimate(EstimatedError(*errors.coverage, *errors.validation)),
+      return {ExpectFromRun({*errors.coverage, *errors.validation, errors.disagreement}),
               v1::ERROR_BASIS_ESTIMATE,
               run.name};
     }

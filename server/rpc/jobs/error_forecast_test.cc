@@ -110,7 +110,12 @@ TEST_F(ErrorForecastTest, UsesEstimateOfEarlierRun) {
   const ErrorForecast forecast = Forecast(AutomaticSpec());
   EXPECT_EQ(forecast.basis, v1::ERROR_BASIS_ESTIMATE);
   EXPECT_EQ(forecast.job, run);
-  EXPECT_EQ(forecast.error.error, ExpectFromEstimate(EstimatedError(0.5, 3.0)).error);
+  EXPECT_EQ(forecast.error.error, ExpectFromRun({0.5, 3.0, std::nullopt}).error);
+  Run(AutomaticSpec(),
+      {{kind::kCarryColor, kCovered},
+       {kind::kPersonalize, kValidated},
+       {kind::kSolveChroma, {"view_disagreement_ab", 1.2}}});
+  EXPECT_EQ(Forecast(AutomaticSpec()).error.error, ExpectFromRun({0.5, 3.0, 1.2}).error);
 }
 
 TEST_F(ErrorForecastTest, PrefersScoreOverEstimate) {
