@@ -31,10 +31,39 @@ std::string StageTable(const v1::JobPlan& plan, bool runs, const std::string& he
   return rows.size() > 1 ? Table(std::move(rows)) : "";
 }
 
+std::string OriginOfErrors(const v1::JobPlan& plan) {
+  switch (plan.error_basis()) {
+    case v1::ERROR_BASIS_ESTIMATE:
+      return "by the estimate of " + plan.error_job();
+    case v1::ERROR_BASIS_SCORE:
+      return "by the score of " + plan.error_job() + " against true colours";
+    default:
+      return "by the errors of other scenes, because nothing is known about this one; an estimate "
+             "follows when the colorizer is trained";
+  }
+}
+
+// Expected error for each time budget; empty if there are none.
+std::string ErrorTable(const v1::JobPlan& plan) {
+  if (plan.budget_errors().empty()) return "";
+  std::vector<std::vector<std::string>> rows = {{"time budget", "expected error"}};
+  for (const v1::BudgetError& row : plan.budget_errors()) {
+    rows.push_back(
+        {HumanSeconds(row.budget_seconds()),
+         row.too_short()
+             ? fmt::format("too short, at least {:.0f} s", plan.shortest_budget_seconds())
+             : fmt::format("{:.1f} ({:.1f} to {:.1f})", row.error(), row.low(), row.high())});
+  }
+  return Table(std::move(rows)) +
+         fmt::format("CIEDE2000 of new views, and where four of five scenes lie; {}\n",
+                     OriginOfErrors(plan));
+}
+
 }  // namespace
 
 std::string PlanText(const v1::JobPlan& plan) {
-  std::string text = StageTable(plan, true, "runs") + StageTable(plan, false, "left out");
+  std::string text =
+      StageTable(plan, true, "runs") + StageTable(plan, false, "left out") + ErrorTable(plan);
   text += fmt::format("expected: {} of computing", HumanSeconds(plan.expected_seconds()));
   if (plan.saved_seconds() >= 0.05) {
     text += fmt::format("; {} saved", HumanSeconds(plan.saved_seconds()));

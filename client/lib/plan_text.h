@@ -9,7 +9,8 @@
 namespace color3d::client {
 
 // Lines, each with its end: the stages that run with their expected seconds and peak memory, then
-// those that are left out with the seconds and memory that this saves, with reasons.
+// those that are left out with the seconds and memory that this saves, with reasons, then the
+// expected error for each time budget.
 std::string PlanText(const v1::JobPlan& plan);
 
 // Returns whether both differ by at most a third of the measured value.

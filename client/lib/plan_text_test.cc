@@ -67,6 +67,28 @@ TEST(PlanTextTest, OmitsHeadingWithoutStagesLeftOut) {
   EXPECT_THAT(PlanText(plan), Not(HasSubstr("saved")));
 }
 
+TEST(PlanTextTest, TellsExpectedErrorsOfBudgets) {
+  v1::JobPlan plan = SomePlan();
+  EXPECT_THAT(PlanText(plan), Not(HasSubstr("expected error")));
+  plan.set_shortest_budget_seconds(41.0);
+  plan.set_error_basis(v1::ERROR_BASIS_OTHER_SCENES);
+  v1::BudgetError* row = plan.add_budget_errors();
+  row->set_budget_seconds(30.0);
+  row->set_too_short(true);
+  row = plan.add_budget_errors();
+  row->set_budget_seconds(60.0);
+  row->set_error(3.14);
+  row->set_low(1.62);
+  row->set_high(6.08);
+  const std::string text = PlanText(plan);
+  EXPECT_THAT(text, HasSubstr("too short, at least 41 s"));
+  EXPECT_THAT(text, HasSubstr("3.1 (1.6 to 6.1)"));
+  EXPECT_THAT(text, HasSubstr("errors of other scenes"));
+  plan.set_error_basis(v1::ERROR_BASIS_SCORE);
+  plan.set_error_job("jobs/7");
+  EXPECT_THAT(PlanText(plan), HasSubstr("by the score of jobs/7 against true colours"));
+}
+
 TEST(PlanTextTest, ComparesWithMeasuredSeconds) {
   EXPECT_TRUE(IsWithinAThird(41.0, 60.0));
   EXPECT_TRUE(IsWithinAThird(79.0, 60.0));

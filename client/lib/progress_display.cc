@@ -42,12 +42,18 @@ int ProgressDisplay::Width() const {
 
 void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
   const v1::Job& job = event.job();
+  estimate_.OnJob(job);
+  const std::string estimate = estimate_.Text();
   if (IsFinished(job.state())) {
     bool& ended = ended_[job.name()];
     // The failure of the last stage repeats one that was printed before.
     const bool failed = job.state() == v1::Job::STATE_FAILED;
     const bool repeated = failed && failure_told_ && job.kind() == kind::kColorizeScene;
-    if (!ended && !repeated) PrintLine(EndLine(job));
+    if (!ended && !repeated) {
+      const bool is_new = estimate != told_estimate_;
+      PrintLine(EndLine(job) + (is_new && !estimate.empty() ? "; " + estimate : ""));
+      told_estimate_ = estimate;
+    }
     failure_told_ = failure_told_ || failed;
     ended = true;
     if (unfinished_.erase(job.name()) > 0) idle_since_ = steady_clock::now();
@@ -55,7 +61,7 @@ void ProgressDisplay::OnEvent(const v1::JobEvent& event) {
   }
   ended_.erase(job.name());
   unfinished_[job.name()] = job.state();
-  if (job.state() == v1::Job::STATE_RUNNING) Draw(ProgressLine(job, Width()));
+  if (job.state() == v1::Job::STATE_RUNNING) Draw(ProgressLine(job, Width(), estimate));
 }
 
 bool ProgressDisplay::IsAnyStageRunning() const {

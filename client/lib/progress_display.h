@@ -1,5 +1,6 @@
-// Progress on stderr: on terminals one line that is redrawn, else a line at the end of each stage
-// and at most one every 10 s in between. Not thread-safe.
+// Progress on stderr, with the estimated error of the run once it is known: on terminals one line
+// that is redrawn, else a line at the end of each stage and at most one every 10 s in between. Not
+// thread-safe.
 #pragma once
 
 #include <chrono>
@@ -8,6 +9,7 @@
 #include <map>
 #include <string>
 
+#include "client/lib/run_estimate.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {
@@ -45,6 +47,8 @@ class ProgressDisplay {
   bool failure_told_ = false;
   std::chrono::steady_clock::time_point last_;
   std::map<std::string, bool> ended_;  // by job name
+  RunEstimate estimate_;
+  std::string told_estimate_;  // of the newest line of a finished stage
   std::map<std::string, v1::Job::State> unfinished_;
   std::chrono::steady_clock::time_point idle_since_;
   std::chrono::steady_clock::time_point last_look_;

@@ -108,7 +108,7 @@ std::string StageName(const v1::Job& job) {
   return job.kind() == kind::kColorizeScene ? "report" : job.kind();
 }
 
-std::string ProgressLine(const v1::Job& job, int width) {
+std::string ProgressLine(const v1::Job& job, int width, const std::string& note) {
   const v1::Progress& progress = job.progress();
   std::string line = Padded(StageName(job), kNameColumns) + " ";
   if (progress.total_steps() > 0) {
@@ -122,6 +122,7 @@ std::string ProgressLine(const v1::Job& job, int width) {
   if (progress.eta_seconds() >= 0.0 && progress.step() > 0) {
     line += "  " + HumanClock(progress.eta_seconds()) + " left";
   }
+  if (!note.empty()) line += "  " + note;
   if (!progress.message().empty()) line += "  " + OneLine(progress.message());
   return Cut(line, static_cast<size_t>(std::max(10, width)));
 }

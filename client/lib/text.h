@@ -23,8 +23,9 @@ std::string StateName(v1::Job::State state);
 // colorize_scene job.
 std::string StageName(const v1::Job& job);
 
-// Line for a running stage, at most `width` columns: name, bar, step, message, error, time left.
-std::string ProgressLine(const v1::Job& job, int width);
+// Line for a running stage, at most `width` columns: name, bar, step, error of the stage, time
+// left, `note`, message.
+std::string ProgressLine(const v1::Job& job, int width, const std::string& note = "");
 // Line for a finished stage: seconds and "(cached)", "left out: reason", "failed: reason" or
 // "cancelled".
 std::string EndLine(const v1::Job& job);

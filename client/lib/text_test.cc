@@ -45,6 +45,11 @@ TEST(Text, ProgressLineHasAllParts) {
   EXPECT_THAT(line, HasSubstr("training"));
 }
 
+TEST(Text, ProgressLineHasNoteBeforeMessage) {
+  EXPECT_THAT(ProgressLine(Running(), 200, "estimated error 2.4"),
+              HasSubstr("1:05 left  estimated error 2.4  training"));
+}
+
 TEST(Text, ProgressLineFitsTerminal) {
   v1::Job job = Running();
   job.mutable_progress()->set_message("two\nlines \xe2\x82\xac\xe2\x82\xac\xe2\x82\xac");

@@ -1,4 +1,4 @@
-// Carries the colours of one view into another through geometry (STILL.md "Stage 2", "Reading
+// Carries the colours of one view into another through geometry (GAUSSIANS.md "Stage 2", "Reading
 // order"). Rendered depth gives the place of each pixel's surface in the source picture; depth and
 // luminance decide whether the source sees the same surface. Pure functions, thread-safe.
 #pragma once

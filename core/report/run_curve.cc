@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/catalogue/error_model.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d {
@@ -10,11 +11,6 @@ namespace {
 
 constexpr char kWholeRun[] = "whole_run";
 constexpr char kEstimate[] = "estimated_delta_e00";
-constexpr char kTruth[] = "delta_e00_chroma";
-
-// Chosen for the true errors of fern, banana (one and two key views), fox and the film lady_running
-// (one and two key frames), of which the estimates are within a third.
-constexpr double kCarriedError = 1.5;
 
 std::vector<CurvePoint> PointsOf(const std::vector<CurvePoint>& curves,
                                  const std::string& stage,
@@ -39,27 +35,37 @@ std::string InWords(std::string kind) {
 
 RunCurve EstimateRunCurve(const std::vector<RanStage>& stages,
                           const std::vector<CurvePoint>& curves) {
-  const auto validation = PointsOf(curves, kind::kPersonalize, "validation_delta_e00");
+  const auto validation = PointsOf(curves, kind::kPersonalize, kValidationCurve);
   if (validation.empty()) return {};
-  const double coverage = LastValue(PointsOf(curves, kind::kCarryColor, "coverage")).value_or(0.0);
+  const double coverage =
+      LastValue(PointsOf(curves, kind::kCarryColor, kCoverageCurve)).value_or(0.0);
   RunCurve curve;
-  double start = 0.0, carried = 0.0;
-  double uncovered_error = validation.front().value;  // of a colorizer that has learnt nothing
-  const auto estimate = [&] { return carried * kCarriedError + (1.0 - carried) * uncovered_error; };
+  double start = 0.0;
+  RunState run;
+  run.uncovered_error = validation.front().value;  // of a colorizer that has learnt nothing
+  const auto estimate = [&] { return EstimatedError(run); };
   for (const RanStage& stage : stages) {
     curve.points.push_back({start, stage.kind, estimate()});
-    if (stage.kind == kind::kCarryColor) carried = coverage;
+    if (stage.kind == kind::kCarryColor) run.carried_share = coverage;
     if (stage.kind == kind::kPersonalize) {
       for (const CurvePoint& p : validation) {
-        uncovered_error = p.value;
+        run.uncovered_error = p.value;
         curve.points.push_back(
             {start + std::min(p.seconds, stage.seconds), stage.kind, estimate()});
       }
     }
+    if (stage.kind == kind::kSolveChroma) {
+      for (const CurvePoint& p : PointsOf(curves, kind::kSolveChroma, kHeldOutChromaCurve)) {
+        curve.chroma.push_back({start + std::min(p.seconds, stage.seconds), stage.kind, p.value});
+      }
+    }
+    if (stage.kind == kind::kSolveChroma) {
+      run.disagreement = LastValue(PointsOf(curves, kind::kSolveChroma, kDisagreementCurve));
+    }
     start += stage.seconds;
     curve.points.push_back({start, stage.kind, estimate()});
   }
-  curve.true_error = LastValue(PointsOf(curves, kind::kEvaluate, kTruth));
+  curve.true_error = LastValue(PointsOf(curves, kind::kEvaluate, kScoreCurve));
   return curve;
 }
 
@@ -68,8 +74,11 @@ std::vector<CurvePoint> RunCurvePoints(const RunCurve& curve) {
   for (const RunPoint& p : curve.points) {
     points.push_back({kWholeRun, p.seconds, 0, kEstimate, p.error});
   }
-  if (!points.empty() && curve.true_error) {
-    points.push_back({kWholeRun, points.back().seconds, 0, kTruth, *curve.true_error});
+  for (const RunPoint& p : curve.chroma) {
+    points.push_back({kWholeRun, p.seconds, 0, kHeldOutChromaCurve, p.error});
+  }
+  if (!curve.points.empty() && curve.true_error) {
+    points.push_back({kWholeRun, curve.points.back().seconds, 0, kScoreCurve, *curve.true_error});
   }
   return points;
 }
@@ -87,8 +96,15 @@ Plot RunCurvePlot(const RunCurve& curve) {
   std::erase_if(plot.series, [&](const PlotSeries& series) {
     return series.points.back().seconds - series.points.front().seconds < 0.02 * end;
   });
+  if (!plot.series.empty() && !curve.chroma.empty()) {
+    PlotSeries chroma{"chroma, held out", {}};
+    for (const RunPoint& p : curve.chroma) {
+      chroma.points.push_back({p.stage, p.seconds, 0, kHeldOutChromaCurve, p.error});
+    }
+    plot.series.push_back(std::move(chroma));
+  }
   if (!plot.series.empty() && curve.true_error) {
-    plot.series.push_back({"truth", {{kWholeRun, end, 0, kTruth, *curve.true_error}}});
+    plot.series.push_back({"truth", {{kWholeRun, end, 0, kScoreCurve, *curve.true_error}}});
   }
   return plot;
 }

@@ -25,20 +25,21 @@ struct RunPoint {
 
 struct RunCurve {
   std::vector<RunPoint> points;      // by seconds; at least one at the end of each stage
+  std::vector<RunPoint> chroma;      // of the chroma solver on held-out predicted colours
   std::optional<double> true_error;  // of held-out views at the end of the run; nullopt: no truth
 };
 
-// The estimate is c E + (1 - c) V (core/METHOD.md, "Plan and error of a run"): c is the share of
-// the pixels that get carried colours, E the usual error of such colours, V the error of the
-// colorizer on parts of the key view that it did not learn from. Empty if no colorizer was trained:
-// V is unknown.
+// Estimates by EstimatedError (core/catalogue/error_model.h). `points` is empty if no colorizer was
+// trained.
 RunCurve EstimateRunCurve(const std::vector<RanStage>& stages,
                           const std::vector<CurvePoint>& curves);
 
-// Points of curves.csv: stage "whole_run", errors "estimated_delta_e00" and "delta_e00_chroma".
+// Points of curves.csv: stage "whole_run", errors "estimated_delta_e00", "heldout_delta_e00" and
+// "delta_e00_chroma".
 std::vector<CurvePoint> RunCurvePoints(const RunCurve& curve);
 
-// One line for each stage, so that the stages are bands of colour, and one for the true error.
+// One line for each stage, so that the stages are bands of colour, and one each for the chroma
+// solver and the true error.
 Plot RunCurvePlot(const RunCurve& curve);
 
 }  // namespace color3d

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/catalogue/error_model.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
@@ -300,7 +301,13 @@ void RunEvaluate(const EvaluateOptions& options, StageContext& context) {
   SceneConsistency consistency;
   if (model) consistency = CompareViews(scene, *model, all, context);
   const Scores mean = scores.Mean();
-  for (const auto& [name, value] : mean) context.progress().OnError(0, name, value);
+  // The error that users look for is last, so that it stays in the progress of the job.
+  for (const auto& [name, value] : mean) {
+    if (name != kScoreCurve) context.progress().OnError(0, name, value);
+  }
+  if (const auto score = mean.find(kScoreCurve); score != mean.end()) {
+    context.progress().OnError(0, kScoreCurve, score->second);
+  }
   ordered_json json{{"mean", mean}, {"views", scores.views()}};
   if (ordered_json intervals = scores.Intervals(); !intervals.empty()) {
     json["interval_95"] = std::move(intervals);

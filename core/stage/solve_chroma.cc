@@ -8,6 +8,8 @@
 #include "core/stage/run_stages.h"
 #include "core/stage/solve_chroma_jointly.h"
 #include "core/stage/sources/chroma_budget.h"
+#include "core/stage/sources/held_out_chroma.h"
+#include "core/stage/sources/view_disagreement.h"
 
 namespace color3d {
 namespace {
@@ -45,8 +47,12 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   };
   ChromaOptions fit = ChromaWithinMemory(options, scene, geometry, context.MemoryBytes());
   if (jointly) fit = ForConfidenceAlone(fit);
-  GaussianModel model =
-      FitChroma(geometry, ChromaProblemOf(scene, images, targets), fit, context.control());
+  ChromaProblem problem = ChromaProblemOf(scene, images, targets);
+  if (!jointly) problem.snapshot = ObserveHeldOutChroma(scene, images, context);
+  const RunControl control = context.control();
+  ViewDisagreement disagreement(control.progress);
+  GaussianModel model = FitChroma(
+      geometry, problem, fit, {control.pool, control.checkpoints, disagreement, control.cancel});
   if (jointly) {
     std::vector<float> confidence = std::move(model.confidence);
     model = geometry;
@@ -54,6 +60,7 @@ void RunSolveChroma(const ChromaOptions& options, StageContext& context) {
   }
   AdjustChroma(options.adjustment, &model);
   context.WriteOutput(artifact::kModel, SerializeGaussians(model));
+  disagreement.Report();
 }
 
 }  // namespace color3d

@@ -1,5 +1,5 @@
-// The second half of the paper's training: luminance, chroma and geometry together (STILL.md "Joint
-// training").
+// The second half of the paper's training: luminance, chroma and geometry together (GAUSSIANS.md
+// "Joint training").
 #pragma once
 
 #include "core/scene/scene.h"

@@ -71,6 +71,56 @@ TEST_F(ConfidenceTest, NeedsProvenance) {
   EXPECT_THROW(RunExport({.formats = {ExportFormat::kSplat}, .confidence = true}, context), Error);
 }
 
+// p0 is held out, p1 is the key view with chroma (5, 5).
+class HeldOutChromaTest : public ConfidenceTest {
+ protected:
+  void Predict(const char* view, float chroma) {
+    AddInput(ViewArtifact(artifact::kViewsAb, scene_.views[scene_.FindView(view)], ".png"),
+             EncodeAbPng(Image(48, 32, 2, chroma)));
+  }
+  std::vector<double> Curve() {
+    observer_.errors.clear();
+    Solved();
+    return observer_.errors["heldout_delta_e00"];
+  }
+};
+
+TEST_F(HeldOutChromaTest, IsErrorOfUnseenView) {
+  Predict("p2.png", 5.0f);
+  Predict("p0.png", 5.0f);
+  const std::vector<double> right = Curve();
+  ASSERT_GE(right.size(), 2u) << "the closed form, and rounds";
+  EXPECT_LT(right.back(), 1.0);
+  Predict("p0.png", 40.0f);
+  const std::vector<double> wrong = Curve();
+  ASSERT_EQ(wrong.size(), right.size());
+  EXPECT_GT(wrong.back(), 10.0);
+}
+
+TEST_F(HeldOutChromaTest, ReportsDisagreementOfViewsBeforeSolve) {
+  const auto disagreement = [&] {
+    observer_.errors.clear();
+    Solved();
+    EXPECT_EQ(observer_.errors["view_disagreement_ab"].size(), 1u);
+    EXPECT_EQ(observer_.errors["view_disagreement_ab"],
+              std::vector<double>{observer_.errors["train_l1_ab"].front()});
+    return observer_.errors["view_disagreement_ab"].back();
+  };
+  const double apart = disagreement();  // a is 5 in p1 and 25 in p2
+  Predict("p2.png", 5.0f);
+  EXPECT_GT(apart, 2.0 + disagreement());
+}
+
+TEST_F(HeldOutChromaTest, LeavesTheModelAsItIs) {
+  const GaussianModel with = Solved();
+  ASSERT_FALSE(observer_.errors["heldout_delta_e00"].empty());
+  inputs_.erase(ViewArtifact(artifact::kViewsAb, scene_.views[0], ".png"));
+  observer_.errors.clear();
+  const GaussianModel without = Solved();
+  EXPECT_TRUE(observer_.errors["heldout_delta_e00"].empty()) << "nothing was predicted for p0";
+  EXPECT_EQ(SerializeGaussians(with), SerializeGaussians(without));
+}
+
 // reconstruct_geometry and solve_chroma by the paper's recipe, in miniature.
 class JointSolveTest : public EvaluatedSceneTest {
  protected:

@@ -48,7 +48,10 @@ StageWork WorkOf(const v1::JobSpec& stage,
   StageWork work;
   work.views = views.count;
   work.megapixels = AssumedMegapixels(side, views.are_frames);
-  work.iterations = NumberOf<int>(options, "iterations", 0);
+  const v1::PersonalizeSpec& personalize = stage.personalize();
+  const bool trains = personalize.recipe() != v1::PersonalizeSpec::RECIPE_FEED_FORWARD &&
+                      !personalize.has_colorizer();
+  work.iterations = trains ? NumberOf<int>(options, "iterations", 0) : 0;
   work.gaussians = NumberOf<int>(options, "max_gaussians", 0);
   work.sh_degree = NumberOf<int>(options, "sh_degree", 0);
   work.kind = views.kind;
@@ -56,8 +59,8 @@ StageWork WorkOf(const v1::JobSpec& stage,
   work.geometry_given = views.have_geometry;
   work.key_view_given =
       stage.select_key_view().strategy() == v1::SelectKeyViewSpec::STRATEGY_MANUAL;
-  work.ends_early = stage.personalize().min_improvement() > 0.0;
-  work.paper_recipe = stage.personalize().recipe() == v1::PersonalizeSpec::RECIPE_PAPER;
+  work.ends_early = personalize.min_improvement() > 0.0;
+  work.paper_recipe = personalize.recipe() == v1::PersonalizeSpec::RECIPE_PAPER;
   return work;
 }
 

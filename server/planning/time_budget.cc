@@ -81,7 +81,7 @@ std::string TooShort(double seconds, const SceneFacts& facts, const v1::ImportSc
                        : "a film takes, without its frames,",
       std::ceil(fixed),
       views.is_counted && EstimatesPoses(facts, import) ? " (finding their poses among them)" : "",
-      std::ceil(fixed + kMinScheduledSeconds),
+      ShortestTimeBudget(facts, import),
       views.is_counted ? views.fewer : "");
 }
 
@@ -100,6 +100,10 @@ double FixedSeconds(const SceneFacts& facts, const v1::ImportSceneSpec& import) 
     if (!stage.keeps_time_limit) seconds += EstimateSeconds(stage.kind, work);
   }
   return seconds;
+}
+
+double ShortestTimeBudget(const SceneFacts& facts, const v1::ImportSceneSpec& import) {
+  return std::ceil(FixedSeconds(facts, import) + kMinScheduledSeconds);
 }
 
 TimeBudget DivideTimeBudget(double seconds,

@@ -32,6 +32,9 @@ struct TimeBudget {
 // film, search for their poses.
 double FixedSeconds(const SceneFacts& facts, const v1::ImportSceneSpec& import = {});
 
+// Smallest budget that DivideTimeBudget accepts, whole seconds.
+double ShortestTimeBudget(const SceneFacts& facts, const v1::ImportSceneSpec& import);
+
 // Throws ServiceError{kInvalidArgument, BAD_OPTION} with the smallest possible budget if `seconds`
 // leaves too little for the stages with a schedule.
 TimeBudget DivideTimeBudget(double seconds,

@@ -1,4 +1,4 @@
-// Lab Gaussian reconstruction, second half: chroma on fixed geometry (STILL.md "Stage 2").
+// Lab Gaussian reconstruction, second half: chroma on fixed geometry (GAUSSIANS.md "Stage 2").
 // Deterministic for a seed and a thread count.
 #pragma once
 
@@ -29,12 +29,16 @@ struct ChromaTarget {
 // called often and by several threads at once.
 using ChromaTargetSource = std::function<std::shared_ptr<const ChromaTarget>(int view)>;
 
+// Receives a function that returns the current model.
+using ChromaSnapshot =
+    std::function<void(int64_t iteration, const std::function<GaussianModel()>& model)>;
+
 struct ChromaProblem {
   std::vector<PosedCamera> training;
   ChromaTargetSource targets;
   // For measurements, may be empty. Called after the closed form, after every round of conjugate
-  // gradients and at growing intervals of Adam, with a function that returns the current model.
-  std::function<void(int64_t iteration, const std::function<GaussianModel()>& model)> snapshot;
+  // gradients and at growing intervals of Adam.
+  ChromaSnapshot snapshot;
 };
 
 // The training views of `scene` at the working size of `images`.

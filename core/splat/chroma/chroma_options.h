@@ -9,7 +9,7 @@
 namespace color3d {
 
 struct ChromaOptions {
-  // kJoint: continues the training of the geometry on luminance and chroma (STILL.md "Joint
+  // kJoint: continues the training of the geometry on luminance and chroma (GAUSSIANS.md "Joint
   // training"), by the options of that training.
   enum class Solver { kConjugateGradients, kAdam, kJoint };
   Solver solver = Solver::kConjugateGradients;

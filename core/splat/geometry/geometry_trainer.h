@@ -1,5 +1,5 @@
 // Lab Gaussian reconstruction: luminance geometry (the paper's warm-up, one channel), or luminance
-// and chroma together (STILL.md "Stage 2"). Deterministic for a seed and a thread count.
+// and chroma together (GAUSSIANS.md "Stage 2"). Deterministic for a seed and a thread count.
 #pragma once
 
 #include <cstdint>

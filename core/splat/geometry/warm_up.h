@@ -1,6 +1,6 @@
 // The first part of a joint training, as a value and as a file: the state of training at the end of
-// the warm-up on luminance, with all that its second part needs (STILL.md "Joint training"). Plain
-// values and pure functions.
+// the warm-up on luminance, with all that its second part needs (GAUSSIANS.md "Joint training").
+// Plain values and pure functions.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Lab-space Gaussians as structure-of-arrays float buffers (STILL.md "Stage 2"). A plain value.
+// Lab-space Gaussians as structure-of-arrays float buffers (GAUSSIANS.md "Stage 2"). A plain value.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,7 @@ struct GaussianMotion {
   float UnitTime(double time_s) const;
 };
 
-// What three channels hold: L', a', b', or R, G, B for comparison with those (STILL.md "Joint
+// What three channels hold: L', a', b', or R, G, B for comparison with those (GAUSSIANS.md "Joint
 // training").
 enum class ColorSpace { kLab, kSrgb };
 

@@ -1,4 +1,4 @@
-// The loss of a picture in Lab, L_l + L_ab (STILL.md "Losses"): L' has the edge term, a' and b'
+// The loss of a picture in Lab, L_l + L_ab (GAUSSIANS.md "Losses"): L' has the edge term, a' and b'
 // have not. Not thread-safe; keeps its work space between calls.
 #pragma once
 

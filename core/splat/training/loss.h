@@ -1,4 +1,4 @@
-// The training loss of one picture and its gradient (STILL.md "Stage 2"):
+// The training loss of one picture and its gradient (GAUSSIANS.md "Stage 2"):
 //   mean over channels and pixels of  w_l1 |x - y| + w_ssim (1 - SSIM(x, y))
 //   + w_edge mean over inner pixels of sqrt((Lap x - Lap y)^2 + eps^2),
 // with an 11x11 Gaussian window of sigma 1.5 and zero padding for SSIM (Wang et al. 2004), and the

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/carry/confidence.h"
+#include "core/catalogue/error_model.h"
 #include "core/stage/formats/carry_facts.h"
 
 namespace color3d {
@@ -37,7 +38,7 @@ void WriteCoverage(const CarryInputs& inputs,
   const double mean = MeanCoverage(coverage, inputs.key_views);
   facts.coverage = mean;
   for (size_t i = 0; i < coverage.size(); ++i) facts.view_coverage[views[i].name] = coverage[i];
-  context.progress().OnError(0, "coverage", mean);
+  context.progress().OnError(0, kCoverageCurve, mean);
   if (mean < kSmallCoverage) {
     context.Warn(
         "the key view shows only {:.1f} % of what the other views show; their colours "

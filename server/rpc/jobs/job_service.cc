@@ -20,6 +20,7 @@
 #include "server/planning/spec_check.h"
 #include "server/planning/spec_names.h"
 #include "server/rpc/calls/convert.h"
+#include "server/rpc/jobs/error_forecast.h"
 #include "server/rpc/jobs/job_log_stream.h"
 #include "server/storage/ballast.h"
 
@@ -198,8 +199,12 @@ v1::JobPlan DescribeRequest(const RpcParts& parts,
   const std::vector<JobRecord> inputs = LoadInputs(store, spec);
   const NewGraph graph =
       request.has_facts() ? PlanJob(spec, inputs, facts) : PlanRequest(store, spec);
-  return DescribeGraph(
-      graph, facts, FindImport(graph, inputs), MeasureMachine(MeasuredJobs(store)));
+  const v1::ImportSceneSpec import = FindImport(graph, inputs);
+  v1::JobPlan plan = DescribeGraph(graph, facts, import, MeasureMachine(MeasuredJobs(store)));
+  if (spec.has_colorize_scene()) {
+    AddBudgetErrors(ForecastError(spec, store), spec, graph, facts, import, &plan);
+  }
+  return plan;
 }
 
 JobRecord CreateJobRecord(const RpcParts& parts,

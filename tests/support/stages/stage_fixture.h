@@ -20,7 +20,11 @@ namespace color3d {
 class Warnings : public NullObserver {
  public:
   void OnWarning(const std::string& message) override { text += message + "\n"; }
+  void OnError(int64_t, const std::string& error_name, double value) override {
+    errors[error_name].push_back(value);
+  }
   std::string text;
+  std::map<std::string, std::vector<double>> errors;  // by name
 };
 
 // Records all states, and throws at one of them.
