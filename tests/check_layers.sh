@@ -82,7 +82,7 @@ done
 lower=
 for part in model hexplane motion raster training movers geometry chroma export import; do
   lower="$lower${lower:+|}$part"
-  allow "core/splat/$part" "core/(base|zip|simd|color|image|scene|splat/($lower))"
+  allow "core/splat/$part" "core/(base|catalogue|zip|simd|color|image|scene|splat/($lower))"
 done
 allow core/report 'core/(base|catalogue|image|report)'
 allow core/video 'core/(base|video)'
@@ -176,7 +176,7 @@ public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics
 public server/notify notifier webhook
-public server/planning asked_formats job_plan job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key
+public server/planning asked_formats job_plan job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key time_budget
 public server/rpc calls/error_mapping rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store
 public server/store chore_store client_store job job_store project_store worker_store sqlite_job_store store_file user_models

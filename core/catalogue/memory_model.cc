@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
+#include "core/base/error.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d {
@@ -45,8 +46,24 @@ constexpr StageMemory kStageMemory[] = {{kind::kImportScene, 10, 0},
 constexpr StageMemory kOtherStage = {nullptr, 180, 0};  // not measured, or the report
 
 // The chroma solver keeps its weights within these budgets (core/splat/chroma/chroma_options.h).
-constexpr int64_t kMostPictureBytes = 2560 * kMiB;
-constexpr int64_t kMostFrameBytes = 480 * kMiB;
+struct KindMemory {
+  CaptureKind kind;
+  bool moves;  // as in GeometryMemory
+  int64_t most_weight_bytes;
+};
+
+constexpr KindMemory kKindMemory[] = {{CaptureKind::kStatic, false, 2560 * kMiB},
+                                      {CaptureKind::kFilm, true, 480 * kMiB},
+                                      {CaptureKind::kDynamic, true, 480 * kMiB},
+                                      {CaptureKind::kRelief, true, 480 * kMiB}};
+
+const KindMemory& MemoryOf(CaptureKind kind) {
+  const auto* found = std::ranges::find(kKindMemory, kind, &KindMemory::kind);
+  if (found == std::end(kKindMemory)) {
+    throw Error(ErrorCode::kInternal, "no memory of the capture kind {}", static_cast<int>(kind));
+  }
+  return *found;
+}
 
 int64_t GeometryBytes(const StageWork& work) {
   const auto pixels = static_cast<int64_t>(1e6 * work.megapixels);
@@ -56,7 +73,7 @@ int64_t GeometryBytes(const StageWork& work) {
                                       .gaussians = work.gaussians,
                                       .sh_degree = work.sh_degree,
                                       .channels = work.trains_jointly ? 3 : 1,
-                                      .moves = work.kind != CaptureKind::kStatic});
+                                      .moves = MemoryOf(work.kind).moves});
 }
 
 }  // namespace
@@ -97,8 +114,8 @@ int64_t EstimatePeakBytes(std::string_view stage, const StageWork& work) {
   const StageMemory& memory = found == std::end(kStageMemory) ? kOtherStage : *found;
   const auto of_pixels =
       static_cast<int64_t>(1e6 * work.views * work.megapixels * memory.bytes_per_pixel);
-  const int64_t most = work.kind == CaptureKind::kStatic ? kMostPictureBytes : kMostFrameBytes;
-  return kIdleWorkerBytes + memory.fixed_mib * kMiB + std::min(of_pixels, most);
+  return kIdleWorkerBytes + memory.fixed_mib * kMiB +
+         std::min(of_pixels, MemoryOf(work.kind).most_weight_bytes);
 }
 
 }  // namespace color3d
