@@ -63,6 +63,7 @@ TEST(PlanTextTest, OmitsHeadingWithoutStagesLeftOut) {
   v1::JobPlan plan = SomePlan();
   plan.mutable_stages()->DeleteSubrange(1, 2);
   plan.set_saved_seconds(0.0);
+  plan.set_saved_memory_bytes(0);
   EXPECT_THAT(PlanText(plan), Not(HasSubstr("left out")));
   EXPECT_THAT(PlanText(plan), Not(HasSubstr("saved")));
 }

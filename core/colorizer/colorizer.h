@@ -41,7 +41,7 @@ struct ColorizerOptions {
   double time_limit_seconds = 0.0;
   // The decoder is not trained if its expected share of the answers, where the carried pictures
   // have no colour, is below this. 0..1; 0: always, 1: never. Not kept in files.
-  double min_decoder_share = 0.0;
+  double min_decoder_share = 0.04;
   int max_side_px = 400;            // of the pictures during training, 64..4096
   int crop_px = 256;                // side of the training crops, 64..1024, clipped to the picture
   double learning_rate = 0.0;       // at the start of the schedule, 0..1; 0: recipe's default

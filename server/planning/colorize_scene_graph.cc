@@ -268,7 +268,7 @@ void BuildColorizeSceneGraph(const JobSpec& submitted,
     }
     if (kind == kind::kPersonalize &&
         scene.colorize_views().method() == v1::ColorizeViewsSpec::METHOD_DECODER) {
-      spec.mutable_personalize()->clear_min_decoder_share();
+      spec.mutable_personalize()->set_min_decoder_share(0.0);
     }
     std::string skip_reason;
     if (kind == kind::kCarryColor) {

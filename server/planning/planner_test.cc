@@ -146,8 +146,8 @@ TEST(Planner, MethodDecoderAlwaysTrainsDecoder) {
               0.5);
     spec.mutable_colorize_scene()->mutable_colorize_views()->set_method(
         v1::ColorizeViewsSpec::METHOD_DECODER);
-    EXPECT_FALSE(
-        SpecOf(PlanJob(spec, {}, facts), "personalize").personalize().has_min_decoder_share());
+    EXPECT_EQ(SpecOf(PlanJob(spec, {}, facts), "personalize").personalize().min_decoder_share(),
+              0.0);
   }
 }
 

@@ -96,14 +96,21 @@ struct ErrorNames : NullObserver {
   std::set<std::string> names;
 };
 
-// The second picture is coloured in its left half alone.
+// The second picture has stripes of both directions, whose colour is uncertain, and is coloured in
+// its left half alone.
 TEST(ColorizerTest, TrainsDecoderOnlyAboveItsLeastShare) {
   const Key key = MakeKey(96, 64);
   Image left(96, 64, 1);
   for (int y = 0; y < 64; ++y) {
     for (int x = 0; x < 48; ++x) left.At(0, y, x) = 1.0f;
   }
-  const TrainingPicture view{"view", key.luminance, key.ab, left};
+  Image stripes(96, 64, 1);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      stripes.At(0, y, x) = 50.0f + 10.0f * (std::sin(0.8f * x) + std::sin(0.8f * y));
+    }
+  }
+  const TrainingPicture view{"view", stripes, key.ab, left};
   ErrorNames seen;
   const auto colors = [&](int iterations, double least_share, bool has_view) {
     std::vector<TrainingPicture> pictures = {{"key", key.luminance, key.ab}};
@@ -114,7 +121,7 @@ TEST(ColorizerTest, TrainsDecoderOnlyAboveItsLeastShare) {
     ThreadPool pool(1);
     NoCheckpoints checkpoints;
     return TrainColorizer(TheEncoder(), pictures, options, {pool, checkpoints, seen, {}})
-        ->Colorize(key.luminance)
+        ->Colorize(stripes)
         .data;
   };
   const auto untrained = colors(0, 0.0, true), trained = colors(10, 0.0, true);
