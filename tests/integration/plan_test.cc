@@ -56,7 +56,8 @@ TEST_F(PlanTest, EqualsJobsOfRun) {
   const ProcessResult before = Client(std::vector<std::string>{"--json", "plan", room} + options);
   ASSERT_EQ(before.exit_code, 0) << before.err;
   std::vector<std::string> planned, ran;
-  for (const auto& stage : nlohmann::json::parse(before.out).at("stages")) {
+  const auto plan = nlohmann::json::parse(before.out);
+  for (const auto& stage : plan.at("stages")) {
     planned.push_back(Entry(stage.at("kind"), stage.at("runs")));
   }
   const ProcessResult run =
