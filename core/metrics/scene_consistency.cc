@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "core/color/lab.h"
@@ -50,6 +51,8 @@ class Scorer {
 
   SceneConsistency Score() {
     const auto pairs = ConsistencyPairs(source_.groups, kMaxPairs);
+    const int views = std::accumulate(source_.groups.begin(), source_.groups.end(), 0);
+    for (int view = 0; view < views; ++view) with_common_ |= source_.has_truth(view);
     with_truth_ = std::all_of(pairs.begin(), pairs.end(), [&](const ViewPair& pair) {
       return source_.has_truth(pair.first) && source_.has_truth(pair.second);
     });
@@ -61,7 +64,7 @@ class Scorer {
       std::vector<PairScores> scores(batch.size()), common_scores(batch.size());
       pool_.ForEach(static_cast<int64_t>(batch.size()), [&](int64_t i, int) {
         scores[i] = Compare(batch[i], MatchedByGeometry(batch[i]));
-        if (with_truth_) common_scores[i] = Compare(batch[i], MatchedByFlow(batch[i]));
+        if (with_common_) common_scores[i] = Compare(batch[i], MatchedByFlow(batch[i]));
       });
       for (size_t i = 0; i < batch.size(); ++i) {
         own.Add(batch[i], scores[i]);
@@ -70,10 +73,15 @@ class Scorer {
     }
     SceneConsistency result{
         own.rendered.Result(), own.colored.Result(), std::nullopt, std::nullopt};
-    if (!with_truth_ || pairs.empty()) return result;
-    result.truth = own.truth.Result();
-    result.common = SceneConsistency::Common{
-        common.rendered.Result(), common.colored.Result(), common.truth.Result()};
+    if (pairs.empty()) return result;
+    if (with_common_) {
+      result.common =
+          SceneConsistency::Common{common.rendered.Result(), common.colored.Result(), std::nullopt};
+    }
+    if (with_truth_) {
+      result.truth = own.truth.Result();
+      result.common->truth = common.truth.Result();
+    }
     return result;
   }
 
@@ -110,8 +118,8 @@ class Scorer {
   }
 
   std::vector<PixelMatch> MatchedByFlow(const ViewPair& pair) const {
-    return MatchByFlow(LuminanceOfLab(views_.at(pair.first).truth.lab),
-                       LuminanceOfLab(views_.at(pair.second).truth.lab),
+    return MatchByFlow(LuminanceOfLab(views_.at(pair.first).colored.lab),
+                       LuminanceOfLab(views_.at(pair.second).colored.lab),
                        kStridePx);
   }
 
@@ -129,7 +137,8 @@ class Scorer {
   ThreadPool& pool_;
   const CancellationToken& cancel_;
   MatchOptions match_;
-  bool with_truth_ = false;
+  bool with_truth_ = false;   // of all pairs
+  bool with_common_ = false;  // the scene has any truth
   std::map<int, ViewPictures> views_;
 };
 

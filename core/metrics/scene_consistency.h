@@ -35,15 +35,16 @@ struct ConsistencySource {
 };
 
 struct SceneConsistency {
-  // On matches by optical flow of the true luminance (MatchByFlow): the same pixels whatever model
-  // or method made the colours.
+  // On matches by optical flow of the photos' luminance (MatchByFlow): the same pixels whatever
+  // model or method made the colours.
   struct Common {
-    Consistency rendered, colored, truth;
+    Consistency rendered, colored;
+    std::optional<Consistency> truth;  // as below
   };
   Consistency rendered;              // renders of the coloured model
   Consistency colored;               // the photos in their predicted colours
   std::optional<Consistency> truth;  // the photos in their true colours
-  std::optional<Common> common;      // with `truth` only
+  std::optional<Common> common;      // if any view has a truth: for benchmarks
 };
 
 // Consistency over ConsistencyPairs of all groups, training and held-out views alike. Matches come

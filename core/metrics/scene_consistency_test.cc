@@ -41,7 +41,7 @@ class SceneConsistencyTest : public ::testing::Test {
       return ConsistencySource::Rendered{{camera, Pose(), map}, Colored(view, swapped_view)};
     };
     source.colored_lab = [&](int view) { return Colored(view, swapped_view); };
-    source.has_truth = [&](int) { return has_truth_; };
+    source.has_truth = [&](int view) { return view < views_with_truth_; };
     source.true_srgb = [&](int) { return SrgbFromLab(TrueLab()); };
     ThreadPool pool(2);
     return MeasureConsistency(source, pool, CancellationToken());
@@ -58,7 +58,7 @@ class SceneConsistencyTest : public ::testing::Test {
     return swapped;
   }
 
-  bool has_truth_ = true;
+  int views_with_truth_ = 2;
 };
 
 TEST_F(SceneConsistencyTest, CommonMatchesDoNotDependOnGeometry) {
@@ -68,7 +68,8 @@ TEST_F(SceneConsistencyTest, CommonMatchesDoNotDependOnGeometry) {
   EXPECT_GT(right.common->rendered.matches, 300);             // of 704
   EXPECT_EQ(right.common->rendered.matches, wrong.common->rendered.matches);
   EXPECT_EQ(right.common->rendered.me, wrong.common->rendered.me);
-  EXPECT_EQ(right.common->truth.matches, right.common->colored.matches);
+  ASSERT_TRUE(right.common->truth);
+  EXPECT_EQ(right.common->truth->matches, right.common->colored.matches);
 }
 
 TEST_F(SceneConsistencyTest, CommonMatchesNoticeSwappedColors) {
@@ -76,11 +77,22 @@ TEST_F(SceneConsistencyTest, CommonMatchesNoticeSwappedColors) {
   EXPECT_LT(good.common->colored.me_de00, 0.5);
   EXPECT_GT(swapped.common->colored.me_de00, 5.0);
   EXPECT_GT(swapped.common->colored.tc, 10.0 * good.common->colored.tc + 1e-4);
-  EXPECT_LT(swapped.common->truth.me_de00, 0.5);
+  ASSERT_TRUE(swapped.common->truth);
+  EXPECT_LT(swapped.common->truth->me_de00, 0.5);
+}
+
+TEST_F(SceneConsistencyTest, CommonMatchesNeedTheTruthOfOneView) {
+  const SceneConsistency all = Measure(1.0f, 1);
+  views_with_truth_ = 1;
+  const SceneConsistency one = Measure(1.0f, 1);
+  ASSERT_TRUE(all.common && one.common);
+  EXPECT_EQ(one.common->colored.me_de00, all.common->colored.me_de00);
+  EXPECT_FALSE(one.common->truth);
+  EXPECT_FALSE(one.truth);
 }
 
 TEST_F(SceneConsistencyTest, HasNoCommonMatchesWithoutTruth) {
-  has_truth_ = false;
+  views_with_truth_ = 0;
   const SceneConsistency scores = Measure(1.0f, -1);
   EXPECT_FALSE(scores.common);
   EXPECT_FALSE(scores.truth);

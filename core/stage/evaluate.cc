@@ -261,7 +261,7 @@ ordered_json JsonOf(const SceneConsistency& scores) {
     const SceneConsistency::Common* common = scores.common ? &*scores.common : nullptr;
     json["rendered"] = JsonOf(scores.rendered, common ? &common->rendered : nullptr);
     json["colored_views"] = JsonOf(scores.colored, common ? &common->colored : nullptr);
-    if (scores.truth) json["truth"] = JsonOf(*scores.truth, common ? &common->truth : nullptr);
+    if (scores.truth) json["truth"] = JsonOf(*scores.truth, common ? &*common->truth : nullptr);
   }
   return json;
 }

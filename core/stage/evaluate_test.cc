@@ -61,11 +61,14 @@ TEST_F(EvaluateTest, ScoresTheBoundOfTheReconstruction) {
 
 TEST_F(EvaluateTest, ComparesViewsOnCommonMatches) {
   EvaluateOptions options;
-  options.truth = {TruthOf("p0.png")};
   EXPECT_FALSE(Evaluated(options).at("consistency").at("rendered").contains("me_common"));
+  options.truth = {TruthOf("p0.png")};
+  const json held_out = Evaluated(options).at("consistency");
+  EXPECT_FALSE(held_out.contains("truth"));
   options.training_truth = {TruthOf("p1.png"), TruthOf("p2.png")};
   const json consistency = Evaluated(options).at("consistency");
   const json& colored = consistency.at("colored_views");
+  EXPECT_EQ(held_out.at("colored_views").at("me_de00_common"), colored.at("me_de00_common"));
   // p2 is redder.
   EXPECT_GT(colored.at("me_de00_common"), 3.0);
   EXPECT_LT(consistency.at("truth").at("me_de00_common"), colored.at("me_de00_common"));

@@ -105,7 +105,7 @@ std::string Row(const SuiteCell& cell, const std::string& mark) {
       Number(cell.Mean("delta_e00_chroma_2d"), 2),
       Number(cell.Mean("psnr_l"), 1),
       Number(cell.Mean("colorfulness_ratio"), 2),
-      Number(cell.Mean("me"), 4),
+      Number(cell.Mean("me_common"), 4),
       Number(cell.Mean("gaussians"), 0),
       Number(cell.Mean("seconds_total"), 0),
       cell.rows.size(),
@@ -120,7 +120,7 @@ std::string SceneSection(const SceneResults& scene) {
   html +=
       "<div class=\"scroll\"><table><tr><th>preset</th><th class=\"n\">error, 95 %</th>"
       "<th class=\"n\">photos</th><th class=\"n\">PSNR of L</th><th class=\"n\">colourfulness</th>"
-      "<th class=\"n\">ME</th><th class=\"n\">Gaussians</th><th class=\"n\">s</th>"
+      "<th class=\"n\">ME, common</th><th class=\"n\">Gaussians</th><th class=\"n\">s</th>"
       "<th class=\"n\">seeds</th><th></th></tr>\n";
   for (size_t i = 0; i < scene.cells.size(); ++i) {
     const auto at = std::find(scene.frontier.begin(), scene.frontier.end(), i);

@@ -102,7 +102,8 @@ std::string MarkdownOfScene(const SceneResults& results) {
   std::string text =
       fmt::format("\n## {}\n\nWithout colour: {}.\n\n", results.scene, Figure(results.gray, 2));
   text +=
-      "| preset | error (95 %) | photos | PSNR of L | colourfulness | ME | Gaussians | s | seeds | "
+      "| preset | error (95 %) | photos | PSNR of L | colourfulness | ME, common | Gaussians | s | "
+      "seeds | "
       "|\n"
       "|---|--:|--:|--:|--:|--:|--:|--:|--:|---|\n";
   for (size_t i = 0; i < results.cells.size(); ++i) {
@@ -120,7 +121,7 @@ std::string MarkdownOfScene(const SceneResults& results) {
                         Figure(cell.Mean("delta_e00_chroma_2d"), 2),
                         Figure(cell.Mean("psnr_l"), 1),
                         Figure(cell.Mean("colorfulness_ratio"), 2),
-                        Figure(cell.Mean("me"), 4),
+                        Figure(cell.Mean("me_common"), 4),
                         Figure(cell.Mean("gaussians"), 0),
                         Figure(cell.Mean("seconds_total"), 0),
                         cell.rows.size(),
@@ -258,8 +259,10 @@ std::string SuiteCsv(const std::vector<SuiteRow>& rows) {
                                       "psnr_l",
                                       "ssim_rgb",
                                       "colorfulness_ratio",
-                                      "me",
-                                      "tc",
+                                      "me_common",
+                                      "tc_common",
+                                      "tc_chroma",
+                                      "cdc",
                                       "gaussians",
                                       "seconds_total",
                                       "peak_memory_bytes"};
