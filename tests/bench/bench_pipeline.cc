@@ -24,6 +24,8 @@ struct PipelineArguments {
   GeometryOptions geometry{.iterations = 3000, .max_gaussians = 150'000};
   ColorizerOptions colorizer{.iterations = 800};
   ChromaOptions chroma{.iterations = 600};
+  CarryColorOptions carrying;
+  ColorizeViewsOptions coloring;
   bool paper = false;
   bool feed_forward = false;
   bool carry = true;
@@ -105,7 +107,7 @@ void RunPipeline(const PipelineArguments& args) {
   }
   if (args.carry) {
     run(kind::kCarryColor, [&](StageContext& c) {
-      CarryColorOptions options;
+      CarryColorOptions options = args.carrying;
       options.max_side_px = args.max_side_px;
       RunCarryColor(options, c);
     });
@@ -114,8 +116,11 @@ void RunPipeline(const PipelineArguments& args) {
   if (args.paper) colorizer.UsePaperRecipe();
   if (args.feed_forward) colorizer.recipe = ColorizerOptions::Recipe::kFeedForward;
   run(kind::kPersonalize, [&](StageContext& c) { RunPersonalize(colorizer, c); });
-  run(kind::kColorizeViews,
-      [&](StageContext& c) { RunColorizeViews({.max_side_px = args.max_side_px}, c); });
+  run(kind::kColorizeViews, [&](StageContext& c) {
+    ColorizeViewsOptions options = args.coloring;
+    options.max_side_px = args.max_side_px;
+    RunColorizeViews(options, c);
+  });
   run(kind::kSolveChroma, [&](StageContext& c) { RunSolveChroma(args.chroma, c); });
   if (args.score_training) {
     pipeline.Run("score_training", [&](StageContext& c) {
@@ -160,6 +165,21 @@ void AddPipelineCommand(CLI::App& app) {
   command->add_flag("--carry,!--no-carry",
                     args->carry,
                     "Carry the key view's colours through the geometry (default), or not");
+  command->add_option("--depth-sources",
+                      args->carrying.depth_sources,
+                      "Photos that the plane sweep of each view compares; 0: no plane sweep");
+  command->add_option("--flow-tolerance",
+                      args->carrying.carry.flow_tolerance_px,
+                      "Tolerance of carried positions, px of optical flow; 0: no check by flow");
+  command->add_flag("--augment,!--no-augment",
+                    args->colorizer.augment,
+                    "Transform the training pictures of the colorizer (default), or not");
+  command->add_flag("--guess,!--no-guess",
+                    args->coloring.guess,
+                    "Guess where nothing similar has a colour (default), or not");
+  command->add_flag("--spread,!--no-spread",
+                    args->coloring.spread,
+                    "Spread colours between the edges of the luminance (default), or not");
   command->add_flag(
       "--feed-forward", args->feed_forward, "Use the general colorizer, without training");
   command->add_flag("--paper", args->paper, "Use the paper's colorizer recipe");

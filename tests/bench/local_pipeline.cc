@@ -59,6 +59,14 @@ void LocalPipeline::ImportScene() {
   });
 }
 
+std::filesystem::path LocalPipeline::ArtifactPath(const std::string& name) const {
+  const auto found = artifacts_.find(name);
+  if (found == artifacts_.end()) {
+    throw InvalidArgument("there is no {}; --earlier takes the folder of a run of all stages", name);
+  }
+  return found->second;
+}
+
 void LocalPipeline::TakeAll() {
   for (const std::string& name : ListFiles(out_folder_)) Take(name, out_folder_ / name);
 }

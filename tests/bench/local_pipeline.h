@@ -33,7 +33,8 @@ class LocalPipeline {
   void Take(const std::string& name, const std::filesystem::path& file) { artifacts_[name] = file; }
   void TakeAll();
 
-  std::filesystem::path ArtifactPath(const std::string& name) const { return artifacts_.at(name); }
+  // Throws Error{kInvalidArgument} if no stage of this run, and no earlier run, has written it.
+  std::filesystem::path ArtifactPath(const std::string& name) const;
   const std::map<std::string, std::filesystem::path>& artifacts() const { return artifacts_; }
   const std::vector<StageSummary>& summaries() const { return summaries_; }
 
