@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/catalogue/stages.h"
 #include "core/report/curves.h"
@@ -62,7 +63,8 @@ void LocalPipeline::ImportScene() {
 std::filesystem::path LocalPipeline::ArtifactPath(const std::string& name) const {
   const auto found = artifacts_.find(name);
   if (found == artifacts_.end()) {
-    throw InvalidArgument("there is no {}; --earlier takes the folder of a run of all stages", name);
+    throw InvalidArgument("there is no {}; --earlier takes the folder of a run of all stages",
+                          name);
   }
   return found->second;
 }
