@@ -106,7 +106,8 @@ CaptureLayout DetectCapture(const std::vector<std::string>& files) {
   if (counts.photos == 0 && counts.splats > 0) return CaptureLayout::kSplat;
   if (!ColmapPlaces(files).empty()) return CaptureLayout::kColmap;
   if (counts.has_metadata && counts.has_cameras) return CaptureLayout::kNerfies;
-  return counts.has_transforms ? CaptureLayout::kTransforms : CaptureLayout::kPhotos;
+  if (counts.has_transforms) return CaptureLayout::kTransforms;
+  return counts.has_poses_bounds ? CaptureLayout::kPosesBounds : CaptureLayout::kPhotos;
 }
 
 const std::vector<CaptureKindInfo>& CaptureKinds() {

@@ -33,6 +33,7 @@ TEST(DetectCaptureTest, ReadsEachLayoutFromFileNames) {
   EXPECT_EQ(DetectCapture({"a.mp4", "b.mp4"}), CaptureLayout::kFilms);
   EXPECT_EQ(DetectCapture({"a.mp4", "b.mp4", "transforms.json"}), CaptureLayout::kTransforms);
   EXPECT_EQ(DetectCapture({"a.mp4", "b.mp4", "poses_bounds.npy"}), CaptureLayout::kPosesBounds);
+  EXPECT_EQ(DetectCapture({"images/a.jpg", "poses_bounds.npy"}), CaptureLayout::kPosesBounds);
 }
 
 TEST(DetectCaptureTest, IgnoresAugmentFilesAndMasks) {
