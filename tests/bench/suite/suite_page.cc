@@ -142,21 +142,20 @@ std::string SceneSection(const SceneResults& scene) {
 std::string Overview(const std::vector<PresetSummary>& presets) {
   std::string html =
       "<h2>All scenes</h2>\n<div class=\"scroll\"><table><tr><th>preset</th><th>kind</th>"
-      "<th class=\"n\">scenes</th><th class=\"n\">mean rank</th><th class=\"n\">error / grey</th>"
-      "<th class=\"n\">mean s</th><th>tests</th></tr>\n";
+      "<th class=\"n\">scenes</th><th class=\"n\">error / default</th>"
+      "<th class=\"n\">time / default</th><th>tests</th></tr>\n";
   for (const PresetSummary& p : presets) {
     html += fmt::format(
-        "<tr class=\"{}\"><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{:.1f}</td>"
-        "<td class=\"n\">{:.2f}</td><td class=\"n\">{:.0f}</td><td class=\"w\">{}</td></tr>\n",
+        "<tr class=\"{}\"><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>"
+        "<td class=\"n\">{}</td><td class=\"w\">{}</td></tr>\n",
         p.preset.oracle           ? "oracle"
         : p.preset.kind == "ours" ? "ours"
                                   : "",
         EscapeHtml(p.preset.name),
-        p.preset.oracle ? "oracle" : EscapeHtml(p.preset.kind),
+        EscapeHtml(KindOf(p.preset)),
         p.scenes,
-        p.mean_rank,
-        p.ratio_to_gray,
-        p.seconds,
+        Number(p.error_ratio, 2),
+        Number(p.time_ratio, 2),
         EscapeHtml(p.preset.claim));
   }
   return html + "</table></div>\n";

@@ -130,6 +130,8 @@ SuiteScenes ReadManifest(const fs::path& json, const fs::path& data) {
 }
 
 std::vector<std::string> SuiteTask::Arguments(const fs::path& out) const {
+  const bool is_bound = preset.name == kBoundPreset;
+  const std::string name = is_bound ? kDefaultPreset : preset.name;
   std::vector<std::string> arguments = {"colorize",
                                         scene.folder.string(),
                                         "-o",
@@ -138,11 +140,11 @@ std::vector<std::string> SuiteTask::Arguments(const fs::path& out) const {
                                         "--seed",
                                         std::to_string(seed),
                                         "--preset",
-                                        preset.file.empty() ? preset.name : preset.file.string()};
+                                        preset.file.empty() ? name : preset.file.string()};
   if (!scene.key_view.empty() && !ChoosesKeyView(preset)) {
     arguments.insert(arguments.end(), {"--key-view", scene.key_view});
   }
-  if (preset.name == kBoundSource) arguments.push_back("--bound");
+  if (is_bound) arguments.push_back("--bound");
   arguments.insert(arguments.end(), preset.arguments.begin(), preset.arguments.end());
   arguments.insert(arguments.end(), scene.arguments.begin(), scene.arguments.end());
   return arguments;
@@ -155,7 +157,6 @@ std::vector<SuiteTask> PlanSuite(const std::vector<SuiteScene>& scenes,
   for (int seed = 1; seed <= seeds; ++seed) {
     for (const SuiteScene& scene : scenes) {
       for (const SuitePreset& preset : presets) {
-        if (preset.name == kBoundPreset) continue;
         SuiteTask task{scene, preset, static_cast<uint64_t>(seed), {}};
         nlohmann::json facts = {scene.name, scene.key_view, scene.arguments, preset.name};
         if (!preset.file.empty()) facts.push_back(ReadFile(preset.file));

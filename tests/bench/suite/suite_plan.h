@@ -19,9 +19,10 @@ struct SuitePreset {
   std::vector<std::string> arguments = {};  // further options of `color3d colorize`
 };
 
-// The preset whose figure comes from runs of kBoundSource with `--bound`.
+// The preset that others are compared with.
+inline constexpr char kDefaultPreset[] = "fast";
+// kDefaultPreset with `--bound`; its figure is the error of the bound.
 inline constexpr char kBoundPreset[] = "bound";
-inline constexpr char kBoundSource[] = "fast";
 
 // Reads the rows of a Markdown table "| name | file | kind | oracle | claim |"; options of `color3d
 // colorize` may follow the file, as in "paper.textproto --keys 2". Throws
@@ -56,8 +57,7 @@ struct SuiteTask {
   std::vector<std::string> Arguments(const std::filesystem::path& out) const;
 };
 
-// All tasks but those of kBoundPreset: seed by seed, so that an interrupted suite has whole rows
-// first.
+// Seed by seed, so that an interrupted suite has whole rows first.
 std::vector<SuiteTask> PlanSuite(const std::vector<SuiteScene>& scenes,
                                  const std::vector<SuitePreset>& presets,
                                  int seeds);

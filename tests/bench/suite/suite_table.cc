@@ -25,27 +25,27 @@ std::vector<double> ErrorsOf(const SuiteCell& cell) {
   return errors;
 }
 
-// The cell of the upper bound, from the runs of kBoundSource.
-void AddBound(const std::vector<SuitePreset>& presets, std::vector<SuiteCell>* cells) {
-  const auto bound = std::find_if(
-      presets.begin(), presets.end(), [](const SuitePreset& p) { return p.name == kBoundPreset; });
-  if (bound == presets.end()) return;
-  for (const SuiteCell& cell : *cells) {
-    if (cell.preset.name != kBoundSource) continue;
-    SuiteCell of_bound{cell.scene, *bound, {}, {}, {}};
-    for (SuiteRow row : cell.rows) {
-      const double error = row.Metric(std::string(kRankingMetric) + "_bound");
-      if (!std::isfinite(error)) continue;
-      row.preset = kBoundPreset;
-      row.view_errors.clear();
-      row.metrics = {{kRankingMetric, error}, {"seconds_total", row.Metric("seconds_total")}};
-      of_bound.rows.push_back(std::move(row));
-    }
-    if (!of_bound.Empty()) {
-      cells->push_back(std::move(of_bound));
-      return;
-    }
-  }
+std::string Figure(double value, int decimals) {
+  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "";
+}
+
+// The row of a run with `--bound`, with the error of the bound in place of its own.
+SuiteRow BoundOf(SuiteRow row) {
+  const double error = row.Metric(std::string(kRankingMetric) + "_bound");
+  row.view_errors.clear();
+  row.metrics = {{kRankingMetric, error},
+                 {"delta_e00_gray", row.Metric("delta_e00_gray")},
+                 {"seconds_total", row.Metric("seconds_total")}};
+  return row;
+}
+
+// Mean and, of several values, interval.
+std::string WithInterval(const MeanWithInterval& error) {
+  return error.low == error.high ? Figure(error.mean, 2)
+                                 : fmt::format("{} ({} to {})",
+                                               Figure(error.mean, 2),
+                                               Figure(error.low, 2),
+                                               Figure(error.high, 2));
 }
 
 void FindFrontier(SceneResults* results) {
@@ -80,10 +80,6 @@ void FindFrontier(SceneResults* results) {
   }
 }
 
-std::string Figure(double value, int decimals) {
-  return std::isfinite(value) ? fmt::format("{:.{}f}", value, decimals) : "";
-}
-
 std::string CsvCell(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -108,16 +104,15 @@ std::string MarkdownOfScene(const SceneResults& results) {
       "|---|--:|--:|--:|--:|--:|--:|--:|--:|---|\n";
   for (size_t i = 0; i < results.cells.size(); ++i) {
     const SuiteCell& cell = results.cells[i];
-    std::string mark = cell.preset.oracle ? "oracle" : "";
+    std::string mark;
     const auto at = std::find(results.frontier.begin(), results.frontier.end(), i);
     if (at != results.frontier.end()) {
       mark = at - results.frontier.begin() == results.knee ? "frontier, knee" : "frontier";
     }
-    text += fmt::format("| {} | {} ({} to {}) | {} | {} | {} | {} | {} | {} | {} | {} |\n",
+    text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n",
                         cell.preset.name,
-                        Figure(cell.error.mean, 2),
-                        Figure(cell.error.low, 2),
-                        Figure(cell.error.high, 2),
+                        KindOf(cell.preset),
+                        WithInterval(cell.error),
                         Figure(cell.Mean("delta_e00_chroma_2d"), 2),
                         Figure(cell.Mean("psnr_l"), 1),
                         Figure(cell.Mean("colorfulness_ratio"), 2),
@@ -128,17 +123,28 @@ std::string MarkdownOfScene(const SceneResults& results) {
                         mark);
   }
   for (const SuiteCell& cell : results.failed) {
-    text += fmt::format("| {} | failed | | | | | | | | {} |\n", cell.preset.name, cell.failure);
+    text += fmt::format("| {} | {} | failed | | | | | | | | {} |\n",
+                        cell.preset.name,
+                        KindOf(cell.preset),
+                        cell.failure);
   }
   return text;
 }
 
 }  // namespace
 
+std::string KindOf(const SuitePreset& preset) { return preset.oracle ? "oracle" : preset.kind; }
+
 double SuiteCell::Mean(const std::string& metric) const {
   double sum = 0.0;
-  for (const SuiteRow& row : rows) sum += row.Metric(metric);
-  return sum / static_cast<double>(rows.size());
+  int count = 0;
+  for (const SuiteRow& row : rows) {
+    const double value = row.Metric(metric);
+    if (!std::isfinite(value)) continue;
+    sum += value;
+    ++count;
+  }
+  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
 std::vector<SceneResults> SummarizeScenes(const std::vector<SuiteRow>& rows,
@@ -158,7 +164,7 @@ std::vector<SceneResults> SummarizeScenes(const std::vector<SuiteRow>& rows,
         if (other.Failed()) {
           cell.failure = other.failure;
         } else {
-          cell.rows.push_back(other);
+          cell.rows.push_back(preset.name == kBoundPreset ? BoundOf(other) : other);
         }
       }
       if (cell.Empty()) {
@@ -168,7 +174,6 @@ std::vector<SceneResults> SummarizeScenes(const std::vector<SuiteRow>& rows,
       cell.failure.clear();
       results.cells.push_back(std::move(cell));
     }
-    AddBound(presets, &results.cells);
     results.gray = std::numeric_limits<double>::quiet_NaN();
     std::erase_if(results.cells, [](const SuiteCell& cell) { return ErrorsOf(cell).empty(); });
     for (SuiteCell& cell : results.cells) {
@@ -190,23 +195,22 @@ std::vector<PresetSummary> SummarizePresets(const std::vector<SceneResults>& sce
   std::vector<PresetSummary> summaries;
   for (const SuitePreset& preset : presets) {
     PresetSummary summary{preset};
-    double log_ratio = 0.0;
+    double log_error = 0.0, log_seconds = 0.0;
     for (const SceneResults& scene : scenes) {
       const SuiteCell* cell = FindCell(scene, preset.name);
-      if (cell == nullptr || !(scene.gray > 0.0)) continue;
+      const SuiteCell* of_default = FindCell(scene, kDefaultPreset);
+      if (cell == nullptr || of_default == nullptr) continue;
       ++summary.scenes;
-      summary.mean_rank += static_cast<double>(cell - scene.cells.data() + 1);
-      log_ratio += std::log(cell->error.mean / scene.gray);
-      summary.seconds += cell->Mean("seconds_total");
+      log_error += std::log(cell->error.mean / of_default->error.mean);
+      log_seconds += std::log(cell->Mean("seconds_total") / of_default->Mean("seconds_total"));
     }
     if (summary.scenes == 0) continue;
-    summary.mean_rank /= summary.scenes;
-    summary.seconds /= summary.scenes;
-    summary.ratio_to_gray = std::exp(log_ratio / summary.scenes);
+    summary.error_ratio = std::exp(log_error / summary.scenes);
+    summary.time_ratio = std::exp(log_seconds / summary.scenes);
     summaries.push_back(std::move(summary));
   }
   std::stable_sort(summaries.begin(), summaries.end(), [](const auto& x, const auto& y) {
-    return x.ratio_to_gray < y.ratio_to_gray;
+    return x.error_ratio < y.error_ratio;
   });
   return summaries;
 }
@@ -285,15 +289,15 @@ std::string SuiteMarkdown(const std::vector<SceneResults>& scenes,
                           const std::vector<PresetSummary>& presets,
                           const std::vector<ClaimResult>& claims) {
   std::string text =
-      "| preset | kind | scenes | mean rank | error / grey | mean s |\n|---|---|--:|--:|--:|--:|\n";
+      "Relative to the default (geometric means over the scenes that have both).\n\n"
+      "| preset | kind | scenes | error | time |\n|---|---|--:|--:|--:|\n";
   for (const PresetSummary& p : presets) {
-    text += fmt::format("| {} | {} | {} | {:.1f} | {:.2f} | {:.0f} |\n",
+    text += fmt::format("| {} | {} | {} | {:.2f} | {} |\n",
                         p.preset.name,
-                        p.preset.oracle ? "oracle" : p.preset.kind,
+                        KindOf(p.preset),
                         p.scenes,
-                        p.mean_rank,
-                        p.ratio_to_gray,
-                        p.seconds);
+                        p.error_ratio,
+                        Figure(p.time_ratio, 2));
   }
   for (const SceneResults& scene : scenes) text += MarkdownOfScene(scene);
   text +=

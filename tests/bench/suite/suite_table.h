@@ -24,7 +24,7 @@ struct SuiteCell {
   MeanWithInterval error;
 
   bool Empty() const { return rows.empty(); }
-  // Mean over the rows; NaN if a row lacks the metric.
+  // Mean over the rows that have the metric; NaN if there is none.
   double Mean(const std::string& metric) const;
 };
 
@@ -44,15 +44,17 @@ struct SceneResults {
 std::vector<SceneResults> SummarizeScenes(const std::vector<SuiteRow>& rows,
                                           const std::vector<SuitePreset>& presets);
 
-// Means over the scenes that have both the preset and grey.
+// "oracle", "ours", "baseline", "paper" or "ablation".
+std::string KindOf(const SuitePreset& preset);
+
+// Geometric means over the scenes that have both the preset and the default.
 struct PresetSummary {
   SuitePreset preset;
   int scenes = 0;
-  double mean_rank = 0.0;      // among cells without an oracle
-  double ratio_to_gray = 0.0;  // geometric mean
-  double seconds = 0.0;        // mean
+  double error_ratio = 0.0;  // error divided by that of the default
+  double time_ratio = 0.0;   // the same of seconds; NaN if some are unknown
 };
-// By ratio_to_gray.
+// Least error_ratio first.
 std::vector<PresetSummary> SummarizePresets(const std::vector<SceneResults>& scenes,
                                             const std::vector<SuitePreset>& presets);
 

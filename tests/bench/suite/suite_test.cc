@@ -101,9 +101,11 @@ TEST_F(SuitePlanTest, ListsMissingScenesAndNamesWrongEntry) {
   EXPECT_THAT(MessageOf([&] { SelectScenes(scenes, {"fox"}); }),
               HasSubstr("fox is not in the data"));
   const auto tasks = PlanSuite(scenes.found, {PresetOf("fast"), PresetOf(kBoundPreset)}, 2);
-  ASSERT_EQ(tasks.size(), 2u) << "two seeds, and no run of the bound";
+  ASSERT_EQ(tasks.size(), 4u);
+  EXPECT_THAT(tasks[0].Arguments("out"), Not(testing::Contains("--bound")));
   const std::vector<std::string> arguments = tasks[1].Arguments("out");
   EXPECT_THAT(arguments, testing::Contains("--bound"));
+  EXPECT_THAT(arguments, testing::Contains("fast"));
   EXPECT_THAT(arguments, testing::Contains("7"));
   EXPECT_THAT(MessageOf([&] {
                 ReadManifest(Write("bad.json", R"({"scenes": [{"name": "a"}]})"), folder_.path());
@@ -206,7 +208,7 @@ TEST_F(RunTasksTest, RefusesBudgetBelowShortestRunAndStartsNoneBeyondIt) {
 
 TEST_F(RunTasksTest, FailedRunIsRowAndRetriedOnRequestOnly) {
   EXPECT_EQ(Run("rows", {}, 1000, {"flow"}), 0);
-  EXPECT_THAT(Table("rows"), HasSubstr("| flow | failed |"));
+  EXPECT_THAT(Table("rows"), HasSubstr("| flow | baseline | failed |"));
   EXPECT_EQ(Run("rows", {}, 0), 0) << "nothing is run again";
   EXPECT_EQ(Run("rows", {.retry_failed = true}), 0);
   EXPECT_THAT(Table("rows"), Not(HasSubstr("failed")));
@@ -218,9 +220,10 @@ TEST(SuiteTableTest, SortsCellsAndFindsFrontierWithKnee) {
                                             PresetOf("quick"),
                                             PresetOf("poor"),
                                             PresetOf(kBoundPreset, "baseline", true)};
-  SuiteRow fast = RowOf("fern", "fast", 2.0, 10.0);
-  fast.metrics["delta_e00_chroma_bound"] = 1.0;
-  const auto scenes = SummarizeScenes({fast,
+  SuiteRow bound = RowOf("fern", kBoundPreset, 2.0, 12.0);
+  bound.metrics["delta_e00_chroma_bound"] = 1.0;
+  const auto scenes = SummarizeScenes({RowOf("fern", "fast", 2.0, 10.0),
+                                       bound,
                                        RowOf("fern", "slow", 1.9, 100.0),
                                        RowOf("fern", "quick", 6.0, 1.0),
                                        RowOf("fern", "poor", 7.0, 20.0)},
@@ -234,8 +237,10 @@ TEST(SuiteTableTest, SortsCellsAndFindsFrontierWithKnee) {
   EXPECT_EQ(scenes[0].gray, 10.0);
   const auto summaries = SummarizePresets(scenes, presets);
   EXPECT_EQ(summaries[0].preset.name, "bound");
-  EXPECT_NEAR(summaries[1].ratio_to_gray, 0.19, 1e-9);
-  EXPECT_EQ(summaries[1].mean_rank, 1.0);
+  EXPECT_NEAR(summaries[0].error_ratio, 0.5, 1e-9);
+  EXPECT_EQ(summaries[1].preset.name, "slow");
+  EXPECT_NEAR(summaries[1].error_ratio, 0.95, 1e-9);
+  EXPECT_NEAR(summaries[1].time_ratio, 10.0, 1e-9);
 }
 
 TEST(SuiteTableTest, IntervalCoversViewsAndSeeds) {
