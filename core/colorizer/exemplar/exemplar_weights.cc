@@ -2,10 +2,12 @@
 
 #include <cstddef>
 
+// NOLINTBEGIN(readability-identifier-naming)
 extern "C" {
 extern const char color3d_exemplar_weights_begin[];  // exemplar_weights.S
 extern const char color3d_exemplar_weights_end[];
 }
+// NOLINTEND(readability-identifier-naming)
 
 namespace color3d {
 
