@@ -90,14 +90,15 @@ bool IsWithinAThird(double expected, double measured) {
 }
 
 std::string MemoryCheckText(int64_t expected_bytes, int64_t measured_bytes) {
-  return fmt::format(
-      "expected a peak memory of {}, measured {}{}",
-      HumanBytes(expected_bytes),
-      HumanBytes(measured_bytes),
-      IsWithinAThird(static_cast<double>(expected_bytes), static_cast<double>(measured_bytes))
-          ? ""
-          : ": more than a third off (large photos need more while they are "
-            "decoded)");
+  std::string text = fmt::format("expected a peak memory of {}, measured {}",
+                                 HumanBytes(expected_bytes),
+                                 HumanBytes(measured_bytes));
+  if (!IsWithinAThird(static_cast<double>(expected_bytes), static_cast<double>(measured_bytes))) {
+    text += measured_bytes > expected_bytes
+                ? ": more than a third off (large photos need more while they are decoded)"
+                : ": more than a third off (the plan assumes the maximum number of Gaussians)";
+  }
+  return text;
 }
 
 std::string PlanCheckText(double expected_seconds, double measured_seconds) {
@@ -106,8 +107,8 @@ std::string PlanCheckText(double expected_seconds, double measured_seconds) {
                      HumanSeconds(measured_seconds),
                      IsWithinAThird(expected_seconds, measured_seconds)
                          ? ""
-                         : ": more than a third off (results of earlier equal jobs keep the "
-                           "seconds of their first run)");
+                         : ": more than a third off (this machine was faster or slower in "
+                           "the jobs that the plan knows)");
 }
 
 }  // namespace color3d::client
