@@ -127,6 +127,7 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
 
 // min_decoder_share is one of all pixels, but the decoder has none where colours are carried.
 ColorizerOptions ForOpenPixels(ColorizerOptions options, const StageContext& context) {
+  if (options.min_decoder_share == 0.0) return options;  // it is always trained
   const double open = 1.0 - ReadCarryFacts(context).coverage.value_or(0.0);
   options.min_decoder_share =
       open > options.min_decoder_share ? options.min_decoder_share / open : 1.0;

@@ -22,14 +22,20 @@ class PersonalizeStageTest : public AugmentationStageTest {
     ColorizerOptions options;
     options.iterations = 2;
     options.crop_px = options.max_side_px = 64;
+    options.min_decoder_share = min_decoder_share_;
     RunPersonalize(options, context, "", other_colorizer);
     return Output(artifact::kColorizer);
   }
   struct Warnings : NullObserver {
     void OnWarning(const std::string& message) override { text += message; }
+    void OnError(int64_t, const std::string& error_name, double) override {
+      trains |= error_name == "train_l1_ab";
+    }
     std::string text;
+    bool trains = false;
   };
   Warnings warnings_;
+  double min_decoder_share_ = ColorizerOptions().min_decoder_share;
 };
 
 TEST_F(PersonalizeStageTest, ReportsKeyViewWithoutColor) {
@@ -38,6 +44,15 @@ TEST_F(PersonalizeStageTest, ReportsKeyViewWithoutColor) {
   AddInput(artifact::kKeyColor, EncodeAbPng(Image(kWidth, kHeight, 2, 0.3f)));
   Personalize();
   EXPECT_THAT(warnings_.text, AllOf(HasSubstr("almost no colour"), HasSubstr("hints")));
+}
+
+TEST_F(PersonalizeStageTest, TrainsNoDecoderWhereKeyViewShowsAllUnlessAsked) {
+  AddInput(artifact::kCarryFacts, R"({"coverage": 1.0})");
+  Personalize();
+  EXPECT_FALSE(warnings_.trains);
+  min_decoder_share_ = 0.0;
+  Personalize();
+  EXPECT_TRUE(warnings_.trains);
 }
 
 TEST_F(PersonalizeStageTest, TakesColorizerOfOtherScene) {
