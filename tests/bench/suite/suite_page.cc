@@ -87,21 +87,28 @@ class Axes {
   double low_ = 1e9, high_ = -1e9, most_ = 1.0;
 };
 
+// Class of a table row.
+std::string StyleOf(const SuitePreset& preset) {
+  const std::string kind = KindOf(preset);
+  return kind == "oracle" || kind == "ours" ? kind : "";
+}
+
 std::string Row(const SuiteCell& cell, const std::string& mark) {
-  const std::string style = cell.preset.oracle           ? "oracle"
-                            : cell.preset.kind == "ours" ? "ours"
-                                                         : "";
+  const std::string interval = HasInterval(cell.error)
+                                   ? fmt::format(" <span class=\"soft\">{} to {}</span>",
+                                                 Number(cell.error.low, 2),
+                                                 Number(cell.error.high, 2))
+                                   : "";
   return fmt::format(
-      "<tr class=\"{}\"><td title=\"{}\">{}</td><td class=\"n\">{} <span class=\"soft\">{} to {}"
-      "</span></td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>"
+      "<tr class=\"{}\"><td title=\"{}\">{}</td><td class=\"n\">{}{}</td><td "
+      "class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>"
       "<td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>"
       "<td>{}</td></tr>\n",
-      style,
+      StyleOf(cell.preset),
       EscapeHtml(cell.preset.claim),
       EscapeHtml(cell.preset.name),
       Number(cell.error.mean, 2),
-      Number(cell.error.low, 2),
-      Number(cell.error.high, 2),
+      interval,
       Number(cell.Mean("delta_e00_chroma_2d"), 2),
       Number(cell.Mean("psnr_l"), 1),
       Number(cell.Mean("colorfulness_ratio"), 2),
@@ -123,12 +130,8 @@ std::string SceneSection(const SceneResults& scene) {
       "<th class=\"n\">ME, common</th><th class=\"n\">Gaussians</th><th class=\"n\">s</th>"
       "<th class=\"n\">seeds</th><th></th></tr>\n";
   for (size_t i = 0; i < scene.cells.size(); ++i) {
-    const auto at = std::find(scene.frontier.begin(), scene.frontier.end(), i);
-    std::string mark = scene.cells[i].preset.oracle ? "oracle" : "";
-    if (at != scene.frontier.end()) {
-      mark = at - scene.frontier.begin() == scene.knee ? "frontier, knee" : "frontier";
-    }
-    html += Row(scene.cells[i], mark);
+    const bool is_oracle = scene.cells[i].preset.oracle;
+    html += Row(scene.cells[i], is_oracle ? "oracle" : FrontierMark(scene, i));
   }
   for (const SuiteCell& cell : scene.failed) {
     html += fmt::format(
@@ -148,9 +151,7 @@ std::string Overview(const std::vector<PresetSummary>& presets) {
     html += fmt::format(
         "<tr class=\"{}\"><td>{}</td><td>{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td>"
         "<td class=\"n\">{}</td><td class=\"w\">{}</td></tr>\n",
-        p.preset.oracle           ? "oracle"
-        : p.preset.kind == "ours" ? "ours"
-                                  : "",
+        StyleOf(p.preset),
         EscapeHtml(p.preset.name),
         EscapeHtml(KindOf(p.preset)),
         p.scenes,

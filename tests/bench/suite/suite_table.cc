@@ -39,13 +39,12 @@ SuiteRow BoundOf(SuiteRow row) {
   return row;
 }
 
-// Mean and, of several values, interval.
 std::string WithInterval(const MeanWithInterval& error) {
-  return error.low == error.high ? Figure(error.mean, 2)
-                                 : fmt::format("{} ({} to {})",
-                                               Figure(error.mean, 2),
-                                               Figure(error.low, 2),
-                                               Figure(error.high, 2));
+  return HasInterval(error) ? fmt::format("{} ({} to {})",
+                                          Figure(error.mean, 2),
+                                          Figure(error.low, 2),
+                                          Figure(error.high, 2))
+                            : Figure(error.mean, 2);
 }
 
 void FindFrontier(SceneResults* results) {
@@ -98,17 +97,11 @@ std::string MarkdownOfScene(const SceneResults& results) {
   std::string text =
       fmt::format("\n## {}\n\nWithout colour: {}.\n\n", results.scene, Figure(results.gray, 2));
   text +=
-      "| preset | error (95 %) | photos | PSNR of L | colourfulness | ME, common | Gaussians | s | "
-      "seeds | "
-      "|\n"
-      "|---|--:|--:|--:|--:|--:|--:|--:|--:|---|\n";
+      "| preset | kind | error (95 %) | photos | PSNR of L | colourfulness | ME, common | "
+      "Gaussians | "
+      "s | seeds | |\n|---|---|--:|--:|--:|--:|--:|--:|--:|--:|---|\n";
   for (size_t i = 0; i < results.cells.size(); ++i) {
     const SuiteCell& cell = results.cells[i];
-    std::string mark;
-    const auto at = std::find(results.frontier.begin(), results.frontier.end(), i);
-    if (at != results.frontier.end()) {
-      mark = at - results.frontier.begin() == results.knee ? "frontier, knee" : "frontier";
-    }
     text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n",
                         cell.preset.name,
                         KindOf(cell.preset),
@@ -120,7 +113,7 @@ std::string MarkdownOfScene(const SceneResults& results) {
                         Figure(cell.Mean("gaussians"), 0),
                         Figure(cell.Mean("seconds_total"), 0),
                         cell.rows.size(),
-                        mark);
+                        FrontierMark(results, i));
   }
   for (const SuiteCell& cell : results.failed) {
     text += fmt::format("| {} | {} | failed | | | | | | | | {} |\n",
@@ -134,6 +127,14 @@ std::string MarkdownOfScene(const SceneResults& results) {
 }  // namespace
 
 std::string KindOf(const SuitePreset& preset) { return preset.oracle ? "oracle" : preset.kind; }
+
+std::string FrontierMark(const SceneResults& results, size_t cell) {
+  const auto at = std::find(results.frontier.begin(), results.frontier.end(), cell);
+  if (at == results.frontier.end()) return "";
+  return at - results.frontier.begin() == results.knee ? "frontier, knee" : "frontier";
+}
+
+bool HasInterval(const MeanWithInterval& error) { return error.low < error.high; }
 
 double SuiteCell::Mean(const std::string& metric) const {
   double sum = 0.0;

@@ -40,6 +40,11 @@ struct SceneResults {
   int knee = -1;
 };
 
+// "frontier", "frontier, knee" or "". `cell`: index of `results.cells`.
+std::string FrontierMark(const SceneResults& results, size_t cell);
+// False for the mean of a single value.
+bool HasInterval(const MeanWithInterval& error);
+
 // Scenes in the order of their first row.
 std::vector<SceneResults> SummarizeScenes(const std::vector<SuiteRow>& rows,
                                           const std::vector<SuitePreset>& presets);

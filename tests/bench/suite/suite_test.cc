@@ -1,9 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <set>
+#include <sstream>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
@@ -241,6 +243,30 @@ TEST(SuiteTableTest, SortsCellsAndFindsFrontierWithKnee) {
   EXPECT_EQ(summaries[1].preset.name, "slow");
   EXPECT_NEAR(summaries[1].error_ratio, 0.95, 1e-9);
   EXPECT_NEAR(summaries[1].time_ratio, 10.0, 1e-9);
+}
+
+// Number of cells of each line of the table that holds `text`.
+std::set<size_t> CellsOfTable(const std::string& markdown, const std::string& text) {
+  const size_t at = markdown.find(text);
+  std::istringstream lines(markdown.substr(markdown.rfind('\n', at) + 1));
+  std::set<size_t> cells;
+  for (std::string line; std::getline(lines, line) && line.starts_with('|');) {
+    cells.insert(static_cast<size_t>(std::ranges::count(line, '|')) - 1);
+  }
+  return cells;
+}
+
+TEST(SuiteTableTest, MarkdownRowsHaveTheCellsOfTheirHeader) {
+  const std::vector<SuitePreset> presets = {PresetOf("fast", "ours"), PresetOf("flow")};
+  SuiteRow failed = RowOf("fern", "flow", 2.0, 10.0);
+  failed.failure = "exit code 1";
+  const auto scenes = SummarizeScenes({RowOf("fern", "fast", 2.0, 10.0), failed}, presets);
+  const std::string markdown =
+      SuiteMarkdown(scenes, SummarizePresets(scenes, presets), TestClaims(scenes));
+  ASSERT_THAT(markdown, HasSubstr("failed"));
+  for (const char* header : {"| preset | kind | scenes", "PSNR of L", "| claim |"}) {
+    EXPECT_EQ(CellsOfTable(markdown, header).size(), 1u) << header;
+  }
 }
 
 TEST(SuiteTableTest, IntervalCoversViewsAndSeeds) {
