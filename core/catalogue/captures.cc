@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/base/error.h"
+#include "core/catalogue/kind_row.h"
 #include "core/catalogue/pose_files.h"
 #include "core/catalogue/scene_files.h"
 #include "core/catalogue/stages.h"
@@ -120,10 +121,7 @@ const std::vector<CaptureKindInfo>& CaptureKinds() {
 }
 
 const CaptureKindInfo& InfoOf(CaptureKind kind) {
-  for (const CaptureKindInfo& info : CaptureKinds()) {
-    if (info.kind == kind) return info;
-  }
-  throw Error(ErrorCode::kInternal, "there is no kind of capture {}", static_cast<int>(kind));
+  return RowOfKind(CaptureKinds(), kind, "properties");
 }
 
 CaptureKind KindOfName(std::string_view name) {

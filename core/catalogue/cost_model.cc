@@ -1,10 +1,9 @@
 #include "core/catalogue/cost_model.h"
 
 #include <algorithm>
-#include <iterator>
 
-#include "core/base/error.h"
 #include "core/catalogue/estimates.h"
+#include "core/catalogue/kind_row.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d {
@@ -49,13 +48,7 @@ constexpr double kSelectSecondsPerMegapixel = 0.33;  // 323 photographs in 20 s
 constexpr double kKeyColorSeconds = 0.3;
 constexpr double kExportSecondsPerGaussian = 7e-5;
 
-const KindCosts& CostsOf(CaptureKind kind) {
-  const auto* found = std::ranges::find(kKindCosts, kind, &KindCosts::kind);
-  if (found == std::end(kKindCosts)) {
-    throw Error(ErrorCode::kInternal, "no costs of the capture kind {}", static_cast<int>(kind));
-  }
-  return *found;
-}
+const KindCosts& CostsOf(CaptureKind kind) { return RowOfKind(kKindCosts, kind, "costs"); }
 
 double GeometrySeconds(const StageWork& work) {
   if (work.geometry_given) return 0.0;

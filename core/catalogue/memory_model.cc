@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "core/base/error.h"
+#include "core/catalogue/kind_row.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d {
@@ -57,13 +57,7 @@ constexpr KindMemory kKindMemory[] = {{CaptureKind::kStatic, false, 2560 * kMiB}
                                       {CaptureKind::kDynamic, true, 480 * kMiB},
                                       {CaptureKind::kRelief, true, 480 * kMiB}};
 
-const KindMemory& MemoryOf(CaptureKind kind) {
-  const auto* found = std::ranges::find(kKindMemory, kind, &KindMemory::kind);
-  if (found == std::end(kKindMemory)) {
-    throw Error(ErrorCode::kInternal, "no memory of the capture kind {}", static_cast<int>(kind));
-  }
-  return *found;
-}
+const KindMemory& MemoryOf(CaptureKind kind) { return RowOfKind(kKindMemory, kind, "memory"); }
 
 int64_t GeometryBytes(const StageWork& work) {
   const auto pixels = static_cast<int64_t>(1e6 * work.megapixels);
@@ -103,10 +97,8 @@ int64_t GeometryBytes(const GeometryMemory& m) {
 
 int64_t EstimatePeakBytes(std::string_view stage, const StageWork& work) {
   StageOf(stage);  // throws if it is unknown
-  if (stage == kind::kReconstructGeometry && !work.geometry_given) {
-    return kIdleWorkerBytes + GeometryBytes(work);
-  }
-  if (stage == kind::kSolveChroma && work.trains_jointly) {
+  if ((stage == kind::kReconstructGeometry && !work.geometry_given) ||
+      (stage == kind::kSolveChroma && work.trains_jointly)) {
     return kIdleWorkerBytes + GeometryBytes(work);
   }
   const auto* found =

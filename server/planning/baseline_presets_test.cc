@@ -23,7 +23,7 @@ const fs::path kFolder = fs::path(COLOR3D_SOURCE_DIR) / "tests/bench/baselines";
 std::map<std::string, std::string> FilesOfTable() {
   const std::string table = ReadFile(kFolder / "README.md");
   const std::regex row(
-      "\\n\\| ([a-z0-9_]+) \\| ((?:[a-z0-9_]+.textproto|-)[^|]*) \\| "
+      "\\n\\| ([a-z0-9_]+) \\| ((?:[a-z0-9_]+\\.textproto|-)(?: --[^|]+)?) \\| "
       "(ours|baseline|paper|ablation) \\| (yes|no) \\| [^|]+ \\|(?=\\n)");
   std::map<std::string, std::string> files;
   for (std::sregex_iterator it(table.begin(), table.end(), row), end; it != end; ++it) {
