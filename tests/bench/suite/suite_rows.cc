@@ -106,6 +106,17 @@ void AppendRow(const fs::path& jsonl, const SuiteRow& row) {
   }
 }
 
+void AddMissingRows(const fs::path& jsonl, const std::vector<SuiteRow>& rows) {
+  const std::vector<SuiteRow> present = ReadRows(jsonl);
+  for (const SuiteRow& row : rows) {
+    if (std::none_of(present.begin(), present.end(), [&](const SuiteRow& other) {
+          return KeyOf(other) == KeyOf(row);
+        })) {
+      AppendRow(jsonl, row);
+    }
+  }
+}
+
 std::vector<SuiteRow> NewestRows(const std::vector<SuiteRow>& rows) {
   const auto same_run = [](const SuiteRow& x, const SuiteRow& y) {
     return x.scene == y.scene && x.preset == y.preset && x.seed == y.seed;
