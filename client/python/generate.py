@@ -117,7 +117,10 @@ def generate(package):
 
 def make_tarball(out):
     """Writes the source tarball and returns its path."""
-    from setuptools import build_meta  # pylint: disable=import-outside-toplevel
+    try:
+        from setuptools import build_meta  # pylint: disable=import-outside-toplevel
+    except ImportError:
+        sys.exit("generate: install Debian's python3-setuptools")
 
     out = os.path.abspath(out)
     os.makedirs(out, exist_ok=True)

@@ -1,5 +1,6 @@
 """Real servers, a proxy that cuts connections and the installed package, for client_test.py."""
 
+import atexit
 import contextlib
 import os
 import shutil
@@ -33,6 +34,7 @@ for program in ("protoc", "grpc_python_plugin"):
         sys.exit(77)
 
 SCRATCH = Path(tempfile.mkdtemp(prefix="color3d-python-"))
+atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
 VENV = SCRATCH / "venv"
 PYTHON = VENV / "bin" / "python"
 ROOM, TRUTH = SCRATCH / "room", SCRATCH / "room" / "truth"
@@ -72,7 +74,16 @@ class Server:
         self.folder.mkdir(exist_ok=True)
         port_file = self.folder / "address"
         port_file.unlink(missing_ok=True)
-        command = [BIN / "color3d-server", "serve", "--listen", self.address, "--workers", "1"]
+        # It ends with this test, even if that is killed.
+        command = [
+            *"setpriv --pdeathsig TERM".split(),
+            BIN / "color3d-server",
+            "serve",
+            "--listen",
+            self.address,
+            "--workers",
+            "1",
+        ]
         command += ["--threads", "2", "--port-file", port_file, "--data-dir", self.folder / "data"]
         command += [*RECOVERY.split(), *self.flags]
         with open(self.folder / "log", "ab") as log:

@@ -12,8 +12,11 @@ import os
 import subprocess
 import sys
 
-import yaml
-from google.protobuf import descriptor_pb2
+try:
+    import yaml
+    from google.protobuf import descriptor_pb2
+except ImportError as missing:
+    sys.exit(f"make_descriptors: {missing}; install python3-protobuf and python3-yaml")
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROTOS = [

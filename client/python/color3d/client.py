@@ -35,6 +35,15 @@ _FINISHED = frozenset(
     getattr(job_pb2.Job, "STATE_" + name)
     for name in ("SUCCEEDED", "FAILED", "CANCELLED", "SKIPPED")
 )
+# Codes of errors that a repetition does not mend.
+_WRONG_INPUT = frozenset(
+    code.value[0]
+    for code in (
+        grpc.StatusCode.INVALID_ARGUMENT,
+        grpc.StatusCode.FAILED_PRECONDITION,
+        grpc.StatusCode.NOT_FOUND,
+    )
+)
 
 
 class Client:
@@ -366,7 +375,9 @@ class Client:
         state = job_pb2.Job.State.Name(blamed.state)
         reason = blamed.error.message or blamed.skip_reason or f"it is {state}"
         message = f"the stage {blamed.kind} failed ({blamed.name}): {reason}"
-        raise JobFailedError(f"{message}; {again} from its last checkpoint", job, blamed)
+        if blamed.error.code not in _WRONG_INPUT:
+            message += f"; {again} from its last checkpoint"
+        raise JobFailedError(message, job, blamed)
 
     # Results.
 
