@@ -1,5 +1,6 @@
 // color3d-bench suite: scenes x presets x seeds through the real client and a private server, which
 // never sees a colour of held-out views. Resumable. Writes a table, a page and all rows.
+#include <algorithm>
 #include <cstdio>
 #include <set>
 
@@ -76,10 +77,15 @@ void RunSuite(const SuiteArguments& args) {
     std::fprintf(stderr, "%s: not in %s, left out\n", name.c_str(), args.data.c_str());
   }
   const std::vector<SuitePreset> table = ReadPresetTable(args.table);
-  const std::vector<SuiteTask> tasks = PlanSuite(SelectScenes(scenes, args.scenes),
-                                                 SelectPresets(table, args.presets),
-                                                 args.seeds,
-                                                 {scenes.found, table});
+  const std::vector<SuitePreset> presets = SelectPresets(table, args.presets);
+  const std::vector<SuiteTask> tasks =
+      PlanSuite(SelectScenes(scenes, args.scenes), presets, args.seeds, {scenes.found, table});
+  for (const SuitePreset& preset : presets) {
+    if (std::ranges::find(tasks, preset.name, [](const SuiteTask& t) { return t.preset.name; }) ==
+        tasks.end()) {
+      std::fprintf(stderr, "%s: there is no scene for it here, left out\n", preset.name.c_str());
+    }
+  }
   if (tasks.empty()) {
     throw InvalidArgument(
         "there is nothing to run: no scene of {} is in {}", args.manifest, args.data);

@@ -111,18 +111,11 @@ ExplainFacts FactsOf(const ExplainArguments& args,
 fs::path RunStages(const ExplainArguments& args) {
   const fs::path folder = fs::path(args.out_folder) / "run";
   LocalPipeline pipeline(
-      args.scene_folder,
-      folder,
-      args.threads,
-      static_cast<uint64_t>(args.options.seed),
-      [](const std::string& text) { std::fprintf(stderr, "%s\n", text.c_str()); });
+      args.scene_folder, folder, args.threads, args.options.seed, [](const std::string& text) {
+        std::fprintf(stderr, "%s\n", text.c_str());
+      });
   pipeline.ImportScene();
-  pipeline.Run(kind::kSelectKeyView, [&](StageContext& c) {
-    SelectKeyViewOptions selection;
-    selection.view = args.key_view;
-    if (!args.key_view.empty()) selection.selection.strategy = KeyViewStrategy::kManual;
-    RunSelectKeyView(selection, c);
-  });
+  pipeline.SelectKeyView(args.key_view);
   pipeline.Run(kind::kReconstructGeometry, [&](StageContext& c) {
     GeometryOptions geometry;
     geometry.iterations = kGeometryIterations;

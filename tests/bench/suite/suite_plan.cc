@@ -66,17 +66,6 @@ std::pair<std::string, std::string> SceneAndPresetOfColorizer(const SuitePreset&
   return {};
 }
 
-template <class T>
-const T& FindSource(const std::vector<T>& all, const std::string& name, const SuitePreset& user) {
-  const auto found =
-      std::find_if(all.begin(), all.end(), [&](const T& element) { return element.name == name; });
-  if (found == all.end()) {
-    throw InvalidArgument(
-        "{} takes a colorizer of {}, which this machine does not have", user.name, name);
-  }
-  return *found;
-}
-
 SuiteTask TaskOf(const SuiteScene& scene, const SuitePreset& preset, uint64_t seed) {
   SuiteTask task{scene, preset, seed, {}};
   nlohmann::json facts = {scene.name, scene.key_view, scene.arguments, preset.name};
@@ -169,8 +158,8 @@ SuiteScenes ReadManifest(const fs::path& json, const fs::path& data) {
   return scenes;
 }
 
-fs::path ResultsFolder(const std::string& scene, const std::string& preset, uint64_t seed) {
-  return fs::path(scene) / preset / std::to_string(seed);
+fs::path SuiteTask::Results() const {
+  return fs::path(scene.name) / preset.name / std::to_string(seed);
 }
 
 fs::path SuiteTask::ColorizerFile() const { return colorizer_of->Results() / artifact::kColorizer; }
@@ -209,12 +198,16 @@ std::vector<SuiteTask> PlanSuite(const std::vector<SuiteScene>& scenes,
       for (const SuitePreset& preset : presets) {
         SuiteTask task = TaskOf(scene, preset, static_cast<uint64_t>(seed));
         const auto [other_scene, other_preset] = SceneAndPresetOfColorizer(preset);
-        if (other_scene == scene.name) continue;
         if (!other_scene.empty()) {
-          task.colorizer_of = std::make_shared<const SuiteTask>(
-              TaskOf(FindSource(sources.scenes, other_scene, preset),
-                     FindSource(sources.presets, other_preset, preset),
-                     task.seed));
+          const auto source = std::ranges::find(sources.scenes, other_scene, &SuiteScene::name);
+          if (other_scene == scene.name || source == sources.scenes.end()) continue;
+          const auto taken = std::ranges::find(sources.presets, other_preset, &SuitePreset::name);
+          if (taken == sources.presets.end()) {
+            throw InvalidArgument("{} takes a colorizer of {}, which this machine does not have",
+                                  preset.name,
+                                  other_preset);
+          }
+          task.colorizer_of = std::make_shared<const SuiteTask>(TaskOf(*source, *taken, task.seed));
         }
         tasks.push_back(std::move(task));
       }

@@ -27,11 +27,6 @@ inline constexpr char kDefaultPreset[] = "fast";
 // kDefaultPreset with `--bound`; its figure is the error of the bound.
 inline constexpr char kBoundPreset[] = "bound";
 
-// Folder of the results of a run, relative to the folder of the suite.
-std::filesystem::path ResultsFolder(const std::string& scene,
-                                    const std::string& preset,
-                                    uint64_t seed);
-
 // Reads the rows of a Markdown table "| name | file | kind | oracle | claim |"; options of `color3d
 // colorize` may follow the file, as in "paper.textproto --keys 2". Throws
 // Error{kInvalidArgument} with the line if one cannot be read or a file is missing.
@@ -65,7 +60,8 @@ struct SuiteTask {
   // Arguments of `color3d`, with results in a folder of `suite`, the folder of the suite. A preset
   // with select_key_view or `--keys` chooses the key view itself.
   std::vector<std::string> Arguments(const std::filesystem::path& suite) const;
-  std::filesystem::path Results() const { return ResultsFolder(scene.name, preset.name, seed); }
+  // Folder of its results, relative to the folder of the suite.
+  std::filesystem::path Results() const;
   // Where colorizer_of has the file, relative to the folder of the suite.
   std::filesystem::path ColorizerFile() const;
 };
@@ -77,8 +73,8 @@ struct ColorizerSources {
 };
 
 // Seed by seed, so that an interrupted suite has whole rows first. A preset with the colorizer of
-// another run is left out for the scene of that run. Throws Error{kInvalidArgument} if that run is
-// not among `sources`.
+// another run is left out for the scene of that run, and for all if that scene is not among
+// `sources`. Throws Error{kInvalidArgument} if the preset of that run is not.
 std::vector<SuiteTask> PlanSuite(const std::vector<SuiteScene>& scenes,
                                  const std::vector<SuitePreset>& presets,
                                  int seeds,

@@ -142,6 +142,7 @@ TEST_F(SuitePlanTest, ColorizerOfAnotherRunIsItsFile) {
                 PlanSuite(scenes, {transfer}, 1, {scenes, {}});
               }),
               HasSubstr("transfer takes a colorizer of fast, which this machine does not have"));
+  EXPECT_TRUE(PlanSuite(scenes, {transfer}, 1, {{scenes[0]}, {}}).empty()) << "fox is not here";
 }
 
 TEST_F(SuitePlanTest, RowsSurviveHalfLine) {
@@ -225,6 +226,10 @@ TEST_F(RunTasksTest, GoesOnFromRowsOfAnotherMachine) {
   AddMissingRows(folder_.path() / "second", RowsFromCsv(csv));
   AddMissingRows(folder_.path() / "second", RowsFromCsv(csv));
   EXPECT_EQ(ReadRows(folder_.path() / "second").size(), 5u);
+  SuiteRow of_other_options = ReadRows(folder_.path() / "first").front();
+  of_other_options.options_digest = "other";
+  AddMissingRows(folder_.path() / "second", {of_other_options});
+  EXPECT_EQ(ReadRows(folder_.path() / "second").size(), 5u) << "the row that is there counts";
   EXPECT_EQ(Run("second", {}, static_cast<int>(tasks_.size()) - 5), 0) << "runs only what is open";
   EXPECT_EQ(Table("second"), Table("whole"));
 }
