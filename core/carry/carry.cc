@@ -231,4 +231,16 @@ double Coverage(const CarriedColor& color, float least) {
   return static_cast<double>(covered) / static_cast<double>(color.confidence.data.size());
 }
 
+void Agreement::Add(const CarriedColor& color) {
+  for (float value : color.confidence.data) {
+    if (!(value > static_cast<float>(kMinMatchProbability))) continue;
+    confidence_sum += value;
+    ++pixels;
+  }
+}
+
+double Agreement::Mean() const {
+  return pixels > 0 ? confidence_sum / static_cast<double>(pixels) : 1.0;
+}
+
 }  // namespace color3d

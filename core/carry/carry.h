@@ -3,6 +3,8 @@
 // luminance decide whether the source sees the same surface. Pure functions, thread-safe.
 #pragma once
 
+#include <cstdint>
+
 #include "core/base/image.h"
 #include "core/scene/camera.h"
 
@@ -54,5 +56,15 @@ void KeepMoreConfident(const CarriedColor& other, CarriedColor* color);
 void FillFrom(const CarriedColor& other, CarriedColor* color);
 // Share of the pixels whose confidence is above `least`, 0..1.
 double Coverage(const CarriedColor& color, float least);
+
+// How well depth and luminance of the views agree where they show the same surfaces. It is low when
+// the geometry or the poses are wrong, or when surfaces look different from each side.
+struct Agreement {
+  double confidence_sum = 0.0;  // over the pixels with carried colours
+  int64_t pixels = 0;
+  void Add(const CarriedColor& color);
+  // Mean match probability, 0..1; 1 without pixels.
+  double Mean() const;
+};
 
 }  // namespace color3d

@@ -12,6 +12,7 @@ void CarryColorOptions::Validate() const {
   const RangeCheck check("carry option");
   check("depth_side_px", depth_side_px, 64, 2048);
   check("depth_sources", depth_sources, 0, kMaxSweepSources);
+  check("min_agreement", min_agreement, 0.0, 1.0);
   if (additional_key_views.size() > size_t{kMaxAdditionalKeyViews}) {
     throw InvalidArgument("{} additional key views were given; at most {} are taken",
                           additional_key_views.size(),

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -15,6 +16,7 @@
 namespace color3d {
 namespace {
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr int kWidth = 128, kHeight = 96;
 constexpr double kFocal = 110.0, kDepth = 4.0;
@@ -24,6 +26,8 @@ LabColor Wall(double x, double y) {
                    8.0 * std::sin(17.0 * x) * std::cos(13.0 * y);
   return {l, 35.0 * std::sin(0.8 * x), 20.0 * std::cos(0.7 * y)};
 }
+
+float MaxOf(const Image& image) { return *std::ranges::max_element(image.data); }
 
 class CarryStageTest : public StageTest {
  protected:
@@ -119,6 +123,25 @@ TEST_F(CarryStageTest, CarriesKeyViewIntoEveryView) {
   }
   EXPECT_EQ(facts["key_views"], nlohmann::json({"p1.png"}));
   EXPECT_EQ(observer_.text, "");
+}
+
+TEST_F(CarryStageTest, CarriesNothingIfViewsAgreeTooLittle) {
+  Run();
+  Agreement agreement;
+  for (const int other : {0, 2, 3, 4})
+    agreement.Add({Carried(other).ab, Carried(other).confidence});
+  EXPECT_GT(agreement.Mean(), 0.8) << "the geometry is right";
+  options_.min_agreement = agreement.Mean() - 1e-4;
+  EXPECT_GT(Run()["coverage"], 0.4);
+  EXPECT_EQ(observer_.text, "");
+  options_.min_agreement = agreement.Mean() + 1e-4;
+  const nlohmann::json facts = Run();
+  EXPECT_EQ(facts["coverage"], 0.0);
+  EXPECT_EQ(facts["views"][1]["coverage"], 1.0) << "the key view";
+  for (const int other : {0, 2, 3, 4}) EXPECT_EQ(MaxOf(Carried(other).confidence), 0.0f) << other;
+  EXPECT_EQ(MaxOf(Carried(1).confidence), 1.0f);
+  EXPECT_THAT(observer_.text, HasSubstr("the photos agree by only"));
+  EXPECT_THAT(observer_.text, Not(HasSubstr("the key view shows only")));
 }
 
 TEST_F(CarryStageTest, CarriesStaticFilmLikePhotos) {

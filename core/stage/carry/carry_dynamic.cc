@@ -35,7 +35,7 @@ void CarryDynamic(const CarryInputs& inputs, StageContext& context) {
     FillFrom(CarryFromAll(keys, target, options.carry), &color);
     return color;
   };
-  CarryIntoViews(inputs, keys, carry, context);
+  CarryIntoViews(inputs, keys, carry, /*min_agreement=*/0.0, context);
 }
 
 }  // namespace color3d

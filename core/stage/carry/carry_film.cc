@@ -113,7 +113,7 @@ void CarryFilm(const CarryInputs& inputs, StageContext& context) {
     const auto key = returning->KeyAt(middles[i]);
     if (key) carry({*key});
   }
-  WriteCoverage(inputs, done.coverage(), context);
+  WarnOfSmallCoverage(WriteCoverage(inputs, done.coverage(), context), context);
 }
 
 }  // namespace color3d

@@ -29,9 +29,9 @@ double MeanCoverage(const std::vector<double>& coverage, const std::vector<int>&
 
 double CoveredShare(const CarriedColor& color) { return Coverage(color, kCoveredConfidence); }
 
-void WriteCoverage(const CarryInputs& inputs,
-                   const std::vector<double>& coverage,
-                   StageContext& context) {
+double WriteCoverage(const CarryInputs& inputs,
+                     const std::vector<double>& coverage,
+                     StageContext& context) {
   const std::vector<View>& views = inputs.scene.views;
   CarryFacts facts;
   for (const int view : inputs.key_views) facts.key_views.push_back(views[view].name);
@@ -39,13 +39,16 @@ void WriteCoverage(const CarryInputs& inputs,
   facts.coverage = mean;
   for (size_t i = 0; i < coverage.size(); ++i) facts.view_coverage[views[i].name] = coverage[i];
   context.progress().OnError(0, kCoverageCurve, mean);
-  if (mean < kSmallCoverage) {
-    context.Warn(
-        "the key view shows only {:.1f} % of what the other views show; their colours "
-        "are inferred from similarity. Colour a second key view, or choose another one",
-        100.0 * mean);
-  }
   WriteCarryFacts(facts, context);
+  return mean;
+}
+
+void WarnOfSmallCoverage(double mean, StageContext& context) {
+  if (mean >= kSmallCoverage) return;
+  context.Warn(
+      "the key view shows only {:.1f} % of what the other views show; their colours "
+      "are inferred from similarity. Colour a second key view, or choose another one",
+      100.0 * mean);
 }
 
 }  // namespace color3d

@@ -19,7 +19,9 @@ void CarryStatic(const CarryInputs& inputs, StageContext& context) {
   const auto carry = [&](int view) {
     return CarryFromAll(keys, surfaces.Of(view), inputs.options.carry);
   };
-  CarryIntoViews(inputs, keys, carry, context);
+  // The edited share of an edit has no other source.
+  const bool is_edit = keys.front().color.ab.channels > 2;
+  CarryIntoViews(inputs, keys, carry, is_edit ? 0.0 : inputs.options.min_agreement, context);
 }
 
 }  // namespace color3d

@@ -31,6 +31,34 @@ void AddChannel(const Image& plane, Image* image) {
   image->data.insert(image->data.end(), plane.data.begin(), plane.data.end());
 }
 
+bool IsKeyView(const CarryInputs& inputs, int view) {
+  return std::ranges::find(inputs.key_views, view) != inputs.key_views.end();
+}
+
+double MeasureAgreement(const CarryInputs& inputs,
+                        const CarryCheckpoint& done,
+                        StageContext& context) {
+  Agreement agreement;
+  for (int view = 0; view < static_cast<int>(inputs.scene.views.size()); ++view) {
+    context.ThrowIfCancelled();
+    if (IsKeyView(inputs, view)) continue;
+    AbMap map = DecodeAbPng(done.Png(view), inputs.scene.views[view].name);
+    agreement.Add({std::move(map.ab), std::move(map.confidence)});
+  }
+  return agreement.Mean();
+}
+
+void RemoveCarried(const CarryInputs& inputs, CarryCheckpoint& done, StageContext& context) {
+  for (int view = 0; view < static_cast<int>(inputs.scene.views.size()); ++view) {
+    context.ThrowIfCancelled();
+    if (IsKeyView(inputs, view)) continue;
+    const std::string& name = inputs.scene.views[view].name;
+    const Image old = DecodeAbPng(done.Png(view), name).confidence;
+    done.Replace(
+        view, 0.0, EncodeAbPng(Image(old.width, old.height, 2), Image(old.width, old.height, 1)));
+  }
+}
+
 }  // namespace
 
 SceneSurfaces::SceneSurfaces(const CarryInputs& inputs, int64_t cache_bytes, StageContext& context)
@@ -78,6 +106,7 @@ std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
 void CarryIntoViews(const CarryInputs& inputs,
                     const std::vector<ColoredKeyView>& keys,
                     const std::function<CarriedColor(int view)>& carry,
+                    double min_agreement,
                     StageContext& context) {
   CarryCheckpoint done(inputs.scene, context);
   const std::vector<int> order = inputs.scene.ViewsInOrderOfTime();
@@ -90,6 +119,18 @@ void CarryIntoViews(const CarryInputs& inputs,
     const CarriedColor color = is_key ? key->color : carry(view);
     done.Add(view, is_key ? 1.0 : CoveredShare(color), EncodeCarriedPng(color));
   });
+  const double agreement = min_agreement > 0.0 ? MeasureAgreement(inputs, done, context) : 1.0;
+  if (agreement >= min_agreement) {
+    WarnOfSmallCoverage(WriteCoverage(inputs, done.coverage(), context), context);
+    return;
+  }
+  context.Warn(
+      "the photos agree by only {:.2f} (at least {:.2f} is needed) where they show the same "
+      "surfaces, so that the key view's colours are not carried but inferred from similarity. "
+      "Causes: wrong camera positions, moving things, shiny surfaces",
+      agreement,
+      min_agreement);
+  RemoveCarried(inputs, done, context);
   WriteCoverage(inputs, done.coverage(), context);
 }
 

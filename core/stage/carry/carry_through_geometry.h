@@ -35,10 +35,13 @@ std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
                                                 bool edits = false);
 
 // Writes the colours of all views: those of key views as they are, of other ones as `carry` gives
-// them. `carry` is called from several threads, for views of one time after each other.
+// them. `carry` is called from several threads, for views of one time after each other. If the
+// views agree less than `min_agreement` (Agreement::Mean), the user is warned and only key views
+// keep their colours.
 void CarryIntoViews(const CarryInputs& inputs,
                     const std::vector<ColoredKeyView>& keys,
                     const std::function<CarriedColor(int view)>& carry,
+                    double min_agreement,
                     StageContext& context);
 
 }  // namespace color3d
