@@ -64,7 +64,17 @@ std::string ViewErrorsToCell(const std::map<std::string, double>& errors) {
   return json.dump();
 }
 
+// Reads a line without its end, "\n" or "\r\n"; returns false if there is none.
+bool ReadLine(std::istream& stream, std::string* line) {
+  if (!std::getline(stream, *line)) return false;
+  if (line->ends_with('\r')) line->pop_back();
+  return true;
+}
+
 SuiteRow RowFromCells(const std::map<std::string, std::string>& cells) {
+  for (const char* column : {"scene", "preset", "seed", "options", "view_errors"}) {
+    if (!cells.contains(column)) throw InvalidArgument("the column {} is missing", column);
+  }
   SuiteRow row;
   row.scene = cells.at("scene");
   row.preset = cells.at("preset");
@@ -110,10 +120,10 @@ std::string RowsToCsv(const std::vector<SuiteRow>& rows) {
 std::vector<SuiteRow> RowsFromCsv(const std::string& csv) {
   std::istringstream stream(csv);
   std::string line;
-  std::getline(stream, line);
+  ReadLine(stream, &line);
   const std::vector<std::string> columns = CsvCells(line);
   std::vector<SuiteRow> rows;
-  for (int number = 2; std::getline(stream, line); ++number) {
+  for (int number = 2; ReadLine(stream, &line); ++number) {
     const std::vector<std::string> values = CsvCells(line);
     std::map<std::string, std::string> cells;
     for (size_t i = 0; i < std::min(columns.size(), values.size()); ++i) {

@@ -370,7 +370,11 @@ TEST(SuiteCsvTest, KeepsAllThatTheTablesNeed) {
 TEST(SuiteCsvTest, NamesLineThatIsNoRow) {
   const std::string csv = RowsToCsv({RowOf("fern", "fast", 2.0, 10.0)});
   EXPECT_THAT(MessageOf([&] { RowsFromCsv(csv + "fern,flow,two\n"); }), HasSubstr("line 3 is not"));
-  EXPECT_THAT(MessageOf([&] { RowsFromCsv("a,b\n1,2\n"); }), HasSubstr("line 2 is not"));
+  EXPECT_THAT(MessageOf([&] { RowsFromCsv("a,b\n1,2\n"); }),
+              HasSubstr("line 2 is not a row of a suite: the column scene is missing"));
+  std::string of_spreadsheet;
+  for (const char c : csv) of_spreadsheet += c == '\n' ? "\r\n" : std::string(1, c);
+  EXPECT_EQ(RowsToCsv(RowsFromCsv(of_spreadsheet)), csv);
 }
 
 TEST(SuitePageTest, IsSmallSelfContainedAndEscaped) {
