@@ -19,7 +19,8 @@ packages=(
 case "${1:-}" in
   "") ;;
   --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus systemd
-    python3-grpcio python3-protobuf python3-numpy python3-pil) ;;
+    python3-grpcio python3-protobuf python3-numpy python3-pil
+    python3-venv python3-setuptools python3-wheel mypy python3-yaml) ;;
   --fuzz) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang libclang-rt-dev) ;;
   *) echo "install-deps: unknown option $1; use --tests or --fuzz" >&2; exit 2 ;;
 esac

@@ -12,7 +12,7 @@ cd "$(dirname "$0")/.."
 
 other_flags='--build --install --prefix --preset --target --test-dir --output-on-failure --gtest_filter
   --plugin --python_out --grpc_python_out --ignore-scripts'
-other_names='add_secure_port'
+other_names='add_secure_port transport_socket per_connection_buffer_limit_bytes'
 
 lists=$(mktemp -d)
 trap 'rm -rf "$lists"' EXIT

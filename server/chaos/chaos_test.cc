@@ -99,7 +99,7 @@ TEST(ChaosTest, EffectsAreDoubledWithoutFence) {
   const ScratchFolder scratch;
   ChaosService service(scratch.path(), {}, COLOR3D_UNFENCED_SERVER);
   const Budget budget{40, 12, {Fault::kWorkerFrozen}};
-  EXPECT_THAT(Endure(service, budget), Contains(HasSubstr("effects that are there twice")));
+  EXPECT_THAT(Endure(service, budget), Contains(HasSubstr("effects that occur twice")));
 }
 
 }  // namespace

@@ -87,12 +87,7 @@ void RunPipeline(const PipelineArguments& args) {
     if (!TakeEarlier(args, kind, &pipeline)) pipeline.Run(kind, stage);
   };
   if (!TakeEarlier(args, kind::kImportScene, &pipeline)) pipeline.ImportScene();
-  run(kind::kSelectKeyView, [&](StageContext& c) {
-    SelectKeyViewOptions options;
-    options.view = args.key_view;
-    if (!args.key_view.empty()) options.selection.strategy = KeyViewStrategy::kManual;
-    RunSelectKeyView(options, c);
-  });
+  if (!TakeEarlier(args, kind::kSelectKeyView, &pipeline)) pipeline.SelectKeyView(args.key_view);
   const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
   run(kind::kColorizeKeyView, [&](StageContext& c) {
     ColorizeKeyViewOptions options;

@@ -1,11 +1,13 @@
 // color3d-bench suite: scenes x presets x seeds through the real client and a private server, which
 // never sees a colour of held-out views. Resumable. Writes a table, a page and all rows.
+#include <algorithm>
 #include <cstdio>
 #include <set>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "tests/bench/commands.h"
+#include "tests/bench/suite/suite_csv.h"
 #include "tests/bench/suite/suite_page.h"
 #include "tests/bench/suite/suite_plan.h"
 #include "tests/bench/suite/suite_rows.h"
@@ -18,28 +20,33 @@ namespace {
 namespace fs = std::filesystem;
 
 struct SuiteArguments {
-  std::string manifest, data, table, out, commit;
+  std::string manifest, data, table, out, commit, earlier;
   std::vector<std::string> scenes, presets, server_options;
   int seeds = 1;
   SuiteLimits limits;
-  bool table_only = false;
+  bool table_only = false, untimed = false;
 };
 
-// Adds commit and machine to every row.
+// Adds commit and machine to every row, and takes seconds away if `untimed`.
 class LabelledRunner : public TaskRunner {
  public:
-  LabelledRunner(std::unique_ptr<TaskRunner> runner, std::string commit)
-      : runner_(std::move(runner)), commit_(std::move(commit)), machine_(MachineName()) {}
+  LabelledRunner(std::unique_ptr<TaskRunner> runner, std::string commit, bool untimed)
+      : runner_(std::move(runner)),
+        commit_(std::move(commit)),
+        machine_(MachineName()),
+        untimed_(untimed) {}
   SuiteRow Run(const SuiteTask& task, double limit_seconds) override {
     SuiteRow row = runner_->Run(task, limit_seconds);
     row.commit = commit_;
     row.machine = machine_;
+    if (untimed_) row.metrics.erase("seconds_total");
     return row;
   }
 
  private:
   std::unique_ptr<TaskRunner> runner_;
-  std::string commit_, machine_;
+  const std::string commit_, machine_;
+  const bool untimed_;
 };
 
 void WriteTables(const SuiteArguments& args,
@@ -58,7 +65,7 @@ void WriteTables(const SuiteArguments& args,
   for (const std::string& machine : machines) note += "; " + machine;
   for (const std::string& commit : commits) note += "; commit " + commit;
   const std::string markdown = SuiteMarkdown(scenes, summaries, claims);
-  WriteFileAtomic(out / "results.csv", SuiteCsv(rows));
+  WriteFileAtomic(out / "results.csv", RowsToCsv(rows));
   WriteFileAtomic(out / "table.md", note + ".\n\n" + markdown);
   WriteFileAtomic(out / "index.html", SuitePage(scenes, summaries, claims, note + "."));
   std::printf("%s", markdown.c_str());
@@ -70,14 +77,22 @@ void RunSuite(const SuiteArguments& args) {
     std::fprintf(stderr, "%s: not in %s, left out\n", name.c_str(), args.data.c_str());
   }
   const std::vector<SuitePreset> table = ReadPresetTable(args.table);
+  const std::vector<SuitePreset> presets = SelectPresets(table, args.presets);
   const std::vector<SuiteTask> tasks =
-      PlanSuite(SelectScenes(scenes, args.scenes), SelectPresets(table, args.presets), args.seeds);
+      PlanSuite(SelectScenes(scenes, args.scenes), presets, args.seeds, {scenes.found, table});
+  for (const SuitePreset& preset : presets) {
+    if (std::ranges::find(tasks, preset.name, [](const SuiteTask& t) { return t.preset.name; }) ==
+        tasks.end()) {
+      std::fprintf(stderr, "%s: there is no scene for it here, left out\n", preset.name.c_str());
+    }
+  }
   if (tasks.empty()) {
     throw InvalidArgument(
         "there is nothing to run: no scene of {} is in {}", args.manifest, args.data);
   }
   fs::create_directories(args.out);
   const fs::path jsonl = fs::path(args.out) / "results.jsonl";
+  if (!args.earlier.empty()) AddMissingRows(jsonl, RowsFromCsv(ReadFile(args.earlier)));
   int left = 0;
   if (!args.table_only) {
     const CancellationToken never;
@@ -85,7 +100,8 @@ void RunSuite(const SuiteArguments& args) {
       const fs::path programs = fs::read_symlink("/proc/self/exe").parent_path();
       return std::make_unique<LabelledRunner>(
           std::make_unique<ClientRunner>(programs, args.out, args.server_options, never),
-          args.commit);
+          args.commit,
+          args.untimed);
     });
   }
   WriteTables(args, NewestRows(ReadRows(jsonl)), table);
@@ -134,6 +150,14 @@ void AddSuiteCommand(CLI::App& app) {
   command->add_option(
       "--server", args->server_options, "Further options of `color3d-server serve`, e.g. --model");
   command->add_option("--commit", args->commit, "Commit that the rows state");
+  command
+      ->add_option("--earlier",
+                   args->earlier,
+                   "results.csv of an earlier suite; its runs are not repeated, its rows are kept")
+      ->check(CLI::ExistingFile);
+  command->add_flag("--untimed",
+                    args->untimed,
+                    "Leave seconds out of the new rows: other programs run beside them");
   command->add_flag("--table-only", args->table_only, "Only write the tables of existing rows");
   command->callback([args] { RunSuite(*args); });
 }

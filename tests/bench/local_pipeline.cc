@@ -60,6 +60,15 @@ void LocalPipeline::ImportScene() {
   });
 }
 
+void LocalPipeline::SelectKeyView(const std::string& view) {
+  Run(kind::kSelectKeyView, [&](StageContext& context) {
+    SelectKeyViewOptions options;
+    options.view = view;
+    if (!view.empty()) options.selection.strategy = KeyViewStrategy::kManual;
+    RunSelectKeyView(options, context);
+  });
+}
+
 std::filesystem::path LocalPipeline::ArtifactPath(const std::string& name) const {
   const auto found = artifacts_.find(name);
   if (found == artifacts_.end()) {

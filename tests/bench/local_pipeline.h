@@ -23,6 +23,8 @@ class LocalPipeline {
 
   // Runs import, with every eighth view held out.
   void ImportScene();
+  // Runs the selection of the key view; `view`: its name, empty: by the default strategy.
+  void SelectKeyView(const std::string& view);
   // Runs `stage` as job kind `kind` with all artifacts written so far as inputs. `folder`: prefix
   // of its own artifacts, ending in "/"; may be empty.
   void Run(const std::string& kind,

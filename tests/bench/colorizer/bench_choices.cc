@@ -135,7 +135,7 @@ void Prepare(const ChoicesArguments& args, LocalPipeline& pipeline) {
   if (fs::exists(fs::path(args.out_folder) / kPrepared)) return pipeline.TakeAll();
   pipeline.ImportScene();
   const Scene scene = SceneFromJson(ReadFile(pipeline.ArtifactPath(artifact::kScene)));
-  pipeline.Run("select_key_view", [](StageContext& c) { RunSelectKeyView({}, c); });
+  pipeline.SelectKeyView("");
   pipeline.Run("colorize_key_view", [&](StageContext& c) {
     ColorizeKeyViewOptions options;
     options.file = c.scene_folder() / scene.views[ReadKeyView(c, scene)].image_file;

@@ -8,6 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/catalogue/stages.h"
 #include "core/color/lab_planes.h"
 #include "core/encoder/torch_errors.h"
 #include "core/encoder/torch_threads.h"
@@ -17,6 +18,7 @@
 #include "tests/bench/explain/explain_report.h"
 #include "tests/bench/explain/explain_scene.h"
 #include "tests/bench/explain/model_study.h"
+#include "tests/bench/local_pipeline.h"
 #include "tests/bench/result_file.h"
 
 namespace color3d {
@@ -25,9 +27,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kShownViews = 5;
+// Of the preset "fast".
+constexpr int kGeometryIterations = 1500;
+constexpr int kMaxGaussians = 40'000;
 
 struct ExplainArguments {
-  std::string scene_folder, run_folder, out_folder;
+  std::string scene_folder, run_folder, out_folder, key_view;
   std::string encoder = "embedded";
   std::vector<double> lambdas = {0.0, 0.1, 1.0, 10.0};
   int side_px = 400;
@@ -102,11 +107,30 @@ ExplainFacts FactsOf(const ExplainArguments& args,
   return facts;
 }
 
+// The stages that surfaces shared by views come from. Returns their folder.
+fs::path RunStages(const ExplainArguments& args) {
+  const fs::path folder = fs::path(args.out_folder) / "run";
+  LocalPipeline pipeline(
+      args.scene_folder, folder, args.threads, args.options.seed, [](const std::string& text) {
+        std::fprintf(stderr, "%s\n", text.c_str());
+      });
+  pipeline.ImportScene();
+  pipeline.SelectKeyView(args.key_view);
+  pipeline.Run(kind::kReconstructGeometry, [&](StageContext& c) {
+    GeometryOptions geometry;
+    geometry.iterations = kGeometryIterations;
+    geometry.max_gaussians = kMaxGaussians;
+    RunReconstructGeometry(geometry, args.side_px, c);
+  });
+  return folder;
+}
+
 void Run(const ExplainArguments& args) {
   const ColorizerOptions options = OptionsFrom(args);
   ThreadPool pool(args.threads);
+  const fs::path run = args.run_folder.empty() ? RunStages(args) : fs::path(args.run_folder);
   const ExplainScene scene =
-      ReadExplainScene(args.scene_folder, args.run_folder, args.side_px, args.views, pool);
+      ReadExplainScene(args.scene_folder, run, args.side_px, args.views, pool);
   const auto encoder = EncoderOf(args.encoder);
   const ExplainView& key_view = scene.views[scene.key];
   const TrainingPicture key{key_view.name, key_view.luminance, ChromaOfLab(key_view.lab)};
@@ -145,8 +169,15 @@ void AddExplainCommand(CLI::App& app) {
       app.add_subcommand("explain",
                          "Show why the colorizer is consistent: features and colours of matched "
                          "surfaces, the paper's bound, and the consistency term");
-  command->add_option("--scene", args->scene_folder, "Folder of colour photos")->required();
-  command->add_option("--run", args->run_folder, "Output folder of a `pipeline` run")->required();
+  command->add_option("scene,--scene", args->scene_folder, "Folder of colour photos")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  CLI::Option* run = command->add_option(
+      "--run",
+      args->run_folder,
+      "Output folder of a `pipeline` run; default: key view and geometry are made in OUT/run");
+  command->add_option("--key-view", args->key_view, "Name of the key view; default: selected")
+      ->excludes(run);
   command
       ->add_option("--out", args->out_folder, "Folder for explain.md, explain.json, features.png")
       ->required();

@@ -4,15 +4,20 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string_view>
+#include <utility>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "core/catalogue/artifacts.h"
 
 namespace color3d {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::string_view kResultsPrefix = "results:";
 
 std::string Trimmed(const std::string& text) {
   const size_t begin = text.find_first_not_of(' ');
@@ -44,6 +49,30 @@ bool ChoosesKeyView(const SuitePreset& preset) {
   return std::find(options.begin(), options.end(), "--keys") != options.end() ||
          (!preset.file.empty() &&
           ReadFile(preset.file).find("\nselect_key_view {") != std::string::npos);
+}
+
+// Of a run whose colorizer is used; {"", ""} if the preset uses none.
+std::pair<std::string, std::string> SceneAndPresetOfColorizer(const SuitePreset& preset) {
+  for (const std::string& argument : preset.arguments) {
+    if (!argument.starts_with(kResultsPrefix)) continue;
+    const std::string run = argument.substr(kResultsPrefix.size());
+    const size_t slash = run.find('/');
+    if (slash == std::string::npos) {
+      throw InvalidArgument(
+          "{}: expected {}SCENE/PRESET, got {}", preset.name, kResultsPrefix, argument);
+    }
+    return {run.substr(0, slash), run.substr(slash + 1)};
+  }
+  return {};
+}
+
+SuiteTask TaskOf(const SuiteScene& scene, const SuitePreset& preset, uint64_t seed) {
+  SuiteTask task{scene, preset, seed, {}};
+  nlohmann::json facts = {scene.name, scene.key_view, scene.arguments, preset.name};
+  if (!preset.file.empty()) facts.push_back(ReadFile(preset.file));
+  if (!preset.arguments.empty()) facts.push_back(preset.arguments);
+  task.options_digest = Sha256Hex(facts.dump()).substr(0, 12);
+  return task;
 }
 
 template <class T>
@@ -129,13 +158,19 @@ SuiteScenes ReadManifest(const fs::path& json, const fs::path& data) {
   return scenes;
 }
 
-std::vector<std::string> SuiteTask::Arguments(const fs::path& out) const {
+fs::path SuiteTask::Results() const {
+  return fs::path(scene.name) / preset.name / std::to_string(seed);
+}
+
+fs::path SuiteTask::ColorizerFile() const { return colorizer_of->Results() / artifact::kColorizer; }
+
+std::vector<std::string> SuiteTask::Arguments(const fs::path& suite) const {
   const bool is_bound = preset.name == kBoundPreset;
   const std::string name = is_bound ? kDefaultPreset : preset.name;
   std::vector<std::string> arguments = {"colorize",
                                         scene.folder.string(),
                                         "-o",
-                                        out.string(),
+                                        (suite / Results()).string(),
                                         "--benchmark",
                                         "--seed",
                                         std::to_string(seed),
@@ -145,23 +180,35 @@ std::vector<std::string> SuiteTask::Arguments(const fs::path& out) const {
     arguments.insert(arguments.end(), {"--key-view", scene.key_view});
   }
   if (is_bound) arguments.push_back("--bound");
-  arguments.insert(arguments.end(), preset.arguments.begin(), preset.arguments.end());
+  for (const std::string& argument : preset.arguments) {
+    arguments.push_back(argument.starts_with(kResultsPrefix) ? (suite / ColorizerFile()).string()
+                                                             : argument);
+  }
   arguments.insert(arguments.end(), scene.arguments.begin(), scene.arguments.end());
   return arguments;
 }
 
 std::vector<SuiteTask> PlanSuite(const std::vector<SuiteScene>& scenes,
                                  const std::vector<SuitePreset>& presets,
-                                 int seeds) {
+                                 int seeds,
+                                 const ColorizerSources& sources) {
   std::vector<SuiteTask> tasks;
   for (int seed = 1; seed <= seeds; ++seed) {
     for (const SuiteScene& scene : scenes) {
       for (const SuitePreset& preset : presets) {
-        SuiteTask task{scene, preset, static_cast<uint64_t>(seed), {}};
-        nlohmann::json facts = {scene.name, scene.key_view, scene.arguments, preset.name};
-        if (!preset.file.empty()) facts.push_back(ReadFile(preset.file));
-        if (!preset.arguments.empty()) facts.push_back(preset.arguments);
-        task.options_digest = Sha256Hex(facts.dump()).substr(0, 12);
+        SuiteTask task = TaskOf(scene, preset, static_cast<uint64_t>(seed));
+        const auto [other_scene, other_preset] = SceneAndPresetOfColorizer(preset);
+        if (!other_scene.empty()) {
+          const auto source = std::ranges::find(sources.scenes, other_scene, &SuiteScene::name);
+          if (other_scene == scene.name || source == sources.scenes.end()) continue;
+          const auto taken = std::ranges::find(sources.presets, other_preset, &SuitePreset::name);
+          if (taken == sources.presets.end()) {
+            throw InvalidArgument("{} takes a colorizer of {}, which this machine does not have",
+                                  preset.name,
+                                  other_preset);
+          }
+          task.colorizer_of = std::make_shared<const SuiteTask>(TaskOf(*source, *taken, task.seed));
+        }
         tasks.push_back(std::move(task));
       }
     }

@@ -23,6 +23,11 @@ auto KeyOf(const SuiteRow& row) {
   return std::tie(row.scene, row.preset, row.seed, row.options_digest);
 }
 
+// Of any options.
+bool IsSameRun(const SuiteRow& x, const SuiteRow& y) {
+  return x.scene == y.scene && x.preset == y.preset && x.seed == y.seed;
+}
+
 nlohmann::ordered_json ToJson(const SuiteRow& row) {
   return {{"scene", row.scene},
           {"preset", row.preset},
@@ -106,14 +111,22 @@ void AppendRow(const fs::path& jsonl, const SuiteRow& row) {
   }
 }
 
+void AddMissingRows(const fs::path& jsonl, const std::vector<SuiteRow>& rows) {
+  const std::vector<SuiteRow> present = ReadRows(jsonl);
+  for (const SuiteRow& row : rows) {
+    if (std::none_of(present.begin(), present.end(), [&](const SuiteRow& other) {
+          return IsSameRun(other, row);
+        })) {
+      AppendRow(jsonl, row);
+    }
+  }
+}
+
 std::vector<SuiteRow> NewestRows(const std::vector<SuiteRow>& rows) {
-  const auto same_run = [](const SuiteRow& x, const SuiteRow& y) {
-    return x.scene == y.scene && x.preset == y.preset && x.seed == y.seed;
-  };
   std::vector<SuiteRow> newest;
   for (auto row = rows.begin(); row != rows.end(); ++row) {
     if (std::none_of(
-            row + 1, rows.end(), [&](const SuiteRow& later) { return same_run(*row, later); })) {
+            row + 1, rows.end(), [&](const SuiteRow& later) { return IsSameRun(*row, later); })) {
       newest.push_back(*row);
     }
   }

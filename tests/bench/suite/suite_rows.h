@@ -40,6 +40,9 @@ std::vector<SuiteRow> ReadRows(const std::filesystem::path& jsonl);
 // Appends a row, on the disk when this returns. A half line at the end is completed first.
 void AppendRow(const std::filesystem::path& jsonl, const SuiteRow& row);
 
+// Appends the rows whose scene, preset and seed the file does not have.
+void AddMissingRows(const std::filesystem::path& jsonl, const std::vector<SuiteRow>& rows);
+
 // Leaves out rows whose scene, preset and seed were run again later with other options.
 std::vector<SuiteRow> NewestRows(const std::vector<SuiteRow>& rows);
 

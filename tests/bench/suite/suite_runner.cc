@@ -94,11 +94,19 @@ ClientRunner::ClientRunner(fs::path programs,
 ClientRunner::~ClientRunner() = default;
 
 SuiteRow ClientRunner::Run(const SuiteTask& task, double limit_seconds) {
-  const fs::path out = out_ / task.scene.name / task.preset.name / std::to_string(task.seed);
+  if (task.colorizer_of != nullptr && !fs::exists(out_ / task.ColorizerFile())) {
+    const SuiteRow other = Run(*task.colorizer_of, limit_seconds);
+    if (other.Failed()) {
+      SuiteRow row{task.scene.name, task.preset.name, task.seed, task.options_digest};
+      row.failure = fmt::format("{}, {}: {}", other.scene, other.preset, other.failure);
+      return row;
+    }
+  }
+  const fs::path out = out_ / task.Results();
   fs::remove_all(out);
   fs::create_directories(out);
   SubprocessOptions child;
-  child.arguments = task.Arguments(out);
+  child.arguments = task.Arguments(out_);
   child.arguments.insert(child.arguments.begin(), (programs_ / "color3d").string());
   child.environment = {"COLOR3D_SERVER=" + server_->address()};
   child.log_path = out / "log.txt";

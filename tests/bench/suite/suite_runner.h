@@ -22,7 +22,8 @@ class TaskRunner {
 };
 
 // A server with its data in out/server, and `color3d` for each task, with results in
-// out/SCENE/PRESET/SEED. The server ends with the object.
+// out/SCENE/PRESET/SEED. A run whose colorizer is needed and not there is done first, without a
+// row. The server ends with the object.
 class ClientRunner : public TaskRunner {
  public:
   // `programs`: folder with color3d and color3d-server. `server_arguments`: further options of

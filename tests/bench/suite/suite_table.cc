@@ -12,17 +12,17 @@ namespace {
 
 constexpr double kNoticeable = 0.03;  // relative difference
 
-std::vector<double> ErrorsOf(const SuiteCell& cell) {
-  std::vector<double> errors;
+// The mean over seeds; its interval is that of the views of the rows that have scores by view.
+MeanWithInterval ErrorOf(const SuiteCell& cell) {
+  std::vector<double> of_views, of_seeds;
   for (const SuiteRow& row : cell.rows) {
-    for (const auto& [view, error] : row.view_errors) errors.push_back(error);
-  }
-  if (!errors.empty()) return errors;
-  for (const SuiteRow& row : cell.rows) {
+    for (const auto& [view, error] : row.view_errors) of_views.push_back(error);
     const double error = row.Metric(kRankingMetric);
-    if (std::isfinite(error)) errors.push_back(error);
+    if (std::isfinite(error)) of_seeds.push_back(error);
   }
-  return errors;
+  MeanWithInterval error = BootstrapMean(of_views.empty() ? of_seeds : of_views);
+  const double offset = cell.Mean(kRankingMetric) - error.mean;
+  return {error.mean + offset, error.low + offset, error.high + offset};
 }
 
 std::string Figure(double value, int decimals) {
@@ -77,13 +77,6 @@ void FindFrontier(SceneResults* results) {
       results->knee = static_cast<int>(k);
     }
   }
-}
-
-std::string CsvCell(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
-  return quoted + "\"";
 }
 
 const SuiteCell* FindCell(const SceneResults& results, const std::string& preset) {
@@ -176,9 +169,10 @@ std::vector<SceneResults> SummarizeScenes(const std::vector<SuiteRow>& rows,
       results.cells.push_back(std::move(cell));
     }
     results.gray = std::numeric_limits<double>::quiet_NaN();
-    std::erase_if(results.cells, [](const SuiteCell& cell) { return ErrorsOf(cell).empty(); });
+    std::erase_if(results.cells,
+                  [](const SuiteCell& cell) { return std::isnan(cell.Mean(kRankingMetric)); });
     for (SuiteCell& cell : results.cells) {
-      cell.error = BootstrapMean(ErrorsOf(cell));
+      cell.error = ErrorOf(cell);
       const double gray = cell.Mean("delta_e00_gray");
       if (std::isfinite(gray)) results.gray = gray;
     }
@@ -252,38 +246,6 @@ std::vector<ClaimResult> TestClaims(const std::vector<SceneResults>& scenes) {
     results.push_back(result);
   }
   return results;
-}
-
-std::string SuiteCsv(const std::vector<SuiteRow>& rows) {
-  constexpr const char* kMetrics[] = {"delta_e00_chroma",
-                                      "delta_e00_chroma_2d",
-                                      "delta_e00_chroma_bound",
-                                      "delta_e00",
-                                      "delta_e00_gray",
-                                      "psnr_rgb",
-                                      "psnr_l",
-                                      "ssim_rgb",
-                                      "colorfulness_ratio",
-                                      "me_common",
-                                      "tc_common",
-                                      "tc_chroma",
-                                      "cdc",
-                                      "gaussians",
-                                      "seconds_total",
-                                      "peak_memory_bytes"};
-  std::string text = "scene,preset,seed,failure";
-  for (const char* metric : kMetrics) text += std::string(",") + metric;
-  text += ",wall_seconds,commit,machine\n";
-  for (const SuiteRow& row : rows) {
-    text += fmt::format("{},{},{},{}", row.scene, row.preset, row.seed, CsvCell(row.failure));
-    for (const char* metric : kMetrics) {
-      const double value = row.Metric(metric);
-      text += std::isfinite(value) ? fmt::format(",{:.6g}", value) : ",";
-    }
-    text +=
-        fmt::format(",{:.1f},{},{}\n", row.wall_seconds, CsvCell(row.commit), CsvCell(row.machine));
-  }
-  return text;
 }
 
 std::string SuiteMarkdown(const std::vector<SceneResults>& scenes,

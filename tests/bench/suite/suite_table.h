@@ -20,7 +20,7 @@ struct SuiteCell {
   SuitePreset preset;
   std::vector<SuiteRow> rows;  // that succeeded
   std::string failure;         // of the last failed run; empty if one succeeded
-  // Over views and seeds; over seeds if there are no scores by view.
+  // Mean over seeds, interval over views and seeds; over seeds if there are no scores by view.
   MeanWithInterval error;
 
   bool Empty() const { return rows.empty(); }
@@ -84,8 +84,6 @@ struct ClaimResult {
 // scenes agree; else there is no difference.
 std::vector<ClaimResult> TestClaims(const std::vector<SceneResults>& scenes);
 
-// One line for each row, with a header.
-std::string SuiteCsv(const std::vector<SuiteRow>& rows);
 std::string SuiteMarkdown(const std::vector<SceneResults>& scenes,
                           const std::vector<PresetSummary>& presets,
                           const std::vector<ClaimResult>& claims);

@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
+#include "tests/bench/suite/suite_csv.h"
 #include "tests/bench/suite/suite_page.h"
 #include "tests/bench/suite/suite_plan.h"
 #include "tests/bench/suite/suite_rows.h"
@@ -127,6 +128,23 @@ TEST_F(SuitePlanTest, DigestChangesWithPresetFileAndKeyView) {
   EXPECT_NE(PlanSuite({scene}, {preset}, 1)[0].options_digest, other_file);
 }
 
+TEST_F(SuitePlanTest, ColorizerOfAnotherRunIsItsFile) {
+  SuitePreset transfer = PresetOf("transfer");
+  transfer.arguments = {"--colorizer", "results:fox/fast"};
+  const std::vector<SuiteScene> scenes = {{"fern", "f"}, {"fox", "g"}};
+  const auto tasks =
+      PlanSuite(scenes, {transfer, PresetOf("fast")}, 2, {scenes, {transfer, PresetOf("fast")}});
+  ASSERT_EQ(tasks.size(), 6u) << "fox has no transfer from itself";
+  EXPECT_THAT(tasks[0].Arguments("out"), testing::Contains("out/fox/fast/1/colorizer.c3c"));
+  EXPECT_THAT(tasks[3].Arguments("out"), testing::Contains("out/fox/fast/2/colorizer.c3c"));
+  EXPECT_EQ(tasks[0].colorizer_of->options_digest, tasks[2].options_digest);
+  EXPECT_THAT(MessageOf([&] {
+                PlanSuite(scenes, {transfer}, 1, {scenes, {}});
+              }),
+              HasSubstr("transfer takes a colorizer of fast, which this machine does not have"));
+  EXPECT_TRUE(PlanSuite(scenes, {transfer}, 1, {{scenes[0]}, {}}).empty()) << "fox is not here";
+}
+
 TEST_F(SuitePlanTest, RowsSurviveHalfLine) {
   const auto file = folder_.path() / "results.jsonl";
   EXPECT_TRUE(ReadRows(file).empty());
@@ -199,6 +217,21 @@ TEST_F(RunTasksTest, KilledThreeTimesGivesSameTable) {
   EXPECT_EQ(Run("killed", {}), 0);
   EXPECT_EQ(ReadRows(folder_.path() / "killed").size(), tasks_.size());
   EXPECT_EQ(Table("killed"), Table("whole"));
+}
+
+TEST_F(RunTasksTest, GoesOnFromRowsOfAnotherMachine) {
+  EXPECT_EQ(Run("whole", {}), 0);
+  EXPECT_THROW(Run("first", {}, 5), Error);
+  const std::string csv = RowsToCsv(ReadRows(folder_.path() / "first"));
+  AddMissingRows(folder_.path() / "second", RowsFromCsv(csv));
+  AddMissingRows(folder_.path() / "second", RowsFromCsv(csv));
+  EXPECT_EQ(ReadRows(folder_.path() / "second").size(), 5u);
+  SuiteRow of_other_options = ReadRows(folder_.path() / "first").front();
+  of_other_options.options_digest = "other";
+  AddMissingRows(folder_.path() / "second", {of_other_options});
+  EXPECT_EQ(ReadRows(folder_.path() / "second").size(), 5u) << "the row that is there counts";
+  EXPECT_EQ(Run("second", {}, static_cast<int>(tasks_.size()) - 5), 0) << "runs only what is open";
+  EXPECT_EQ(Table("second"), Table("whole"));
 }
 
 TEST_F(RunTasksTest, RefusesBudgetBelowShortestRunAndStartsNoneBeyondIt) {
@@ -279,6 +312,12 @@ TEST(SuiteTableTest, IntervalCoversViewsAndSeeds) {
   EXPECT_DOUBLE_EQ(error.mean, 2.0);
   EXPECT_LT(error.low, 1.5);
   EXPECT_GT(error.high, 2.5);
+  SuiteRow three = RowOf("fern", "fast", 2.6, 10.0);  // without scores by view
+  three.seed = 3;
+  const auto with_three = SummarizeScenes({one, two, three}, {PresetOf("fast")});
+  const MeanWithInterval& shifted = with_three[0].cells[0].error;
+  EXPECT_NEAR(shifted.mean, 2.2, 1e-9);
+  EXPECT_NEAR(shifted.high - shifted.mean, error.high - error.mean, 1e-9);
 }
 
 TEST(SuiteTableTest, ClaimsHoldDoNotHoldOrAreNotTested) {
@@ -304,12 +343,34 @@ TEST(SuiteTableTest, ClaimsHoldDoNotHoldOrAreNotTested) {
   EXPECT_EQ(verdicts.at(""), "cannot be tested");
 }
 
-TEST(SuiteTableTest, CsvQuotesCells) {
-  SuiteRow row = RowOf("fern", "fast", 2.0, 10.0);
-  row.failure = "exit code 1: no \"a\", no b";
-  const std::string csv = SuiteCsv({row});
-  EXPECT_THAT(csv, HasSubstr("fern,fast,1,\"exit code 1: no \"\"a\"\", no b\",2,"));
-  EXPECT_THAT(csv, HasSubstr("\"a machine, 2 cores\""));
+TEST(SuiteCsvTest, KeepsAllThatTheTablesNeed) {
+  const std::vector<SuitePreset> presets = {PresetOf("fast"), PresetOf("flow"), PresetOf("gray")};
+  SuiteRow timed = RowOf("fern", "fast", 2.0, 10.0);
+  timed.view_errors = {{"a view", 1.5}, {"b=1", 2.5}};
+  SuiteRow failed = RowOf("fern", "flow", 3.0, 10.0);
+  failed.failure = "exit code 1: no \"a\", no b\nand c";
+  SuiteRow untimed = RowOf("fern", "gray", 10.0, 10.0);
+  untimed.seed = 2;
+  untimed.metrics.erase("seconds_total");
+  const std::vector<SuiteRow> rows = {timed, failed, untimed};
+  const std::vector<SuiteRow> read = RowsFromCsv(RowsToCsv(rows));
+  ASSERT_EQ(read.size(), 3u);
+  EXPECT_EQ(read[0].view_errors, timed.view_errors);
+  EXPECT_EQ(read[1].failure, "exit code 1: no \"a\", no b and c");
+  EXPECT_TRUE(std::isnan(read[2].Metric("seconds_total")));
+  EXPECT_EQ(read[2].options_digest, "digest");
+  EXPECT_EQ(RowsToCsv(read), RowsToCsv(rows));
+  const auto markdown = [&](const std::vector<SuiteRow>& of) {
+    return SuiteMarkdown(SummarizeScenes(of, presets), {}, {});
+  };
+  EXPECT_THAT(markdown(read), HasSubstr("| 2.00 (1.50 to 2.50) |"));
+  EXPECT_THAT(markdown(read), HasSubstr("exit code 1"));
+}
+
+TEST(SuiteCsvTest, NamesLineThatIsNoRow) {
+  const std::string csv = RowsToCsv({RowOf("fern", "fast", 2.0, 10.0)});
+  EXPECT_THAT(MessageOf([&] { RowsFromCsv(csv + "fern,flow,two\n"); }), HasSubstr("line 3 is not"));
+  EXPECT_THAT(MessageOf([&] { RowsFromCsv("a,b\n1,2\n"); }), HasSubstr("line 2 is not"));
 }
 
 TEST(SuitePageTest, IsSmallSelfContainedAndEscaped) {
