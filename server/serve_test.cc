@@ -236,7 +236,7 @@ TEST_F(ProcessTest, WorkersEndWithKilledServerAndNothingIsLost) {
   }
   ASSERT_FALSE(workers.empty());
   for (const pid_t worker : workers) {
-    for (int i = 0; i < 200 && ::kill(worker, 0) == 0; ++i) SleepMs(25);
+    for (int i = 0; i < 800 && ::kill(worker, 0) == 0; ++i) SleepMs(25);
     EXPECT_NE(::kill(worker, 0), 0) << "an orphan stays";
   }
   ServerProcess server(scratch_.path(), {});
