@@ -320,13 +320,18 @@ int Main(int argc, char** argv) {
   CLI::App app("Color3D server: colours 3D scenes from monochrome photographs.");
   app.set_version_flag("--version", COLOR3D_VERSION);
   CLI::App* serve = app.add_subcommand("serve", "Answer RPCs and run jobs");
-  app.add_subcommand("worker", "Run jobs of a data folder (see worker --help)");
+  app.add_subcommand("worker", "Run jobs of a server (see worker --help)");
   std::string token_name, token_role = "submit";
   std::string token_project;
   std::filesystem::path token_file;
   CLI::App* token = app.add_subcommand("token", "Create a token for a caller and print it once");
   token->add_option("NAME", token_name, "Name of the caller, for logs")->required();
-  token->add_option("--role", token_role, "read, submit or admin; each includes the ones before")
+  token
+      ->add_option(
+          "--role",
+          token_role,
+          "read, submit or admin, each with the ones before; or worker, for color3d-worker "
+          "--server")
       ->capture_default_str();
   token->add_option("--project",
                     token_project,

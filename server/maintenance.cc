@@ -24,7 +24,8 @@ bool IsRetryableLater(const Error& error) {
 
 void ExpireDeadWorkers(ChoreStore& store) {
   for (const WorkerRecord& worker : store.ListWorkers()) {
-    if (IsRunning(static_cast<pid_t>(worker.pid))) continue;
+    // Without a pid it runs on another machine, and may still hold its leases.
+    if (worker.pid == 0 || IsRunning(static_cast<pid_t>(worker.pid))) continue;
     try {
       for (const std::string& job : store.ExpireLeases(worker.worker_id)) {
         spdlog::info("[job={}] its worker {} is gone", job, worker.worker_id);
@@ -111,10 +112,30 @@ std::chrono::milliseconds Maintenance::Reap() {
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
     PauseWhenSpaceIsLow();
     ReturnFreeSpace();
+    ForgetLostWorkers();
   } catch (const std::exception& e) {
     spdlog::error("cannot check leases: {}", e.what());
   }
   return timing_.reap;
+}
+
+// Measured by the steady clock from the first sight of a report, because the wall clock may jump.
+void Maintenance::ForgetLostWorkers() {
+  const auto now = std::chrono::steady_clock::now();
+  std::map<std::string, Report> reports;
+  for (const WorkerRecord& worker : store_.ListWorkers()) {
+    if (worker.pid != 0) continue;
+    const auto known = reports_.find(worker.worker_id);
+    const bool is_new = known == reports_.end() || known->second.at_ms != worker.heartbeat_ms;
+    const Report report = is_new ? Report{worker.heartbeat_ms, now} : known->second;
+    if (now - report.seen > timing_.forget_workers) {
+      spdlog::warn("{} has not reported for long; it is no longer listed", worker.worker_id);
+      store_.RemoveWorker(worker.worker_id);
+    } else {
+      reports[worker.worker_id] = report;
+    }
+  }
+  reports_ = std::move(reports);
 }
 
 void Maintenance::ReturnFreeSpace() {

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <map>
 #include <string>
 #include <thread>
 #include <vector>
@@ -31,6 +32,8 @@ struct MaintenanceTiming {
   int64_t scrub_bytes = int64_t{2} << 30;  // verified in each sweep
   int64_t keep_free_rows_bytes =
       int64_t{4} << 20;  // free space in the database; more is returned to the file system
+  // Workers of other machines are no longer listed after this time without a report.
+  std::chrono::milliseconds forget_workers{180'000};
   std::function<void()> on_life = {};  // called at each `reap` if the store is readable
   // Created while more than `reserve_bytes` are free, released if a deletion needs the space.
   Ballast* ballast = nullptr;
@@ -86,6 +89,7 @@ class Maintenance {
   std::chrono::milliseconds Sweep();
   void PauseWhenSpaceIsLow();
   void ReturnFreeSpace();
+  void ForgetLostWorkers();
   void CollectBlobs(const std::vector<StoredBlob>& blobs);
   void ExpireJobs();
   // Adds the paths that could not be read to `unreadable`.
@@ -102,6 +106,11 @@ class Maintenance {
   const MaintenanceTiming timing_;
   Scrubber scrubber_;
   std::chrono::steady_clock::time_point next_scrub_{};
+  struct Report {
+    int64_t at_ms = 0;  // as recorded
+    std::chrono::steady_clock::time_point seen;
+  };
+  std::map<std::string, Report> reports_;  // of workers on other machines; reaper's thread only
   ChoreCounts counts_;
   Mutex mutex_;
   CondVar wake_;

@@ -290,5 +290,27 @@ TEST_F(MaintenanceTest, ReapsLeasesDuringSweep) {
   }
 }
 
+// Workers of other machines, which no pid identifies, keep their leases over a restart and are
+// listed while they report.
+TEST_F(MaintenanceTest, ForgetsSilentWorkersOfOtherMachines) {
+  const JobRecord job = CreateSingle();
+  ClaimOne("far-1@gpu");
+  store_->UpdateWorker({"far-1@gpu", 0, job.name, 5, 0});
+  store_->UpdateWorker({"worker-1-1", std::numeric_limits<int32_t>::max(), "", 5, 0});
+  ExpireDeadWorkers(*store_);
+  EXPECT_EQ(store_->ReapExpired(), 0) << "it may still run";
+  ASSERT_EQ(store_->ListWorkers().size(), 1u);
+  EXPECT_EQ(store_->ListWorkers()[0].worker_id, "far-1@gpu");
+  store_->UpdateWorker({"worker-1-2", 1, "", 5, 0});
+  MaintenanceTiming timing = Quick();
+  timing.forget_workers = std::chrono::hours(1);
+  RunUntil([] { return true; }, timing);
+  EXPECT_EQ(store_->ListWorkers().size(), 2u);
+  timing.forget_workers = milliseconds(20);
+  RunUntil([&] { return store_->ListWorkers().size() == 1; }, timing);
+  EXPECT_EQ(store_->ListWorkers()[0].worker_id, "worker-1-2") << "the supervisor knows about it";
+  EXPECT_EQ(StateOf(job.name), JobState::kRunning) << "its lease ends by itself";
+}
+
 }  // namespace
 }  // namespace color3d

@@ -135,11 +135,17 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   const std::vector<std::string> model_flags = ToFlags(models);
   setup.arguments.insert(setup.arguments.end(), model_flags.begin(), model_flags.end());
   setup.max_stopped = Milliseconds(3.0 * options.worker.lease_seconds);
-  setup.max_stopped_holding = Milliseconds(options.worker.lease_seconds / 6.0);
   setup.max_silent = Milliseconds(std::max(3.0 * options.worker.lease_seconds, 60.0));
   setup.max_backoff = std::chrono::milliseconds(options.worker_backoff_ms);
   setup.first_backoff = std::min(setup.first_backoff, setup.max_backoff);
   return setup;
+}
+
+WorkerTimes TimesOfWorkers(const WorkerSettings& settings) {
+  return {Milliseconds(settings.lease_seconds).count(),
+          Milliseconds(settings.heartbeat_seconds).count(),
+          Milliseconds(settings.checkpoint_seconds).count(),
+          Milliseconds(settings.stuck_seconds).count()};
 }
 
 std::map<std::string, BackendState> ProbeForInfo(BackendProber& prober) {
@@ -161,7 +167,6 @@ InferenceLink InferenceSetup(const ServeOptions& options,
                              const SocketFolder& sockets,
                              SupervisorOptions* setup) {
   if (::access(setup->program.c_str(), X_OK) != 0) return {};
-  sockets.RemoveAll();
   // Unique, because a worker that has outlived its server removes its socket at its end.
   const std::string socket = "inference-" + fmt::to_string(::getpid());
   const int machine = std::max(1u, std::thread::hardware_concurrency());
@@ -250,6 +255,7 @@ void Serve(const ServeOptions& options) {
   worker_setup.orphans = std::make_shared<OrphanedWorkers>(
       paths.root, Milliseconds(options.drain_seconds + kOrphanSeconds));
   const SocketFolder sockets(paths.Sockets());
+  sockets.RemoveAll();
   const Clock clock = SystemClock();
   StoreOptions store_options;
   store_options.program_version = COLOR3D_VERSION;
@@ -274,6 +280,8 @@ void Serve(const ServeOptions& options) {
   rpc.notify_allowed = options.notify_allow;
   rpc.drain = [] { ::kill(::getpid(), SIGTERM); };
   rpc.models = models;
+  rpc.worker_socket = sockets.Address(kWorkerSocket);
+  rpc.worker_times = TimesOfWorkers(options.worker);
   rpc.inference = InferenceSetup(options, models, sockets, &worker_setup);
   const auto prober = std::make_shared<BackendProber>(models.backends);
   rpc.probe_backends = [prober] { return ProbeForInfo(*prober); };
@@ -316,6 +324,7 @@ void Serve(const ServeOptions& options) {
   // systemd then restarts the server.
   chores.keep_jobs = std::chrono::hours(24) * options.keep_days;
   chores.keep_uncommitted = std::chrono::hours(24) * options.keep_uncommitted_days;
+  chores.forget_workers = 3 * Milliseconds(options.worker.lease_seconds);
   chores.low_space_bytes = options.low_space_mib << 20;
   chores.ballast = &ballast;
   chores.reserve_bytes = options.worker.reserve_mib << 20;

@@ -114,6 +114,9 @@ allow server/storage 'core/base|server/(base|store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/net 'core/base|server/net'
 allow server/rpc 'core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc)'
+# Workers' calls include the streams of blobs.
+allow server/rpc/workers \
+  'core/(base|catalogue)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|blobs|workers))'
 for folder in blobs jobs live scenes; do
   allow "server/rpc/$folder" \
     "core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|$folder))"
@@ -121,7 +124,8 @@ done
 allow server/rpc/calls 'core/(base|catalogue)|server/(base|access|net|store|planning|storage|ops|rpc/calls)'
 allow server/worker/supervision 'core/base|server/(store|ops|worker/supervision)'
 allow server/worker/live \
-  'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/live)'
+  'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/(live|remote))'
+allow server/worker/remote 'core/base|server/(base|ops|rpc/calls|storage|store|worker/remote)'
 allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/zip core/simd core/grid core/color core/image core/weights \
@@ -131,6 +135,8 @@ forbid 'grpc|google/protobuf|color3d/v1|spdlog' core
 forbid 'sqlite3' $(find core -name '*.h' -o -name '*.cc' | grep -v '^core/scene/sfm/sfm_database')
 forbid 'libav|libsw' $(ls -d core/*/ | grep -v '^core/video/') server client
 forbid 'sqlite3' server/rpc server/worker client
+# Workers call the store of the server, and never open its file.
+forbid 'server/store/sqlite' $(find server/worker -name '*.h' -o -name '*.cc' ! -name '*_test.cc')
 forbid 'opencv2' server client core/splat core/base core/zip core/simd core/grid
 
 # public FOLDER HEADER...: the headers of FOLDER that the product may include from outside. (Tests and
@@ -177,8 +183,8 @@ public server/keeping backup fsck
 public server/metrics server_metrics
 public server/notify notifier webhook
 public server/planning asked_formats job_plan job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key time_budget
-public server/rpc calls/error_mapping rpc_server
-public server/storage ballast blob_store collector data_folder file_blob_store upload_store
+public server/rpc calls/error_mapping calls/worker_messages rpc_server
+public server/storage ballast blob_store collector data_folder file_blob_store upload_store worker_blobs
 public server/store chore_store client_store job job_store project_store worker_store sqlite_job_store store_file user_models
 public server/worker supervision/supervisor supervision/worker_settings
 

@@ -89,6 +89,13 @@ const Row& RowOf(ErrorReason reason) { return kRows.at(static_cast<size_t>(reaso
 
 const char* ErrorReasonName(ErrorReason reason) { return RowOf(reason).name; }
 
+std::optional<ErrorReason> ErrorReasonFromName(std::string_view name) {
+  for (const Row& row : kRows) {
+    if (name == row.name) return row.reason;
+  }
+  return std::nullopt;
+}
+
 ErrorCode ErrorReasonCode(ErrorReason reason) { return RowOf(reason).code; }
 
 }  // namespace color3d

@@ -2,6 +2,9 @@
 // stable: clients compare them. Thread-safe: constants only.
 #pragma once
 
+#include <optional>
+#include <string_view>
+
 #include "core/base/error.h"
 
 namespace color3d {
@@ -66,6 +69,8 @@ enum class ErrorReason {
 
 // Name on the wire, e.g. "BLOB_MISSING".
 const char* ErrorReasonName(ErrorReason reason);
+// Returns nothing for a name that this version does not know.
+std::optional<ErrorReason> ErrorReasonFromName(std::string_view name);
 // Code of errors with this reason, unless the place that throws names another one.
 ErrorCode ErrorReasonCode(ErrorReason reason);
 

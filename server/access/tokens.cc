@@ -20,7 +20,7 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::array<const char*, 3> kRoleNames = {"read", "submit", "admin"};
+constexpr std::array<const char*, 4> kRoleNames = {"read", "submit", "admin", "worker"};
 constexpr size_t kTokenBytes = 32;
 constexpr char kPrefix[] = "c3d_";  // lets leak scanners detect tokens
 
@@ -49,7 +49,7 @@ Role RoleFromName(std::string_view name) {
   for (size_t i = 0; i < kRoleNames.size(); ++i) {
     if (name == kRoleNames[i]) return static_cast<Role>(i);
   }
-  throw InvalidArgument("there is no role '{}'; use read, submit or admin", name);
+  throw InvalidArgument("there is no role '{}'; use read, submit, admin or worker", name);
 }
 
 void CheckProject(const std::string& project) {
@@ -64,6 +64,14 @@ void CheckProject(const std::string& project) {
   }
 }
 
+void CheckRole(Role role, const std::string& project) {
+  if (role != Role::kWorker || project.empty()) return;
+  throw InvalidArgument(
+      "the role worker has the project '{}'; give it none, because workers run the jobs of all "
+      "projects",
+      project);
+}
+
 Role ParseRole(const std::string& role,
                const std::string& project,
                const std::string& file,
@@ -71,6 +79,7 @@ Role ParseRole(const std::string& role,
   try {
     const Role named = RoleFromName(role);
     CheckProject(project);
+    CheckRole(named, project);
     return named;
   } catch (const Error& e) {
     throw InvalidArgument("{}, line {}: {}", file, line, e.what());
@@ -105,6 +114,7 @@ std::string AddToken(const fs::path& file,
                      Role role,
                      const std::string& project) {
   CheckProject(project);
+  CheckRole(role, project);
   if (!IsName(name)) {
     throw InvalidArgument(
         "'{}' is not a valid name: 1 to 64 of letters, digits, '.', '-', '_' and '@'",

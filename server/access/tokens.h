@@ -12,12 +12,18 @@
 
 namespace color3d {
 
-// Each role includes the ones before it.
+// Each role includes the ones before it, except kWorker.
 enum class Role {
   kRead,    // read, download, watch
   kSubmit,  // upload, create, change, cancel and delete
   kAdmin,   // operate the server
+  kWorker,  // the calls of workers on other machines, for all projects, and no others
 };
+// Returns true if a caller with the role `has` may make calls that need `needed`.
+constexpr bool Includes(Role has, Role needed) {
+  if (has == Role::kWorker || needed == Role::kWorker) return has == needed;
+  return has >= needed;
+}
 const char* RoleName(Role role);
 // Throws Error{kInvalidArgument} with the list of roles.
 Role RoleFromName(std::string_view name);
@@ -32,8 +38,10 @@ struct TokenRecord {
 // Throws Error{kInvalidArgument} unless it is empty or 1 to 40 of a-z, 0-9 and '-', the first a
 // letter.
 void CheckProject(const std::string& project);
-// Returns the role in line `line` of `file`. Throws as RoleFromName and CheckProject, with file and
-// line before the message.
+// Throws Error{kInvalidArgument} for a project of a worker, which runs the jobs of all projects.
+void CheckRole(Role role, const std::string& project);
+// Returns the role in line `line` of `file`. Throws as RoleFromName, CheckProject and CheckRole,
+// with file and line before the message.
 Role ParseRole(const std::string& role,
                const std::string& project,
                const std::string& file,

@@ -62,6 +62,18 @@ TEST_F(TokensTest, ReloadsChangesAndIgnoresMistakes) {
   EXPECT_TRUE(book.Find(bert));
 }
 
+TEST(RoleTest, IncludesTheOnesBeforeExceptWorkers) {
+  EXPECT_TRUE(Includes(Role::kAdmin, Role::kRead));
+  EXPECT_TRUE(Includes(Role::kSubmit, Role::kSubmit));
+  EXPECT_FALSE(Includes(Role::kRead, Role::kSubmit));
+  EXPECT_TRUE(Includes(Role::kWorker, Role::kWorker));
+  for (const Role role : {Role::kRead, Role::kSubmit, Role::kAdmin}) {
+    EXPECT_FALSE(Includes(Role::kWorker, role)) << RoleName(role);
+    EXPECT_FALSE(Includes(role, Role::kWorker)) << RoleName(role);
+    EXPECT_EQ(RoleFromName(RoleName(role)), role);
+  }
+}
+
 TEST_F(TokensTest, NamesMistakesInFile) {
   const auto message = [](const std::string& text) {
     try {
@@ -75,7 +87,8 @@ TEST_F(TokensTest, NamesMistakesInFile) {
   EXPECT_EQ(ParseTokens("# users\n\nanna read " + digest + "\n", "tokens").size(), 1u);
   EXPECT_NE(message("anna read " + digest + "\nbert read 12\n").find("tokens, line 2"),
             std::string::npos);
-  EXPECT_NE(message("anna king " + digest).find("read, submit or admin"), std::string::npos);
+  EXPECT_NE(message("anna king " + digest).find("read, submit, admin or worker"),
+            std::string::npos);
   EXPECT_EQ(ParseTokens("anna read " + digest + " attic", "tokens").at(0).project, "attic");
   EXPECT_NE(message("anna read " + digest + " attic more").find("line 1"), std::string::npos);
   EXPECT_NE(message("anna read " + digest + " At@tic").find("is not a project name"),
@@ -84,6 +97,9 @@ TEST_F(TokensTest, NamesMistakesInFile) {
   const std::string token = AddToken(File(), "anna", Role::kRead, "cellar");
   EXPECT_EQ(TokenBook{File()}.Find(token)->project, "cellar");
   EXPECT_THROW(AddToken(File(), "anna", Role::kAdmin), Error);
+  EXPECT_THROW(AddToken(File(), "gpu", Role::kWorker, "cellar"), Error) << "serves all projects";
+  EXPECT_NE(message("gpu worker " + digest + " attic").find("line 1: the role worker has"),
+            std::string::npos);
   EXPECT_THROW(AddToken(File(), "a b", Role::kAdmin), Error);
   ::chmod(File().c_str(), 0620);
   EXPECT_THROW(TokenBook{File()}, Error) << "writable by others";

@@ -94,10 +94,10 @@ TEST(ChaosTest, JobsEndAsUndisturbedWithEffectsOnce) {
   EXPECT_GT(service.RepeatedSteps(), 0) << "nothing was ever taken over: the test proves nothing";
 }
 
-// Negative control: with workers that ignore their lease, the same scenario must fail.
+// Negative control: with a server that ignores the lease epoch, the same scenario must fail.
 TEST(ChaosTest, EffectsAreDoubledWithoutFence) {
   const ScratchFolder scratch;
-  ChaosService service(scratch.path(), {"--worker-program", COLOR3D_UNFENCED_WORKER});
+  ChaosService service(scratch.path(), {}, COLOR3D_UNFENCED_SERVER);
   const Budget budget{40, 12, {Fault::kWorkerFrozen}};
   EXPECT_THAT(Endure(service, budget), Contains(HasSubstr("effects that occur twice")));
 }

@@ -65,7 +65,7 @@ Kept CheckCopy(const BlobStore& copy, const std::string& sha256) {
 // Copies the blobs referenced by the copied store, which drops checkpoints that could not be
 // copied.
 CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const DataPaths& to) {
-  SqliteJobStore store(copied_store, StoreRole::kWorker, SystemClocks());
+  SqliteJobStore store(copied_store, StoreRole::kTool, SystemClocks());
   const FileBlobStore source(from.Blobs());
   FileBlobStore target(to.Blobs());
   const fs::path part = to.root / ".blob.part";

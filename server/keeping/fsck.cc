@@ -21,7 +21,7 @@ FsckResult Fsck(const fs::path& data_folder,
   FsckResult result;
   result.store_problems = StoreProblems(paths.Store());
   if (!result.store_problems.empty()) return result;  // its references are unreliable
-  SqliteJobStore store(paths.Store(), StoreRole::kWorker, SystemClocks());
+  SqliteJobStore store(paths.Store(), StoreRole::kTool, SystemClocks());
   std::set<std::string> named = store.ReferencedBlobs();
   FileBlobStore blobs(paths.Blobs());
   std::vector<std::string> damaged;

@@ -23,7 +23,7 @@ constexpr std::string_view kFull = "the log is full; further lines are in the lo
 
 std::string LineOf(const spdlog::details::log_msg& message, std::string_view text) {
   const spdlog::string_view_t level = spdlog::level::to_string_view(message.level);
-  return fmt::format("{} {} {}\n",
+  return fmt::format("{} {} {}",
                      LogTime(message.time),
                      std::string_view(level.data(), level.size()),
                      EscapeControls(CleanUtf8(text)));
@@ -31,7 +31,8 @@ std::string LineOf(const spdlog::details::log_msg& message, std::string_view tex
 
 class JobLogSink : public spdlog::sinks::base_sink<std::mutex> {
  public:
-  explicit JobLogSink(fs::path folder) : folder_(std::move(folder)) {}
+  explicit JobLogSink(std::function<void(const std::string&, const std::string&)> append)
+      : append_(std::move(append)) {}
 
  protected:
   void sink_it_(const spdlog::details::log_msg& message) override {
@@ -40,22 +41,12 @@ class JobLogSink : public spdlog::sinks::base_sink<std::mutex> {
     const size_t end = text.find_first_of(" ]", kTag.size());
     const size_t close = text.find("] ");
     if (end == std::string_view::npos || close == std::string_view::npos) return;
-    const std::string job(text.substr(5, end - 5));
-    const int fd =
-        ::open(JobLogFile(folder_, job).c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
-    if (fd < 0) return;
-    struct stat status {};
-    if (::fstat(fd, &status) == 0 && status.st_size < kMaxBytes) {
-      std::string line = LineOf(message, text.substr(close + 2));
-      if (status.st_size + static_cast<int64_t>(line.size()) >= kMaxBytes) line += kFull;
-      [[maybe_unused]] const ssize_t written = ::write(fd, line.data(), line.size());
-    }
-    ::close(fd);
+    append_(std::string(text.substr(5, end - 5)), LineOf(message, text.substr(close + 2)));
   }
   void flush_() override {}
 
  private:
-  const fs::path folder_;
+  const std::function<void(const std::string&, const std::string&)> append_;
 };
 
 }  // namespace
@@ -64,8 +55,28 @@ fs::path JobLogFile(const fs::path& folder, const std::string& job) {
   return folder / (job.substr(job.find('/') + 1) + ".log");
 }
 
+void AppendJobLog(const fs::path& folder, const std::string& job, const std::string& line) {
+  const int fd =
+      ::open(JobLogFile(folder, job).c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+  if (fd < 0) return;
+  struct stat status {};
+  if (::fstat(fd, &status) == 0 && status.st_size < kMaxBytes) {
+    std::string text = line + "\n";
+    if (status.st_size + static_cast<int64_t>(text.size()) >= kMaxBytes) text += kFull;
+    [[maybe_unused]] const ssize_t written = ::write(fd, text.data(), text.size());
+  }
+  ::close(fd);
+}
+
+spdlog::sink_ptr MakeJobLogSink(
+    std::function<void(const std::string& job, const std::string& line)> append) {
+  return std::make_shared<JobLogSink>(std::move(append));
+}
+
 spdlog::sink_ptr MakeJobLogSink(const fs::path& folder) {
-  return std::make_shared<JobLogSink>(folder);
+  return MakeJobLogSink([folder](const std::string& job, const std::string& line) {
+    AppendJobLog(folder, job, line);
+  });
 }
 
 }  // namespace color3d

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/base/error.h"
@@ -49,11 +50,21 @@ void SetUpLog(const std::string& name,
   spdlog::set_default_logger(logger);
 }
 
-void LogJobsTo(const std::filesystem::path& folder) {
+namespace {
+
+void AddJobSink(const spdlog::sink_ptr& jobs) {
   const std::shared_ptr<spdlog::logger> logger = spdlog::default_logger();
   for (const spdlog::sink_ptr& sink : logger->sinks()) sink->set_level(logger->level());
-  logger->sinks().push_back(MakeJobLogSink(folder));
+  logger->sinks().push_back(jobs);
   logger->set_level(std::min(logger->level(), spdlog::level::debug));
+}
+
+}  // namespace
+
+void LogJobsTo(const std::filesystem::path& folder) { AddJobSink(MakeJobLogSink(folder)); }
+
+void LogJobsTo(std::function<void(const std::string& job, const std::string& line)> append) {
+  AddJobSink(MakeJobLogSink(std::move(append)));
 }
 
 }  // namespace color3d

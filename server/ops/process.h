@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 
 namespace color3d {
@@ -21,5 +22,7 @@ void SetUpLog(const std::string& name,
 // From now on lines about single jobs, including progress, also go to files of their own
 // (job_log.h).
 void LogJobsTo(const std::filesystem::path& folder);
+// The same, to `append(job, line)`, which may be called by any thread and must not log.
+void LogJobsTo(std::function<void(const std::string& job, const std::string& line)> append);
 
 }  // namespace color3d

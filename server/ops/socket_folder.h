@@ -8,6 +8,9 @@
 
 namespace color3d {
 
+// Socket on which a server answers its workers.
+constexpr char kWorkerSocket[] = "workers";
+
 class SocketFolder {
  public:
   // Creates the folder if it is missing, accessible by its owner only. Throws

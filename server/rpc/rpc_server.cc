@@ -13,6 +13,7 @@
 #include "server/rpc/info_services.h"
 #include "server/rpc/jobs/job_service.h"
 #include "server/rpc/scenes/scene_service.h"
+#include "server/rpc/workers/worker_service.h"
 
 namespace color3d {
 namespace {
@@ -23,6 +24,8 @@ constexpr int kHandshakeLimitMs = 10'000;
 constexpr int kIdleLimitMs = 5 * 60'000;
 // Descriptors besides streams: job store, logs, metrics, gRPC itself, and a margin.
 constexpr int kOtherDescriptors = 128;
+// A scene of 10,000 files with long names, or a job with as many results.
+constexpr int kMaxWorkerMessageBytes = 64 << 20;
 
 }  // namespace
 
@@ -38,6 +41,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   bulk_ = std::make_unique<Executor>(options.bulk_threads);
   checks_ = std::make_unique<Executor>(
       options.check_threads, kMaxChecksWaiting, std::max(1, options.check_threads / 2));
+  errands_ = std::make_unique<Executor>(options.errand_threads);
   const int of_project = options.limits.project_max_streams;
   // Without tokens and certificate roles there is only one project.
   const bool shared = options.tokens != nullptr || options.certificates != nullptr;
@@ -47,8 +51,10 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                                   {"live streams", options.live.max_streams, of_project, shared}});
   silence_ = std::make_unique<SilenceWatch>(options.limits.stream_silence);
   memory_ = std::make_unique<CallMemory>(options.limits.call_memory_bytes);
+  worker_memory_ = std::make_unique<CallMemory>(options.limits.call_memory_bytes);
   access_ = std::make_unique<Access>(options.tokens, options.certificates);
   parts_.reset(new RpcParts{store,
+                            store,
                             store,
                             blobs,
                             uploads,
@@ -56,6 +62,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             *slow_,
                             *bulk_,
                             *checks_,
+                            *errands_,
                             *streams_,
                             *silence_,
                             *memory_,
@@ -67,6 +74,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                             options.models,
                             *digests_,
                             options.probe_backends,
+                            options.worker_times,
                             options.job_logs,
                             options.notify_allowed,
                             options.drain,
@@ -80,6 +88,7 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   services_.push_back(MakeColorizerService(*parts_, *colorize_hub_));
   services_.push_back(MakeServerService(*parts_));
   services_.push_back(MakeAdminService(*parts_));
+  services_.push_back(MakeWorkerService(*parts_, WorkerPlace::kElsewhere, *memory_));
   grpc::EnableDefaultHealthCheckService(true);
   grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   grpc::ServerBuilder builder;
@@ -113,7 +122,21 @@ RpcServer::RpcServer(const RpcServerOptions& options,
                 "gRPC cannot answer on {}; choose another with --listen",
                 options.listen);
   }
+  if (!options.worker_socket.empty()) ListenToWorkers(options.worker_socket);
   gate_->Open();
+}
+
+void RpcServer::ListenToWorkers(const std::string& socket) {
+  services_.push_back(MakeWorkerService(*parts_, WorkerPlace::kHere, *worker_memory_));
+  grpc::ServerBuilder builder;
+  builder.AddListeningPort(socket, grpc::InsecureServerCredentials());
+  builder.SetMaxReceiveMessageSize(kMaxWorkerMessageBytes);
+  builder.RegisterService(services_.back().get());
+  worker_server_ = builder.BuildAndStart();
+  if (worker_server_) return;
+  throw Error(ErrorCode::kFailedPrecondition,
+              "cannot listen to workers on {}; the file system of --data-dir must allow sockets",
+              socket);
 }
 
 void RpcServer::MakeGate(const RpcServerOptions& options) {
@@ -156,11 +179,17 @@ void RpcServer::Shutdown(std::chrono::milliseconds grace) {
   server_->Shutdown(std::chrono::system_clock::now() + grace);
   server_->Wait();
   server_.reset();
+  if (worker_server_) {
+    worker_server_->Shutdown(std::chrono::system_clock::now() + grace);
+    worker_server_->Wait();
+    worker_server_.reset();
+  }
   hub_.reset();  // all its streams have ended
   quick_.reset();
   slow_.reset();
   bulk_.reset();
   checks_.reset();
+  errands_.reset();
 }
 
 }  // namespace color3d

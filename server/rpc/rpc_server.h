@@ -30,6 +30,7 @@ struct RpcServerOptions {
   int quick_threads = 4;
   int slow_threads = 6;
   int bulk_threads = 6;
+  int errand_threads = 4;                                // calls of workers
   int check_threads = 4;                                 // one project uses at most half of them
   std::shared_ptr<grpc::ServerCredentials> credentials;  // null: no TLS
   // Both null: no authentication.
@@ -48,6 +49,8 @@ struct RpcServerOptions {
   CallObserver on_call;                     // may be empty
   InferenceLink inference;
   ColorizeLimits live;
+  std::string worker_socket;  // gRPC address for workers on this machine; empty: none
+  WorkerTimes worker_times;
 };
 
 class RpcServer {
@@ -73,19 +76,20 @@ class RpcServer {
   ConnectionGate::Counts connections() const;
   // Sets health to NOT_SERVING, refuses new jobs and ends streams with UNAVAILABLE.
   void StartDraining();
-  // Waits at most `grace` for open RPCs, then cancels them.
+  // Waits at most `grace` for open RPCs, then cancels them. The workers' socket closes last.
   void Shutdown(std::chrono::milliseconds grace);
 
  private:
   void MakeGate(const RpcServerOptions& options);
+  void ListenToWorkers(const std::string& socket);
 
   std::unique_ptr<ListenSockets> sockets_;
   std::atomic<bool> draining_{false};
   std::unique_ptr<FileDigests> digests_;
-  std::unique_ptr<Executor> quick_, slow_, bulk_, checks_;
+  std::unique_ptr<Executor> quick_, slow_, bulk_, checks_, errands_;
   std::unique_ptr<StreamLimits> streams_;
   std::unique_ptr<SilenceWatch> silence_;
-  std::unique_ptr<CallMemory> memory_;
+  std::unique_ptr<CallMemory> memory_, worker_memory_;
   std::unique_ptr<Access> access_;
   std::unique_ptr<RpcParts> parts_;
   std::unique_ptr<WatchHub> hub_;
@@ -93,7 +97,7 @@ class RpcServer {
   std::vector<std::unique_ptr<grpc::Service>> services_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
   std::unique_ptr<ConnectionGate> gate_;  // notified of calls by the server
-  std::unique_ptr<grpc::Server> server_;
+  std::unique_ptr<grpc::Server> server_, worker_server_;
 };
 
 }  // namespace color3d

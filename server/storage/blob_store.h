@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/base/digest.h"
+#include "server/storage/worker_blobs.h"
 
 namespace color3d {
 
@@ -46,28 +47,14 @@ class SpaceReservation {
   int64_t bytes_ = 0;
 };
 
-struct StoredBlob {
-  FileDigest digest;
-  int64_t touched_ns = 0;  // changes with each Put and Touch; compare for equality only
-};
-
-class BlobStore {
+class BlobStore : public WorkerBlobs {
  public:
-  virtual ~BlobStore() = default;
-
-  // Returns true if the blob is stored with this size, and marks it as used (RemoveIfUntouched).
-  // Like all lookups, throws Error{kUnavailable, BLOB_UNREADABLE} if the disk cannot tell.
-  virtual bool Touch(const FileDigest& digest) const = 0;
-  // Returns the blob without touching it, or nothing if it is not stored.
-  virtual std::optional<StoredBlob> Look(const std::string& sha256) const = 0;
   // Returns the path of a read-only file. Throws Error{kNotFound, BLOB_MISSING}.
   virtual std::filesystem::path Fetch(const std::string& sha256) const = 0;
-  // Replaces a damaged blob.
-  virtual FileDigest PutBytes(std::string_view bytes) = 0;
-  // Moves the file into the store. Requires: same filesystem.
-  virtual FileDigest PutFile(const std::filesystem::path& file) = 0;
-  // Like PutFile, for a file whose digest the caller has just computed.
-  virtual void Adopt(const std::filesystem::path& file, const FileDigest& digest) = 0;
+  void Borrow(const std::string& sha256,
+              const std::function<void(const std::filesystem::path&)>& use) const override {
+    use(Fetch(sha256));
+  }
   virtual void Remove(const std::string& sha256) = 0;
   // Rereads the blob and sets it aside if its digest is wrong; it is then missing, so that an
   // upload can replace it. Returns false if the bytes are good, e.g. replaced since they were found
@@ -76,9 +63,7 @@ class BlobStore {
   // Number of damaged blobs found by this process.
   virtual int64_t damaged() const = 0;
 
-  // Throws Error{kResourceExhausted, STORAGE_FULL} if `bytes` more would not leave the reserve.
-  virtual void RequireSpace(int64_t bytes) const = 0;
-  // The same, and reserves the space within this process.
+  // As RequireSpace, and reserves the space within this process.
   virtual SpaceReservation Reserve(int64_t bytes) = 0;
   // Free space minus reservations, at least 0; reservations may exceed the free space.
   virtual int64_t FreeBytes() const = 0;
@@ -87,8 +72,6 @@ class BlobStore {
   // may contain further blobs.
   virtual std::vector<std::string> ForEach(
       const std::function<bool(const StoredBlob&)>& visit) const = 0;
-  // Returns false if the blob was touched since, does not exist, or the store is in use.
-  virtual bool RemoveIfUntouched(const StoredBlob& blob) = 0;
   // Removes partial files of crashes and blobs set aside that were older than `age` at this and the
   // last call. Returns their number.
   virtual int RemoveLeftovers(std::chrono::seconds age) = 0;

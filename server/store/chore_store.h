@@ -31,8 +31,6 @@ class ChoreStore : public virtual CommonStore {
   virtual int ReapExpired() = 0;
   // Ends the leases of a dead worker. Returns the names of its jobs.
   virtual std::vector<std::string> ExpireLeases(const std::string& worker) = 0;
-  // Returns true if another process blocks all writes for about a second.
-  virtual bool IsHeld() = 0;
   // Returns true if writes fail because the disk is full.
   virtual bool IsFull() = 0;
   // Returns the lease epoch of a running job; 0 if it is not running or does not exist.

@@ -144,7 +144,7 @@ constexpr int64_t kArtifactRowBytes = 300;
 
 struct WorkerRecord {
   std::string worker_id;
-  int64_t pid = 0;
+  int64_t pid = 0;  // 0: on another machine
   std::string job;  // empty: idle
   int64_t memory_bytes = 0;
   int64_t heartbeat_ms = 0;

@@ -1,29 +1,13 @@
-// Chores of the server: probes for writing, age limits, referenced blobs.
+// Chores of the server: probe for writing, age limits, referenced blobs.
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <thread>
 
 #include "core/base/error.h"
 #include "server/store/sqlite_db.h"
 #include "server/store/sqlite_job_store.h"
 
 namespace color3d {
-
-bool SqliteJobStore::IsHeld() {
-  SqliteDatabase probe(file_, SqliteAccess::kWrite);
-  probe.SetBusyTimeout(std::chrono::milliseconds(0));
-  for (int look = 0; look < 20; ++look) {
-    try {
-      SqliteTransaction transaction(probe);
-      return false;
-    } catch (const Error& e) {
-      if (e.code() != ErrorCode::kUnavailable) throw;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  }
-  return true;
-}
 
 bool SqliteJobStore::IsFull() {
   try {

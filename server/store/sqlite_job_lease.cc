@@ -29,60 +29,63 @@ constexpr char kHeld[] = "where job_id=? and ?<>0";
 constexpr char kHeld[] = "where job_id=? and lease_epoch=? and state='RUNNING'";
 #endif
 
+// The project whose turn was last comes after all others of the same priority.
+constexpr char kNextJobs[] =
+    "where state='QUEUED' and run_after_ms<=? and not exists(select 1 from job r where "
+    "job.joins_key<>'' and r.running_key=job.joins_key and r.running_key<>'') and "
+    "not exists(select 1 from meta where meta.name in('hold_paused','hold_storage') and "
+    "value<>0) "
+    "order by priority, coalesce((select turn from project where name=job.project), 0), job_id";
+
+std::optional<int64_t> FirstAccepted(SqliteStatement& jobs, const JobChoice& accept) {
+  while (jobs.Step()) {
+    const JobRecord job = JobFromRow(jobs);
+    if (accept(job)) return job.id;
+  }
+  return std::nullopt;
+}
+
 bool IsRetryable(ErrorCode code) {
   return code == ErrorCode::kUnavailable || code == ErrorCode::kAborted;
 }
 
 }  // namespace
 
-void SqliteJobStore::RequireServerVersion(SqliteDatabase& db) const {
-  SqliteStatement server(db, "select version from server");
-  if (server.Step() && server.Text(0) != options_.program_version) {
-    throw ServiceError(ErrorReason::kWorkerVersion,
-                       "this worker is of version '{}', the server of '{}'; start workers of the "
-                       "server's own release",
-                       options_.program_version,
-                       server.Text(0));
-  }
-  // Builds of one release may differ in the schema, too.
-  SqliteStatement schema(db, "select version from schema_version");
-  if (schema.Step() && schema.Int(0) != kSchemaVersion) {
-    throw ServiceError(ErrorReason::kWorkerVersion,
-                       "this worker's job store has version {}, the server's version {}; start "
-                       "workers of the server's own build",
-                       kSchemaVersion,
-                       schema.Int(0));
-  }
-}
-
-std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_t lease_ms) {
-  // The project whose turn was last comes after all others of the same priority.
-  constexpr char kNext[] =
-      "select job_id from job left join project on project.name=job.project "
-      "where state='QUEUED' and run_after_ms<=? and not exists(select 1 from job r where "
-      "job.joins_key<>'' and r.running_key=job.joins_key and r.running_key<>'') and "
-      "not exists(select 1 from meta where meta.name in('hold_paused','hold_storage') and "
-      "value<>0) "
-      "order by priority, coalesce(turn, 0), job_id limit 1";
-  {  // An idle worker only reads.
-    const auto db = connections_.Read();
-    RequireServerVersion(db);
-    if (!SqliteStatement(db, kNext, SteadyNow()).Step()) return std::nullopt;
-  }
+std::optional<JobRecord> SqliteJobStore::ClaimChosen(
+    const std::string& worker,
+    int64_t lease_ms,
+    const std::function<std::optional<int64_t>(SqliteDatabase&)>& choose) {
+  if (!choose(connections_.Read())) return std::nullopt;  // an idle worker only reads
   WriteTransaction db(connections_);
-  RequireServerVersion(db);
-  const int64_t id = SqliteStatement(db, kNext, SteadyNow()).NextInt();
-  if (id == 0) return std::nullopt;
-  JobRecord job = BeginAttempt(db, id, worker, lease_ms);
+  const std::optional<int64_t> id = choose(db);
+  if (!id) return std::nullopt;
+  JobRecord job = BeginAttempt(db, *id, worker, lease_ms);
   db.Commit();
   return job;
 }
 
-std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
-    const std::string& worker,
-    int64_t lease_ms,
-    const std::string& kind,
-    const std::function<bool(const JobRecord&)>& accept) {
+std::optional<JobRecord> SqliteJobStore::Claim(const std::string& worker, int64_t lease_ms) {
+  return ClaimChosen(worker, lease_ms, [&](SqliteDatabase& db) -> std::optional<int64_t> {
+    SqliteStatement next(
+        db, std::string("select job_id from job ") + kNextJobs + " limit 1", SteadyNow());
+    if (!next.Step()) return std::nullopt;
+    return next.Int(0);
+  });
+}
+
+std::optional<JobRecord> SqliteJobStore::ClaimAccepted(const std::string& worker,
+                                                       int64_t lease_ms,
+                                                       const JobChoice& accept) {
+  return ClaimChosen(worker, lease_ms, [&](SqliteDatabase& db) {
+    SqliteStatement next(db, SelectJob(kNextJobs), SteadyNow());
+    return FirstAccepted(next, accept);
+  });
+}
+
+std::optional<JobRecord> SqliteJobStore::ClaimForBatch(const std::string& worker,
+                                                       int64_t lease_ms,
+                                                       const std::string& kind,
+                                                       const JobChoice& accept) {
   // Neither a project nor a submitted job keeps out the jobs of another.
   constexpr char kCandidates[] =
       "where state='QUEUED' and kind=?1 and run_after_ms<=?2 and lost_attempts=0 and not exists("
@@ -94,22 +97,10 @@ std::optional<JobRecord> SqliteJobStore::ClaimForBatch(
       "r.project=job.project), (select count(*) from job r where r.state='RUNNING' and "
       "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
       "limit 16";
-  const auto choose = [&](SqliteDatabase& db) -> std::optional<int64_t> {
-    RequireServerVersion(db);
-    SqliteStatement select(db, SelectJob(kCandidates), kind, SteadyNow());
-    while (select.Step()) {
-      const JobRecord job = JobFromRow(select);
-      if (accept(job)) return job.id;
-    }
-    return std::nullopt;
-  };
-  if (!choose(connections_.Read())) return std::nullopt;
-  WriteTransaction db(connections_);
-  const std::optional<int64_t> id = choose(db);
-  if (!id) return std::nullopt;
-  JobRecord job = BeginAttempt(db, *id, worker, lease_ms);
-  db.Commit();
-  return job;
+  return ClaimChosen(worker, lease_ms, [&](SqliteDatabase& db) {
+    SqliteStatement next(db, SelectJob(kCandidates), kind, SteadyNow());
+    return FirstAccepted(next, accept);
+  });
 }
 
 JobRecord SqliteJobStore::BeginAttempt(SqliteDatabase& db,

@@ -1,8 +1,9 @@
-// Job store in one SQLite file (WAL), shared by processes of one host. Thread-safe. Reads do not
-// wait; writes wait for each other, also across processes.
+// Job store in one SQLite file (WAL) of one server; commands for operators may read it meanwhile.
+// Thread-safe. Reads do not wait; writes wait for each other, also across processes.
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,8 +18,7 @@ struct StoreOptions {
   int max_attempts = 3;
   // Delay before the first retry of a failed or lost attempt; doubles with each attempt.
   int64_t retry_backoff_ms = 2'000;
-  // Version of this program. Workers get jobs only from a server of the same version.
-  std::string program_version;
+  std::string program_version;  // recorded in the store
   // When a server opens the store, leases of other starts of the machine end.
   std::string boot_id = BootId();
 };
@@ -69,11 +69,13 @@ class SqliteJobStore : public JobStore {
   QueuePlace PlaceInQueue(const JobRecord& job) override;
 
   std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override;
-  std::optional<JobRecord> ClaimForBatch(
-      const std::string& worker,
-      int64_t lease_ms,
-      const std::string& kind,
-      const std::function<bool(const JobRecord&)>& accept) override;
+  std::optional<JobRecord> ClaimAccepted(const std::string& worker,
+                                         int64_t lease_ms,
+                                         const JobChoice& accept) override;
+  std::optional<JobRecord> ClaimForBatch(const std::string& worker,
+                                         int64_t lease_ms,
+                                         const std::string& kind,
+                                         const JobChoice& accept) override;
   std::vector<JobRecord> GetInputs(int64_t job_id) override;
   HeartbeatReply Heartbeat(const Lease& lease,
                            const ProgressRecord& progress,
@@ -89,7 +91,6 @@ class SqliteJobStore : public JobStore {
 
   int ReapExpired() override;
   std::vector<std::string> ExpireLeases(const std::string& worker) override;
-  bool IsHeld() override;
   bool IsFull() override;
   void UpdateWorker(const WorkerRecord& worker) override;
   void RemoveWorker(const std::string& worker_id) override;
@@ -166,12 +167,14 @@ class SqliteJobStore : public JobStore {
   // next day.
   int64_t RecordedRequestAge(int64_t before_ms);
 
-  // Throws WORKER_VERSION.
-  void RequireServerVersion(SqliteDatabase& db) const;
-
   // State machine (sqlite_job_state.cc).
   void AddEvent(SqliteDatabase& db, int64_t job_id, bool progress);
   void SetState(SqliteDatabase& db, int64_t job_id, JobState state);
+  // Claims the job that `choose` finds, unless none was found in a look that only reads.
+  std::optional<JobRecord> ClaimChosen(
+      const std::string& worker,
+      int64_t lease_ms,
+      const std::function<std::optional<int64_t>(SqliteDatabase&)>& choose);
   JobRecord BeginAttempt(SqliteDatabase& db,
                          int64_t job_id,
                          const std::string& worker,

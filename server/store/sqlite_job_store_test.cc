@@ -29,7 +29,7 @@ TEST_F(SqliteJobStoreTest, RequestIdMakesCallsIdempotent) {
 }
 
 TEST_F(SqliteJobStoreTest, ConcurrentEqualRequestsCreateOneJob) {
-  SqliteJobStore other(File(), StoreRole::kWorker, TestClocks());
+  SqliteJobStore other(File(), StoreRole::kTool, TestClocks());
   const RequestKey key{"CreateJob", "same", "body"};
   NewGraph graph;
   graph.scene = "scenes/test";

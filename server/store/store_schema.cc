@@ -127,14 +127,14 @@ void PrepareStore(const fs::path& file, StoreRole role, const ServerIdentity& id
                        "use the program that wrote it, or put back the copy that an upgrade left "
                        "beside it (jobs.db.vN)");
   }
-  if (role == StoreRole::kWorker) {
+  if (role == StoreRole::kTool) {
     if (!version) {
       throw ServiceError(ErrorReason::kStoreNotReady,
                          "{} has no tables; start color3d-server serve, which creates them",
                          file.string());
     }
     if (*version < kSchemaVersion) {
-      throw WrongVersion(*version, "the running server is older than this worker: restart it");
+      throw WrongVersion(*version, "start color3d-server serve of this version on it first");
     }
     return;
   }

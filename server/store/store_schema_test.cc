@@ -17,10 +17,10 @@ namespace fs = std::filesystem;
 
 class StoreSchemaTest : public JobStoreTest {
  protected:
-  void OpenAsWorker(const fs::path& file, const std::string& version = "") {
+  void OpenAsTool(const fs::path& file, const std::string& version = "") {
     StoreOptions options;
     options.program_version = version;
-    SqliteJobStore(file, StoreRole::kWorker, TestClocks(), options);
+    SqliteJobStore(file, StoreRole::kTool, TestClocks(), options);
   }
   // Brings a store of version 1 to `version`, as a program of that version did.
   void MigrateOldTo(int version) {
@@ -192,32 +192,11 @@ TEST_F(StoreSchemaTest, FreePagesReturnToTheFileSystem) {
   }
 }
 
-TEST_F(StoreSchemaTest, WorkersDoNotMigrate) {
-  EXPECT_EQ(ReasonThrown([&] { OpenAsWorker(scratch_.path() / "fresh.db"); }), "STORE_NOT_READY");
+TEST_F(StoreSchemaTest, ToolsDoNotMigrate) {
+  EXPECT_EQ(ReasonThrown([&] { OpenAsTool(scratch_.path() / "fresh.db"); }), "STORE_NOT_READY");
   MakeOld();
-  EXPECT_EQ(ReasonThrown([&] { OpenAsWorker(File()); }), "STORE_VERSION");
+  EXPECT_EQ(ReasonThrown([&] { OpenAsTool(File()); }), "STORE_VERSION");
   EXPECT_EQ(VersionOf(File()), 1);
-}
-
-TEST_F(StoreSchemaTest, WorkersOfOtherReleaseGetNoJob) {
-  CreateSingle();
-  StoreOptions options;
-  options.program_version = "0.0.1";
-  SqliteJobStore stranger(File(), StoreRole::kWorker, TestClocks(), options);
-  EXPECT_EQ(ReasonThrown([&] { stranger.Claim("stranger-1", kLease); }), "WORKER_VERSION");
-  EXPECT_EQ(ReasonThrown([&] {
-              stranger.ClaimForBatch(
-                  "stranger-1", kLease, "single", [](const JobRecord&) { return true; });
-            }),
-            "WORKER_VERSION");
-  EXPECT_EQ(ClaimOne().attempt, 1) << "nothing was spent";
-}
-
-TEST_F(StoreSchemaTest, WorkersOfOtherBuildGetNoJob) {
-  CreateSingle();
-  SqliteJobStore worker(File(), StoreRole::kWorker, TestClocks());
-  SqliteDatabase(File(), SqliteAccess::kWrite).Exec("update schema_version set version=version+1");
-  EXPECT_EQ(ReasonThrown([&] { worker.Claim("worker-1", kLease); }), "WORKER_VERSION");
 }
 
 TEST_F(StoreSchemaTest, ClockChangesNeitherEndLeasesNorStallRetries) {

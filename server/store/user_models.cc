@@ -158,4 +158,12 @@ FileDigest FileDigests::Of(const fs::path& file) {
   return digest;
 }
 
+std::string DigestsOfModel(const std::filesystem::path& file, FileDigests& digests) {
+  std::string lines;
+  for (const std::filesystem::path& part : FilesOfModel(file)) {
+    lines += part.filename().string() + ' ' + digests.Of(part).sha256 + '\n';
+  }
+  return lines;
+}
+
 }  // namespace color3d

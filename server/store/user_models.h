@@ -48,6 +48,12 @@ std::string FileIdentity(const std::filesystem::path& file);
 // CLIP. Comparisons of a model must include all of them.
 std::vector<std::filesystem::path> FilesOfModel(const std::filesystem::path& file);
 
+class FileDigests;
+
+// Returns a line "NAME SHA256" for each of FilesOfModel(file): equal texts, equal weights. Throws
+// Error{kNotFound}.
+std::string DigestsOfModel(const std::filesystem::path& file, FileDigests& digests);
+
 // Digests of large files, recomputed only for changed files. Thread-safe; concurrent calls for one
 // file read it once.
 class FileDigests {

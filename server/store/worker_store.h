@@ -21,20 +21,25 @@ struct Publication {
   JobUsage usage;
 };
 
+// Returns whether the worker takes the job.
+using JobChoice = std::function<bool(const JobRecord&)>;
+
 class WorkerStore : public virtual CommonStore {
  public:
   // Claims the next job unless the queue is held: smallest priority first, then the project that
-  // has waited longest since its last turn. Throws kFailedPrecondition (WORKER_VERSION) if the
-  // release of the worker differs from that of the server.
+  // has waited longest since its last turn.
   virtual std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) = 0;
+  // The same, without the jobs that `accept` rejects. `accept` may be called twice for a job.
+  virtual std::optional<JobRecord> ClaimAccepted(const std::string& worker,
+                                                 int64_t lease_ms,
+                                                 const JobChoice& accept) = 0;
   // Claims a job of this kind to run beside those that the worker already holds. Skips jobs that
   // have lost a worker, jobs behind a waiting job of another kind, and jobs that `accept` rejects.
   // Prefers the project, then the submitted job, with the fewest running jobs.
-  virtual std::optional<JobRecord> ClaimForBatch(
-      const std::string& worker,
-      int64_t lease_ms,
-      const std::string& kind,
-      const std::function<bool(const JobRecord&)>& accept) = 0;
+  virtual std::optional<JobRecord> ClaimForBatch(const std::string& worker,
+                                                 int64_t lease_ms,
+                                                 const std::string& kind,
+                                                 const JobChoice& accept) = 0;
   // Extends the lease and stores progress, seconds and warnings. Cheap: not synced to disk.
   virtual HeartbeatReply Heartbeat(const Lease& lease,
                                    const ProgressRecord& progress,

@@ -25,11 +25,15 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-// Makes a blob readable under another name: by a hard link, or by a copy across filesystems.
-void LinkOrCopy(const fs::path& blob, const fs::path& target) {
+// Makes a file readable under another name: by a hard link, or by a copy across filesystems.
+void LinkOrCopy(const fs::path& file, const fs::path& target) {
   fs::create_directories(target.parent_path());
-  if (::link(blob.c_str(), target.c_str()) == 0) return;
-  fs::copy_file(blob, target);
+  if (::link(file.c_str(), target.c_str()) == 0) return;
+  fs::copy_file(file, target);
+}
+
+void LinkBlob(const WorkerBlobs& blobs, const std::string& sha256, const fs::path& target) {
+  blobs.Borrow(sha256, [&](const fs::path& file) { LinkOrCopy(file, target); });
 }
 
 // Identity of a model file and of all files that are read with it.
@@ -41,13 +45,21 @@ std::string IdentityOf(const fs::path& model) {
   return identity;
 }
 
-class StoredBlobs : public BlobSource {
+// Links the blobs into a folder of the attempt.
+class LinkedBlobs : public BlobSource {
  public:
-  explicit StoredBlobs(const BlobStore& blobs) : blobs_(blobs) {}
-  fs::path Fetch(const std::string& sha256) override { return blobs_.Fetch(sha256); }
+  LinkedBlobs(const WorkerBlobs& blobs, fs::path folder)
+      : blobs_(blobs), folder_(std::move(folder)) {}
+  fs::path Fetch(const std::string& sha256) override {
+    const fs::path file = folder_ / sha256;
+    std::error_code none;
+    if (!fs::exists(file, none)) LinkBlob(blobs_, sha256, file);
+    return file;
+  }
 
  private:
-  const BlobStore& blobs_;
+  const WorkerBlobs& blobs_;
+  const fs::path folder_;
 };
 
 class Attempt {
@@ -163,7 +175,7 @@ void Attempt::Prepare() {
   }
   std::string manifest;
   for (const SceneFileRecord& file : context_.store.GetScene(job_.scene).files) {
-    LinkOrCopy(context_.blobs.Fetch(file.digest.sha256), run_.scene_folder / file.path);
+    LinkBlob(context_.blobs, file.digest.sha256, run_.scene_folder / file.path);
     manifest += file.path + '\n' + file.digest.sha256 + '\n';
     keeper_.token().ThrowIfCancelled();
   }
@@ -178,7 +190,7 @@ void Attempt::Prepare() {
       artifact.name = folder + artifact.name;
       if (!input_artifacts_.emplace(artifact.name, artifact).second) continue;
       const fs::path path = scratch_ / "inputs" / artifact.name;
-      LinkOrCopy(context_.blobs.Fetch(artifact.digest.sha256), path);
+      LinkBlob(context_.blobs, artifact.digest.sha256, path);
       // Rendered views are stored in place of photos.
       if (artifact.name.starts_with(artifact::kGivenViews)) {
         LinkOrCopy(path, run_.scene_folder / artifact.name);
@@ -228,10 +240,9 @@ void Attempt::NoteModels(const std::vector<std::string>& names) {
                   file->second.string());
     }
     ModelFile& model = models_[name];
-    model = {file->second, IdentityOf(file->second), ""};
-    for (const fs::path& part : FilesOfModel(file->second)) {
-      model.digests += part.filename().string() + ' ' + context_.digests.Of(part).sha256 + '\n';
-    }
+    model.file = file->second;
+    model.identity = IdentityOf(file->second);
+    model.digests = DigestsOfModel(file->second, context_.digests);
     keeper_.token().ThrowIfCancelled();
   }
 }
@@ -276,7 +287,7 @@ bool Attempt::JoinEqual() {
 }
 
 void Attempt::Compute() {
-  StoredBlobs blobs(context_.blobs);
+  LinkedBlobs blobs(context_.blobs, scratch_ / "blobs");
   const StageOutput output =
       context_.runner.Run(run_, blobs, checkpoints_, keeper_, keeper_.token());
   RequireModelsUnchanged();

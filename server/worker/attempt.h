@@ -7,8 +7,8 @@
 #include <functional>
 #include <string>
 
-#include "server/storage/blob_store.h"
 #include "server/storage/data_folder.h"
+#include "server/storage/worker_blobs.h"
 #include "server/store/user_models.h"
 #include "server/store/worker_store.h"
 #include "server/worker/lease_keeper.h"
@@ -18,8 +18,8 @@ namespace color3d {
 
 struct AttemptContext {
   WorkerStore& store;            // used by the thread of the worker
-  WorkerStore& heartbeat_store;  // used by the heartbeat thread
-  BlobStore& blobs;
+  WorkerStore& heartbeat_store;  // used by the heartbeat thread; with a connection of its own
+  WorkerBlobs& blobs;
   StageRunner& runner;
   DataPaths paths;
   LeaseTiming timing;

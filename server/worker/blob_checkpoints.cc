@@ -3,12 +3,13 @@
 #include <spdlog/spdlog.h>
 
 #include "core/base/files.h"
+#include "server/base/service_error.h"
 #include "server/worker/lease_keeper.h"
 
 namespace color3d {
 
 BlobCheckpoints::BlobCheckpoints(WorkerStore& store,
-                                 BlobStore& blobs,
+                                 WorkerBlobs& blobs,
                                  const JobRecord& job,
                                  std::chrono::milliseconds interval)
     : store_(store),
@@ -18,29 +19,36 @@ BlobCheckpoints::BlobCheckpoints(WorkerStore& store,
       pace_(interval, std::chrono::steady_clock::now()),
       newest_(job.checkpoint) {}
 
-std::optional<std::filesystem::path> BlobCheckpoints::Newest() {
-  if (!newest_) return std::nullopt;
+bool BlobCheckpoints::UseNewest(const std::function<void(const std::filesystem::path&)>& use) {
+  if (!newest_) return false;
+  bool found = false;
   try {
-    return blobs_.Fetch(newest_->sha256);
+    blobs_.Borrow(newest_->sha256, [&](const std::filesystem::path& file) {
+      found = true;
+      use(file);
+    });
   } catch (const Error& e) {
+    // The server may answer the next attempt.
+    const bool is_away =
+        e.code() == ErrorCode::kUnavailable && !HasReason(e, ErrorReason::kBlobUnreadable);
+    if (found || is_away) throw;
     spdlog::warn("{} the checkpoint is missing, starting over: {}", tag_, e.what());
-    return std::nullopt;
   }
+  return found;
 }
 
 std::optional<std::string> BlobCheckpoints::Load() {
-  const auto file = Newest();
-  return file ? std::optional(ReadFile(*file)) : std::nullopt;
+  std::optional<std::string> state;
+  UseNewest([&](const std::filesystem::path& file) { state = ReadFile(file); });
+  return state;
 }
 
 bool BlobCheckpoints::LoadTo(const std::filesystem::path& file) {
-  const auto newest = Newest();
-  if (newest) {
-    std::filesystem::copy_file(*newest, file, std::filesystem::copy_options::overwrite_existing);
+  return UseNewest([&](const std::filesystem::path& newest) {
+    std::filesystem::copy_file(newest, file, std::filesystem::copy_options::overwrite_existing);
     std::filesystem::permissions(
         file, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
-  }
-  return newest.has_value();
+  });
 }
 
 bool BlobCheckpoints::WantsSave() { return pace_.IsDue(std::chrono::steady_clock::now()); }

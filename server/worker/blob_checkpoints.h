@@ -9,7 +9,7 @@
 #include <string>
 
 #include "core/base/progress.h"
-#include "server/storage/blob_store.h"
+#include "server/storage/worker_blobs.h"
 #include "server/store/worker_store.h"
 #include "server/worker/checkpoint_pace.h"
 
@@ -18,7 +18,7 @@ namespace color3d {
 class BlobCheckpoints : public CheckpointStore {
  public:
   BlobCheckpoints(WorkerStore& store,
-                  BlobStore& blobs,
+                  WorkerBlobs& blobs,
                   const JobRecord& job,
                   std::chrono::milliseconds interval);
   std::optional<std::string> Load() override;
@@ -30,14 +30,15 @@ class BlobCheckpoints : public CheckpointStore {
   void RemoveNewest();
 
  private:
-  std::optional<std::filesystem::path> Newest();
+  // Calls `use` with the file of the checkpoint; returns false if there is none.
+  bool UseNewest(const std::function<void(const std::filesystem::path&)>& use);
   // Stores the blob and makes it the checkpoint.
   void Replace(const FileDigest& digest, const std::function<void()>& put);
   // Removes a blob that this attempt has stored, unless others use the same bytes.
   void RemoveOwn(const StoredBlob& blob);
 
   WorkerStore& store_;
-  BlobStore& blobs_;
+  WorkerBlobs& blobs_;
   const Lease lease_;
   const std::string tag_;  // of log lines
   CheckpointPace pace_;

@@ -146,6 +146,9 @@ void LeaseKeeper::SendHeartbeat() {
     if (error != nullptr && error->code() == ErrorCode::kAborted) {
       StopStage(StopReason::kLeaseLost);
     } else {
+      // While the server is away, each one fails.
+      if (now < next_complaint_) return;
+      next_complaint_ = now + timing_.heartbeat;
       spdlog::warn("{} heartbeat failed: {}", tag_, e.what());
     }
   }

@@ -98,6 +98,7 @@ class LeaseKeeper : public ProgressObserver {
   SteadyClock::time_point last_success_ = start_;
   SteadyClock::time_point last_peek_ = start_;
   SteadyClock::time_point last_report_ = start_;
+  SteadyClock::time_point next_complaint_ = start_;
   std::thread thread_;
 };
 

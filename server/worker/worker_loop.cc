@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <thread>
 
 #include "color3d/v1/job.pb.h"
@@ -10,10 +11,10 @@
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/ops/process.h"
-#include "server/storage/file_blob_store.h"
-#include "server/store/sqlite_job_store.h"
+#include "server/planning/spec_names.h"
 #include "server/worker/attempt.h"
 #include "server/worker/attempt_batch.h"
+#include "server/worker/remote/server_access.h"
 
 namespace color3d {
 namespace {
@@ -28,25 +29,48 @@ std::string EncoderOf(const JobRecord& job) {
   return spec.personalize().encoder();
 }
 
+bool HasAll(const std::vector<NameUse>& uses, const auto& entries) {
+  return std::ranges::all_of(uses, [&](const NameUse& use) { return entries.contains(use.name); });
+}
+
+// Returns whether the worker has the weights and knows the model servers that the job names; also
+// true for a damaged spec.
+bool HasModels(const JobRecord& job, const UserModels& models) {
+  v1::JobSpec spec;
+  spec.ParseFromString(job.spec);
+  const SpecNames names = NamesIn(spec);
+  return HasAll(names.models, models.files) && HasAll(names.backends, models.backends);
+}
+
+// The server refuses this worker, and would do so again.
+bool IsRefusal(const std::exception& e) {
+  const auto* error = dynamic_cast<const Error*>(&e);
+  if (error == nullptr) return false;
+  return error->code() == ErrorCode::kUnauthenticated ||
+         error->code() == ErrorCode::kPermissionDenied || HasReason(e, ErrorReason::kWorkerVersion);
+}
+
 class WorkerLoop {
  public:
-  WorkerLoop(const WorkerOptions& options, StageRunner& runner, const std::atomic<bool>& draining)
+  WorkerLoop(const WorkerOptions& options,
+             ServerAccess& server,
+             StageRunner& runner,
+             const std::atomic<bool>& draining)
       : options_(options),
         id_(options.name + "-" + std::to_string(::getpid())),
         paths_(options.data_folder),
-        store_(paths_.Store(), StoreRole::kWorker, SystemClocks(), Store(options)),
-        heartbeat_store_(paths_.Store(), StoreRole::kWorker, SystemClocks(), Store(options)),
-        blobs_(paths_.Blobs(), {options.reserve_mib << 20}),
+        store_(server.store()),
+        heartbeat_store_(server.heartbeat_store()),
         draining_(draining),
         context_{store_,
                  heartbeat_store_,
-                 blobs_,
+                 server.blobs(),
                  runner,
                  paths_,
-                 options.timing,
-                 options.checkpoint_interval,
-                 options.threads,
-                 options.code_version,
+                 options_.timing,
+                 options_.checkpoint_interval,
+                 options_.threads,
+                 options_.code_version,
                  options_.models,
                  digests_,
                  draining,
@@ -55,12 +79,6 @@ class WorkerLoop {
   void Run();
 
  private:
-  static StoreOptions Store(const WorkerOptions& options) {
-    StoreOptions store;
-    store.retry_backoff_ms = options.retry_backoff_ms;
-    store.program_version = options.release;
-    return store;
-  }
   bool Finished() const {
     return draining_.load() || (options_.parent != 0 && ::getppid() != options_.parent);
   }
@@ -73,17 +91,26 @@ class WorkerLoop {
   bool HasRoom(int running) const;
   // Claims the next job of this kind and encoder; none if there is none or the queue is unreadable.
   std::optional<JobRecord> ClaimForBatch(const std::string& kind, const std::string& encoder);
+  // A worker of this server has all models of the server.
+  bool IsElsewhere() const { return !options_.server.address.empty(); }
+  bool Takes(const JobRecord& job) const {
+    return !IsElsewhere() || HasModels(job, options_.models);
+  }
+  std::optional<JobRecord> ClaimNext();
+  void LogProblem(const std::exception& e);
+  bool IsIdleTooLong() const;
 
   const WorkerOptions options_;
   const std::string id_;
   const DataPaths paths_;
-  SqliteJobStore store_;
-  SqliteJobStore heartbeat_store_;
-  FileBlobStore blobs_;
+  WorkerStore& store_;
+  WorkerStore& heartbeat_store_;
   FileDigests digests_;
   const std::atomic<bool>& draining_;
   const AttemptContext context_;
   int jobs_done_ = 0;
+  std::chrono::steady_clock::time_point last_work_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point next_complaint_;
 };
 
 // Reports the state for listings and to the supervisor. Errors are only logged.
@@ -103,8 +130,22 @@ bool WorkerLoop::ShouldRecycle() const {
   return true;
 }
 
+std::optional<JobRecord> WorkerLoop::ClaimNext() {
+  const int64_t lease_ms = options_.timing.lease.count();
+  if (!IsElsewhere()) return store_.Claim(id_, lease_ms);
+  return store_.ClaimAccepted(id_, lease_ms, [this](const JobRecord& job) { return Takes(job); });
+}
+
+// While the server is away, the same problem occurs several times a second.
+void WorkerLoop::LogProblem(const std::exception& e) {
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_complaint_) return;
+  next_complaint_ = now + std::chrono::seconds(10);
+  spdlog::error("{}: {}", id_, e.what());
+}
+
 bool WorkerLoop::Turn() {
-  const std::optional<JobRecord> job = store_.Claim(id_, options_.timing.lease.count());
+  const std::optional<JobRecord> job = ClaimNext();
   if (!job) return false;
   ReportSelf(store_, job->name);
   const Stage* stage = FindStage(job->kind);
@@ -127,9 +168,9 @@ bool WorkerLoop::HasRoom(int running) const {
 
 std::optional<JobRecord> WorkerLoop::ClaimForBatch(const std::string& kind,
                                                    const std::string& encoder) {
-  const auto has_encoder = [&](const JobRecord& job) { return EncoderOf(job) == encoder; };
+  const auto fits = [&](const JobRecord& job) { return EncoderOf(job) == encoder && Takes(job); };
   try {
-    return store_.ClaimForBatch(id_, options_.timing.lease.count(), kind, has_encoder);
+    return store_.ClaimForBatch(id_, options_.timing.lease.count(), kind, fits);
   } catch (const Error& e) {
     spdlog::warn("{} cannot claim more jobs for its batch: {}", id_, e.what());
     return std::nullopt;
@@ -154,7 +195,7 @@ void WorkerLoop::Run() {
   spdlog::info(
       "{} is ready with {} threads, {} MiB", id_, options_.threads, ResidentMemoryBytes() >> 20);
   auto next_report = std::chrono::steady_clock::now();
-  while (!Finished() && !ShouldRecycle()) {
+  while (!Finished() && !ShouldRecycle() && !IsIdleTooLong()) {
     bool worked = false;
     try {
       if (std::chrono::steady_clock::now() >= next_report) {
@@ -163,9 +204,10 @@ void WorkerLoop::Run() {
       }
       worked = Turn();
     } catch (const std::exception& e) {
-      if (HasReason(e, ErrorReason::kWorkerVersion)) throw;
-      spdlog::error("{}: {}", id_, e.what());
+      if (IsRefusal(e)) throw;
+      LogProblem(e);
     }
+    if (worked) last_work_ = std::chrono::steady_clock::now();
     if (!worked) std::this_thread::sleep_for(options_.poll);
   }
   try {
@@ -175,13 +217,85 @@ void WorkerLoop::Run() {
   }
 }
 
+bool WorkerLoop::IsIdleTooLong() const {
+  if (options_.idle_exit.count() == 0) return false;
+  if (std::chrono::steady_clock::now() - last_work_ < options_.idle_exit) return false;
+  spdlog::info("{} ends: there was no job for {} s", id_, options_.idle_exit.count() / 1000);
+  return true;
+}
+
+// Waits for the server; returns nothing if the worker must end before.
+std::optional<Greeting> GreetServer(const WorkerOptions& options,
+                                    const std::atomic<bool>& draining) {
+  WorkerLink link(options.server, {std::chrono::seconds(10), std::chrono::seconds(0)});
+  const auto begun = std::chrono::steady_clock::now();
+  while (!draining.load()) {
+    try {
+      return link.Greet(options.release);
+    } catch (const Error& e) {
+      if (e.code() != ErrorCode::kUnavailable) throw;
+      spdlog::warn("{}; trying again", e.what());
+    }
+    const auto waited = std::chrono::steady_clock::now() - begun;
+    if (options.idle_exit.count() > 0 && waited > options.idle_exit) return std::nullopt;
+    const auto next = std::chrono::steady_clock::now() + std::chrono::seconds(2);
+    while (!draining.load() && std::chrono::steady_clock::now() < next) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+  }
+  return std::nullopt;
+}
+
+// The same name must mean the same weights.
+void RequireEqualModels(const UserModels& models, const Greeting& greeting) {
+  FileDigests digests;
+  for (const auto& [name, file] : models.files) {
+    const auto theirs = greeting.models.find(name);
+    if (theirs == greeting.models.end()) {
+      spdlog::warn("the server has no model '{}', so no job needs it", name);
+    } else if (theirs->second != Sha256Hex(DigestsOfModel(file, digests))) {
+      throw Error(ErrorCode::kFailedPrecondition,
+                  "the files of the model '{}' ({}) differ from the server's; copy its files with "
+                  "their names, or leave out --model {}",
+                  name,
+                  file.string(),
+                  name);
+    }
+  }
+}
+
+void RunElsewhere(WorkerOptions options, StageRunner& runner, const std::atomic<bool>& draining) {
+  const std::optional<Greeting> greeting = GreetServer(options, draining);
+  if (!greeting) return;
+  RequireEqualModels(options.models, *greeting);
+  using std::chrono::milliseconds;
+  options.timing.lease = milliseconds(greeting->times.lease_ms);
+  options.timing.heartbeat = milliseconds(greeting->times.heartbeat_ms);
+  options.timing.stuck = milliseconds(greeting->times.stuck_ms);
+  options.checkpoint_interval = milliseconds(greeting->times.checkpoint_ms);
+  ServerAccess server(DataPaths(options.data_folder),
+                      LinkTiming::For(options.timing.lease),
+                      options.release,
+                      options.server,
+                      options.cache_bytes);
+  // Lines after the end of the access are dropped.
+  LogJobsTo([logs = std::weak_ptr(server.logs())](const std::string& job, const std::string& line) {
+    if (const auto sender = logs.lock()) sender->Add(job, line);
+  });
+  WorkerLoop(options, server, runner, draining).Run();
+}
+
 }  // namespace
 
 void RunWorker(const WorkerOptions& options,
                StageRunner& runner,
                const std::atomic<bool>& draining) {
-  WorkerLoop loop(options, runner, draining);
-  loop.Run();
+  if (!options.server.address.empty()) return RunElsewhere(options, runner, draining);
+  ServerAccess server(DataPaths(options.data_folder),
+                      LinkTiming::For(options.timing.lease),
+                      options.release,
+                      options.reserve_mib << 20);
+  WorkerLoop(options, server, runner, draining).Run();
 }
 
 }  // namespace color3d

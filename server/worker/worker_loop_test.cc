@@ -16,8 +16,11 @@
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 #include "core/colorizer/scene_batch.h"
+#include "server/ops/socket_folder.h"
 #include "server/planning/spec_check.h"
+#include "server/rpc/rpc_server.h"
 #include "server/storage/data_folder.h"
+#include "server/storage/file_blob_store.h"
 #include "server/store/sqlite_job_store.h"
 
 namespace color3d {
@@ -108,6 +111,10 @@ class TurnsRunner : public StageRunner {
 class WorkerLoopTest : public testing::Test {
  protected:
   WorkerLoopTest() : store_(StoreIn(folder_.path()), StoreRole::kServer, SystemClocks()) {
+    RpcServerOptions server;
+    server.listen = "127.0.0.1:0";
+    server.worker_socket = sockets_.Address(kWorkerSocket);
+    server_ = std::make_unique<RpcServer>(server, store_, blobs_, uploads_, SystemClock());
     SceneRecord scene;
     scene.name = "scenes/test";
     store_.CreateScene(scene, {}, {});
@@ -168,6 +175,10 @@ class WorkerLoopTest : public testing::Test {
 
   ScratchFolder folder_;
   SqliteJobStore store_;
+  const SocketFolder sockets_{DataPaths(folder_.path()).Sockets()};
+  FileBlobStore blobs_{DataPaths(folder_.path()).Blobs(), {0}};
+  UploadStore uploads_{DataPaths(folder_.path()).Uploads(), blobs_, 1 << 20};
+  std::unique_ptr<RpcServer> server_;
   WorkerOptions options_;
   MeetingRunner runner_;
 };
@@ -249,6 +260,34 @@ TEST_F(WorkerLoopTest, RunsOneAtATimeWithLittleMemory) {
   for (int i = 0; i < 3; ++i) RunWorker(options_, runner_, draining);
   EXPECT_EQ(runner_.most(), 1);
   EXPECT_EQ(store_.GetJob(root.name).state, JobState::kSucceeded);
+}
+
+// A worker of another machine has some weights and model servers only: the others' jobs wait.
+TEST_F(WorkerLoopTest, WorkerElsewhereTakesJobsOfItsModels) {
+  const ScratchFolder own;
+  runner_.wanted = 1;
+  options_.server.address = server_->address();
+  options_.data_folder = own.path();
+  options_.models.files["mine"] = own.path() / "weights";
+  WriteFileAtomic(own.path() / "weights", "weights");
+  const JobRecord theirs = Submit({1}, "theirs"), ours = Submit({2}, "mine");
+  std::filesystem::create_directories(own.path() / "scratch");
+  Work({ours});
+  EXPECT_EQ(store_.GetJob(ours.name).state, JobState::kSucceeded);
+  for (const JobRecord& job : store_.ListChildren(theirs.name)) {
+    EXPECT_EQ(job.state, JobState::kQueued);
+    EXPECT_EQ(job.attempt, 0);
+  }
+  const JobRecord done = store_.ListChildren(ours.name).at(0);
+  EXPECT_EQ(ReadFile(blobs_.Fetch(done.artifacts.at(0).digest.sha256)), "of " + done.name);
+  EXPECT_TRUE(done.worker.ends_with("@remote")) << done.worker;
+}
+
+TEST_F(WorkerLoopTest, EndsWithoutWork) {
+  options_.idle_exit = std::chrono::milliseconds(100);
+  const std::atomic<bool> draining{false};
+  RunWorker(options_, runner_, draining);
+  EXPECT_TRUE(store_.ListWorkers().empty());
 }
 
 }  // namespace

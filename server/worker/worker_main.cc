@@ -8,10 +8,13 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <map>
+#include <thread>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "core/base/memory.h"
+#include "core/base/mutex.h"
 #include "core/base/process/process_limits.h"
 #include "core/base/process/sandbox.h"
 #include "server/ops/process.h"
@@ -19,6 +22,7 @@
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "server/worker/live/inference_worker.h"
+#include "server/worker/remote/worker_place.h"
 #include "server/worker/supervision/worker_settings.h"
 #include "server/worker/worker_loop.h"
 
@@ -38,19 +42,65 @@ struct WorkerArguments {
   std::string inference;  // socket; empty: a worker for jobs
   int max_batch = InferenceOptions().max_batch;
   double idle_seconds = 900.0;
+  std::filesystem::path token_file;  // with --server
+  std::filesystem::path cache_folder;
+  int64_t cache_mib = WorkerOptions().cache_bytes >> 20;
+  double idle_exit_seconds = 0.0;
+  std::string until;
+
+  bool IsElsewhere() const { return !options.server.address.empty(); }
 };
 
 std::chrono::milliseconds Milliseconds(double seconds) {
   return std::chrono::milliseconds(static_cast<int64_t>(seconds * 1000.0));
 }
 
+// For a worker on another machine than its server.
+void AddRemoteFlags(CLI::App* app, CLI::Option* data_folder, WorkerArguments* arguments) {
+  WorkerTarget& server = arguments->options.server;
+  CLI::Option* address =
+      app->add_option(
+             "--server",
+             server.address,
+             "Address of a server on another machine: https://HOST:PORT, or HOST:PORT in a "
+             "trusted network")
+          ->excludes(data_folder);
+  const auto add = [&](const char* flag, auto& value, const char* text) {
+    return app->add_option(flag, value, text)->needs(address);
+  };
+  add("--token-file", arguments->token_file, "File with a token of the role worker");
+  add("--tls-ca", server.ca, "PEM file with the authorities of the server's certificate");
+  add("--tls-cert", server.certificate, "PEM file with the certificate of this worker");
+  add("--tls-key", server.key, "PEM file with its key");
+  add("--cache-dir",
+      arguments->cache_folder,
+      "Folder of this worker for cached files, jobs and logs; default: color3d-worker in "
+      "$XDG_CACHE_HOME or ~/.cache");
+  add("--cache-mib", arguments->cache_mib, "Size of the cached files of scenes and results, MiB")
+      ->check(CLI::Range(int64_t{0}, int64_t{1} << 30))
+      ->capture_default_str();
+  add("--idle-exit",
+      arguments->idle_exit_seconds,
+      "End after this time without a job, e.g. 90s, 10m, 2h; 0: never")
+      ->transform(CLI::AsNumberWithUnit(
+          std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}},
+          CLI::AsNumberWithUnit::UNIT_OPTIONAL,
+          "TIME"));
+  add("--until",
+      arguments->until,
+      "Release the job and end before this time: RFC 3339, e.g. 2026-01-31T18:00:00Z, or seconds "
+      "from now");
+}
+
 // Flags without a group are hidden: set by `serve` and by tests.
 void AddFlags(CLI::App* app, WorkerArguments* arguments) {
   WorkerSettings& settings = arguments->settings;
   WorkerOptions& options = arguments->options;
-  app->add_option("--data-dir", settings.data_folder, "The server's data directory")->required();
-  app->add_option("--name", options.name, "Name in logs and in GetServerInfo")
-      ->capture_default_str();
+  CLI::Option* folder = app->add_option(
+      "--data-dir", settings.data_folder, "Data directory of a server on this machine");
+  AddRemoteFlags(app, folder, arguments);
+  app->add_option(
+      "--name", options.name, "Name in logs and in GetServerInfo; default: worker-1, or the host");
   app->add_option("--threads", settings.threads, "Threads of computing")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
@@ -86,13 +136,38 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
   app->add_option("--code-version", options.code_version)->group("");
 }
 
+// Completes the place of the worker: the data folder of its server, or a folder of its own, which
+// is returned.
+std::unique_ptr<WorkerFolder> SetUpPlace(WorkerArguments* arguments) {
+  WorkerOptions& options = arguments->options;
+  if (!arguments->IsElsewhere()) {
+    if (arguments->settings.data_folder.empty()) {
+      throw InvalidArgument(
+          "give --data-dir of a server on this machine, or --server ADDRESS of another one");
+    }
+    if (options.name.empty()) options.name = "worker-1";
+    // The sandbox gives access to folders that exist.
+    std::error_code ignored;
+    std::filesystem::create_directories(DataPaths(arguments->settings.data_folder).Cache(),
+                                        ignored);
+    return nullptr;
+  }
+  if (options.name.empty()) options.name = HostName();
+  if (!arguments->token_file.empty()) options.server.token = ReadToken(arguments->token_file);
+  if (arguments->cache_folder.empty()) arguments->cache_folder = DefaultWorkerFolder();
+  arguments->settings.data_folder = arguments->cache_folder;
+  options.cache_bytes = arguments->cache_mib << 20;
+  options.idle_exit = Milliseconds(arguments->idle_exit_seconds);
+  options.poll = std::chrono::seconds(1);
+  return std::make_unique<WorkerFolder>(DataPaths(arguments->cache_folder));
+}
+
 void Complete(WorkerArguments* arguments) {
   const WorkerSettings& settings = arguments->settings;
   WorkerOptions& options = arguments->options;
   options.data_folder = settings.data_folder;
   options.threads = settings.threads;
   options.reserve_mib = settings.reserve_mib;
-  options.retry_backoff_ms = settings.retry_backoff_ms;
   options.release = COLOR3D_VERSION;
   options.timing.lease = Milliseconds(settings.lease_seconds);
   options.timing.heartbeat = Milliseconds(settings.heartbeat_seconds);
@@ -125,12 +200,52 @@ void HandleStopSignals() {
   struct sigaction action {};
   action.sa_flags = SA_RESTART;
   action.sa_handler = OnTerminate;
-  for (const int signal : {SIGTERM, SIGHUP, SIGQUIT, SIGPWR, SIGXCPU}) {
+  IgnoreStraySignals();
+  // Batch systems send SIGUSR1 ahead of the end of their time (Slurm: --signal).
+  for (const int signal : {SIGTERM, SIGHUP, SIGQUIT, SIGPWR, SIGXCPU, SIGUSR1}) {
     ::sigaction(signal, &action, nullptr);
   }
   action.sa_handler = OnInterrupt;
   ::sigaction(SIGINT, &action, nullptr);
-  IgnoreStraySignals();
+}
+
+// Sets g_draining ahead of a time, so that jobs are released by then.
+class EndAhead {
+ public:
+  explicit EndAhead(std::chrono::steady_clock::time_point time)
+      : thread_([this, time] {
+          MutexLock lock(mutex_);
+          while (!over_ && wake_.WaitUntil(mutex_, time)) {
+          }
+          if (over_) return;
+          spdlog::info("the time of --until is near; this worker ends");
+          g_draining = true;
+        }) {}
+  ~EndAhead() {
+    {
+      const MutexLock lock(mutex_);
+      over_ = true;
+    }
+    wake_.NotifyAll();
+    thread_.join();
+  }
+  EndAhead(const EndAhead&) = delete;
+  EndAhead& operator=(const EndAhead&) = delete;
+
+ private:
+  Mutex mutex_;
+  CondVar wake_;
+  bool over_ COLOR3D_GUARDED_BY(mutex_) = false;
+  std::thread thread_;  // last, because it uses the others
+};
+
+// Null without --until.
+std::unique_ptr<EndAhead> EndBefore(const WorkerArguments& arguments) {
+  if (arguments.until.empty()) return nullptr;
+  // To stop the stage, and to send its checkpoint.
+  const auto ahead =
+      Milliseconds(arguments.settings.drain_grace_seconds) + std::chrono::seconds(15);
+  return std::make_unique<EndAhead>(ParseUntil(arguments.until) - ahead);
 }
 
 // Uploads may need much memory: this process fails before the machine does.
@@ -180,7 +295,14 @@ void EnterSandbox(const WorkerArguments& arguments) {
   for (const auto& [name, file] : models.files) {
     for (const std::filesystem::path& part : FilesOfModel(file)) rules.readable.push_back(part);
   }
-  rules.writable = {arguments.settings.data_folder, std::filesystem::temp_directory_path()};
+  // Not the store, which only the server opens.
+  const DataPaths paths(arguments.settings.data_folder);
+  rules.writable = {paths.Blobs(),
+                    paths.Scratch(),
+                    paths.Cache(),
+                    paths.Logs(),
+                    paths.Sockets(),
+                    std::filesystem::temp_directory_path()};
   rules.sockets = Sockets::kAll;  // model servers
   rules.may_start_processes = true;
   const Sandbox sandbox(rules);
@@ -217,6 +339,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
   WorkerArguments arguments;
   CLI::App app("Runs the jobs of a color3d server; started by 'color3d-server serve'.");
   app.set_version_flag("--version", COLOR3D_VERSION);
+  arguments.options.name.clear();
   AddFlags(&app, &arguments);
   CLI11_PARSE(app, argc, argv);
   HandleStopSignals();
@@ -227,6 +350,9 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
     if (::getppid() != arguments.options.parent) return 1;
   }
   try {
+    const WorkerSettings& settings = arguments.settings;
+    SetUpLog("worker", settings.log_level, settings.log_format, {});  // until it has a folder
+    const std::unique_ptr<WorkerFolder> own = SetUpPlace(&arguments);
     const DataPaths paths(arguments.settings.data_folder);
     SetUpLog(arguments.options.name,
              arguments.settings.log_level,
@@ -236,7 +362,8 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
     EnterSandbox(arguments);
     if (arguments.inference.empty()) {
       Complete(&arguments);
-      LogJobsTo(paths.JobLogs());
+      if (!arguments.IsElsewhere()) LogJobsTo(paths.JobLogs());
+      const std::unique_ptr<EndAhead> until = EndBefore(arguments);
       const std::unique_ptr<StageRunner> runner = program.make_runner();
       RunWorker(arguments.options, *runner, g_draining);
     } else {

@@ -30,9 +30,10 @@ struct Fixture {
   const std::atomic<bool> draining{false};
   const FileDigest colorizer = blobs.PutBytes("colorizer");
   const FileDigest picture = blobs.PutBytes("picture");
-  RpcParts parts{store,   store,  blobs,  uploads,  quick, slow,          bulk,   slow, streams,
-                 silence, memory, access, draining, {},    SystemClock(), "fuzz", {},   digests,
-                 {},      {},     {},     {},       {}};
+  RpcParts parts{
+      store,   store,   store,  blobs,  uploads,  quick, slow,          bulk,   slow, quick,
+      streams, silence, memory, access, draining, {},    SystemClock(), "fuzz", {},   digests,
+      {},      {},      {},     {},     {},       {}};
   ProjectStore project{store, ""};
 
   Fixture() {

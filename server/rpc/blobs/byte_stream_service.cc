@@ -1,16 +1,9 @@
-// google.bytestream.ByteStream. Both reactors hand one chunk at a time to the executor, so a stream
-// holds at most one chunk in memory and never blocks a gRPC thread.
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <algorithm>
-#include <atomic>
+// google.bytestream.ByteStream for the blobs of the caller's project.
 #include <memory>
-#include <optional>
 
 #include "google/bytestream/bytestream.grpc.pb.h"
-#include "server/base/service_error.h"
 #include "server/rpc/blobs/blob_service.h"
+#include "server/rpc/blobs/blob_streams.h"
 
 namespace color3d {
 namespace {
@@ -21,238 +14,14 @@ using google::bytestream::WriteResponse;
 using grpc::CallbackServerContext;
 using grpc::ServerUnaryReactor;
 
-constexpr int64_t kReadChunkBytes = 256 << 10;
-constexpr size_t kNameBytes = 1024;  // size of a message besides its data
-
-class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
- public:
-  BlobReader(const RpcParts& parts, CallbackServerContext& context, const ReadRequest& request)
-      : parts_(parts),
-        context_(context),
-        request_(request),
-        silence_(parts.silence, [this] { GiveUp(); }) {
-    parts_.bulk.Post([this] { Step(); });
-  }
-  ~BlobReader() override {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  void OnWriteDone(bool ok) override {
-    if (!silence_.Resume()) return FinishGivenUp();
-    if (!ok) return Finish(grpc::Status::CANCELLED);
-    parts_.bulk.Post([this] { Step(); });
-  }
-  // Called after Finish and after the last Step.
-  void OnDone() override { delete this; }
-
- private:
-  // The first call opens the blob; later calls read and send one chunk, or finish.
-  void Step() {
-    bool more = false;
-    const grpc::Status status = Guard([&] {
-      if (fd_ < 0) Open();
-      more = NextChunk();
-      if (!more) RequireIntact();
-    });
-    if (!status.ok() || !more) return Finish(status);
-    silence_.Wait();
-    StartWrite(&response_);
-  }
-
-  // The client does not read. Cancels the call, so that the pending write ends, too.
-  void GiveUp() {
-    context_.TryCancel();
-    FinishGivenUp();
-  }
-  // Called by the end of the write or by the silence watch, whichever comes last; this object lives
-  // until then.
-  void FinishGivenUp() {
-    if (given_up_.exchange(true)) Finish(grpc::Status::CANCELLED);
-  }
-
-  void Open() {
-    const Call call = Admit(parts_, Role::kRead, context_);
-    place_ = parts_.streams.reads.Take(call.caller.project);
-    const FileDigest digest = ParseBlobName(request_.resource_name());
-    if (!HasBlob(parts_, call.store, digest)) {
-      throw ServiceError(ErrorReason::kBlobMissing, "'{}' is not stored", request_.resource_name());
-    }
-    if (request_.read_offset() < 0 || request_.read_limit() < 0) {
-      throw InvalidArgument("read_offset and read_limit must not be negative");
-    }
-    if (request_.read_offset() > digest.size_bytes) {
-      throw ServiceError(ErrorReason::kOffsetBeyondEnd,
-                         "read_offset is {}, the blob has {} bytes",
-                         request_.read_offset(),
-                         digest.size_bytes);
-    }
-    offset_ = request_.read_offset();
-    is_whole_ = offset_ == 0;
-    sha256_ = digest.sha256;
-    end_ = digest.size_bytes;
-    if (request_.read_limit() > 0) {
-      is_whole_ &= request_.read_limit() >= end_;
-      end_ = std::min(end_, offset_ + request_.read_limit());
-    }
-    fd_ = ::open(parts_.blobs.Fetch(digest.sha256).c_str(), O_RDONLY | O_CLOEXEC);
-    if (fd_ < 0) throw Error(ErrorCode::kInternal, "cannot open a stored blob");
-  }
-
-  bool NextChunk() {
-    if (offset_ >= end_) return false;
-    std::string* data = response_.mutable_data();
-    data->resize(static_cast<size_t>(std::min(kReadChunkBytes, end_ - offset_)));
-    const ssize_t got = ::pread(fd_, data->data(), data->size(), offset_);
-    if (got <= 0) {
-      throw Error(ErrorCode::kDataLoss, "'{}' is shorter on disk", request_.resource_name());
-    }
-    data->resize(static_cast<size_t>(got));
-    offset_ += got;
-    if (is_whole_) sent_.Update(*data);
-    return true;
-  }
-
-  // A download of a whole blob verifies its digest.
-  void RequireIntact() {
-    if (!is_whole_ || sent_.FinishHex() == sha256_) return;
-    if (parts_.blobs.SetAside(sha256_)) {
-      throw ServiceError(
-          ErrorReason::kBlobDamaged,
-          "'{}' was damaged on the server's disk and is set aside; upload it again, or "
-          "run the job again with skip_cache",
-          request_.resource_name());
-    }
-    throw ServiceError(
-        ErrorReason::kBlobMended,
-        "'{}' was damaged on the server's disk while it was sent, and is repaired now; "
-        "download it again",
-        request_.resource_name());
-  }
-
-  const RpcParts& parts_;
-  CallbackServerContext& context_;
-  const ReadRequest request_;
-  ReadResponse response_;
-  int fd_ = -1;
-  int64_t offset_ = 0;
-  int64_t end_ = 0;
-  bool is_whole_ = false;
-  std::string sha256_;
-  Sha256 sent_;
-  StreamLimit::Place place_;
-  std::atomic<bool> given_up_{false};
-  SilenceWatch::Stream silence_;
-};
-
-class BlobWriter final : public grpc::ServerReadReactor<WriteRequest> {
- public:
-  BlobWriter(const RpcParts& parts, const CallbackServerContext& context, WriteResponse* response)
-      : parts_(parts),
-        response_(response),
-        silence_(parts.silence, [this] { parts_.bulk.Post([this] { GiveUp(); }); }) {
-    // Nothing is read from callers without the role or above their limit of streams.
-    const grpc::Status allowed = Guard([&] {
-      call_ = Admit(parts_, Role::kSubmit, context);
-      place_ = parts_.streams.writes.Take(call_->caller.project);
-    });
-    allowed.ok() ? ReadNext() : Finish(allowed);
-  }
-  void OnReadDone(bool ok) override {
-    if (!silence_.Resume()) return;  // given up
-    // Checked before the message waits for the executor.
-    const grpc::Status fits = Guard([&] {
-      if (ok) RequireSmallChunk();
-    });
-    if (fits.ok()) return parts_.bulk.Post([this, ok] { ok ? Consume() : EndOfStream(); });
-    WriteRequest().Swap(&request_);
-    parts_.bulk.Post([this, fits] { End(fits); });
-  }
-  void OnDone() override { delete this; }
-
- private:
-  void Consume() {
-    bool finished = false;
-    const grpc::Status status = Guard([&] { finished = Store(); });
-    if (status.ok() && !finished) return ReadNext();
-    End(status);
-  }
-
-  void ReadNext() {
-    silence_.Wait();
-    StartRead(&request_);
-  }
-
-  // Releases the place of the stream. The pending read ends with the call.
-  void GiveUp() {
-    End(Guard([&] {
-      if (writer_) writer_->Sync();
-      throw ServiceError(
-          ErrorReason::kUploadSilent,
-          "the upload was silent for {} s; the received bytes are kept: call QueryWriteStatus and "
-          "continue from there",
-          parts_.silence.limit().count() / 1000);
-    }));
-  }
-
-  void End(const grpc::Status& status) {
-    writer_.reset();
-    Finish(status);
-  }
-
-  void RequireSmallChunk() const {
-    if (request_.ByteSizeLong() <=
-        static_cast<size_t>(parts_.limits.max_chunk_bytes) + kNameBytes) {
-      return;
-    }
-    throw InvalidArgument("the chunk has {} bytes; at most {} are allowed",
-                          request_.data().size(),
-                          parts_.limits.max_chunk_bytes);
-  }
-
-  // Returns whether the RPC has been answered.
-  bool Store() {
-    if (!writer_) {
-      name_ = ParseUploadName(request_.resource_name());
-      name_.owner = call_->caller.project;
-      // Another project may have stored the same bytes; projects that have not sent them must do
-      // so.
-      if (HasBlob(parts_, call_->store, name_.digest)) {
-        response_->set_committed_size(name_.digest.size_bytes);
-        return true;
-      }
-      writer_ = parts_.uploads.Open(name_, request_.write_offset(), [this](int64_t bytes) {
-        RequireQuota(parts_, call_->store, bytes);
-      });
-      resource_ = request_.resource_name();
-    } else if (!request_.resource_name().empty() && request_.resource_name() != resource_) {
-      throw InvalidArgument("resource_name changes within the stream");
-    }
-    writer_->Append(request_.write_offset(), request_.data());
-    if (!request_.finish_write()) return false;
-    response_->set_committed_size(writer_->Sync());
-    writer_->Finish();
-    call_->store.HoldBlob(name_.digest);
-    return true;
-  }
-
-  // The client stopped without finish_write, or the connection broke: keeps the received bytes.
-  void EndOfStream() {
-    const grpc::Status status = Guard([&] {
-      if (!writer_) throw InvalidArgument("the stream ended before its first message");
-      response_->set_committed_size(writer_->Sync());
-    });
-    End(status);
-  }
-
-  const RpcParts& parts_;
-  WriteResponse* response_;
-  WriteRequest request_;
-  std::string resource_;
-  UploadName name_;
-  std::optional<Call> call_;  // empty: refused
-  std::unique_ptr<UploadStore::Writer> writer_;
-  StreamLimit::Place place_;
-  SilenceWatch::Stream silence_;
-};
+// Another project may have stored the same bytes; projects that have not sent them must do so.
+BlobRights RightsOf(const RpcParts& parts, const Call& call) {
+  return {
+      call.caller.project,
+      [&parts, store = call.store](const FileDigest& blob) { return HasBlob(parts, store, blob); },
+      [&parts, store = call.store](int64_t bytes) { RequireQuota(parts, store, bytes); },
+      [store = call.store](const FileDigest& blob) { store.HoldBlob(blob); }};
+}
 
 class ByteStreamServiceImpl final : public google::bytestream::ByteStream::CallbackService {
  public:
@@ -260,12 +29,12 @@ class ByteStreamServiceImpl final : public google::bytestream::ByteStream::Callb
 
   grpc::ServerWriteReactor<ReadResponse>* Read(CallbackServerContext* context,
                                                const ReadRequest* request) override {
-    return new BlobReader(parts_, *context, *request);
+    return ReadBlob(parts_, *context, *request, Admission(Role::kRead));
   }
 
   grpc::ServerReadReactor<WriteRequest>* Write(CallbackServerContext* context,
                                                WriteResponse* response) override {
-    return new BlobWriter(parts_, *context, response);
+    return WriteBlob(parts_, *context, response, Admission(Role::kSubmit));
   }
 
   ServerUnaryReactor* QueryWriteStatus(
@@ -273,16 +42,17 @@ class ByteStreamServiceImpl final : public google::bytestream::ByteStream::Callb
       const google::bytestream::QueryWriteStatusRequest* request,
       google::bytestream::QueryWriteStatusResponse* response) override {
     return AnswerWrite(parts_, context, request, response, [=, this](const Call& call) {
-      UploadName name = ParseUploadName(request->resource_name());
-      name.owner = call.caller.project;
-      const bool complete = HasBlob(parts_, call.store, name.digest);
-      response->set_complete(complete);
-      response->set_committed_size(complete ? name.digest.size_bytes
-                                            : parts_.uploads.CommittedSize(name));
+      QueryBlobWrite(parts_, RightsOf(parts_, call), *request, response);
     });
   }
 
  private:
+  BlobAdmission Admission(Role role) const {
+    return [this, role](const CallbackServerContext& context) {
+      return RightsOf(parts_, Admit(parts_, role, context));
+    };
+  }
+
   const RpcParts& parts_;
 };
 

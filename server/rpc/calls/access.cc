@@ -54,7 +54,7 @@ Caller Access::Require(Role role, const grpc::CallbackServerContext& context) co
   const std::string_view token = ParseBearerToken(AuthorizationHeader(context));
   const bool by_token = tokens_ && (!certificates_ || !token.empty());
   const Caller caller = by_token ? ByToken(token, context) : ByCertificate(context);
-  if (caller.role < role) {
+  if (!Includes(caller.role, role)) {
     LogRefusal(caller.name + " may only " + RoleName(caller.role), context);
     throw ServiceError(ErrorReason::kRoleTooLow,
                        "the {} of '{}' has the role {}; this call needs {}",

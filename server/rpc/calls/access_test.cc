@@ -38,6 +38,7 @@ class AccessTest : public RpcTest {
     read_ = AddToken(file, "reader", Role::kRead);
     submit_ = AddToken(file, "submitter", Role::kSubmit);
     admin_ = AddToken(file, "admin", Role::kAdmin);
+    worker_ = AddToken(file, "worker", Role::kWorker);
     options_.listen = "127.0.0.1:0";
     options_.tokens = std::make_shared<TokenBook>(file);
   }
@@ -82,7 +83,7 @@ class AccessTest : public RpcTest {
 
   RpcServerOptions options_;
   std::unique_ptr<RpcServer> guarded_;
-  std::string read_, submit_, admin_;
+  std::string read_, submit_, admin_, worker_;
 };
 
 TEST_F(AccessTest, EveryRpcRequiresRole) {
@@ -111,6 +112,7 @@ TEST_F(AccessTest, EveryRpcRequiresRole) {
     if (is_admins) {
       EXPECT_EQ(ReasonOfStatus(call("Bearer " + submit_)), "ROLE_TOO_LOW");
     }
+    EXPECT_EQ(ReasonOfStatus(call("Bearer " + worker_)), "ROLE_TOO_LOW") << "a worker's token";
     for (const std::string& token : {submit_, admin_}) {
       if (is_admins && token == submit_) continue;
       const StatusCode code = call("Bearer " + token).error_code();
@@ -118,6 +120,32 @@ TEST_F(AccessTest, EveryRpcRequiresRole) {
       EXPECT_NE(code, StatusCode::PERMISSION_DENIED);
       EXPECT_NE(code, StatusCode::UNIMPLEMENTED);
     }
+  }
+}
+
+// The calls of workers reach all projects: no other role includes them.
+TEST_F(AccessTest, OnlyWorkersMakeCallsOfWorkers) {
+  Start();
+  const auto channel = Open(grpc::InsecureChannelCredentials());
+  const auto* service = google::protobuf::DescriptorPool::generated_pool()->FindServiceByName(
+      "color3d.internal.v1.WorkerService");
+  ASSERT_NE(service, nullptr);
+  EXPECT_GE(service->method_count(), 22);
+  for (int i = 0; i < service->method_count(); ++i) {
+    const std::string name = "/" + service->full_name() + "/" + service->method(i)->name();
+    SCOPED_TRACE(name);
+    EXPECT_EQ(ReasonOfStatus(Call(channel, name, "")), "TOKEN_MISSING");
+    EXPECT_EQ(ReasonOfStatus(Call(channel, name, "Bearer " + std::string(68, 'x'))),
+              "TOKEN_UNKNOWN");
+    for (const std::string& token : {read_, submit_, admin_}) {
+      const grpc::Status refused = Call(channel, name, "Bearer " + token);
+      EXPECT_EQ(refused.error_code(), StatusCode::PERMISSION_DENIED);
+      EXPECT_EQ(ReasonOfStatus(refused), "ROLE_TOO_LOW");
+    }
+    const StatusCode code = Call(channel, name, "Bearer " + worker_).error_code();
+    EXPECT_NE(code, StatusCode::UNAUTHENTICATED);
+    EXPECT_NE(code, StatusCode::PERMISSION_DENIED);
+    EXPECT_NE(code, StatusCode::UNIMPLEMENTED);
   }
 }
 

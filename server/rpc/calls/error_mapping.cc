@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "core/base/text/utf8.h"
 #include "google/rpc/error_details.pb.h"
@@ -49,6 +50,27 @@ grpc::StatusCode GrpcCode(ErrorCode code) {
       return grpc::StatusCode::PERMISSION_DENIED;
   }
   return grpc::StatusCode::INTERNAL;
+}
+
+ErrorCode CodeOf(grpc::StatusCode code) {
+  using enum ErrorCode;
+  for (const ErrorCode one : {kCancelled,
+                              kInvalidArgument,
+                              kDeadlineExceeded,
+                              kNotFound,
+                              kAlreadyExists,
+                              kFailedPrecondition,
+                              kResourceExhausted,
+                              kAborted,
+                              kUnimplemented,
+                              kUnavailable,
+                              kDataLoss,
+                              kOutOfRange,
+                              kUnauthenticated,
+                              kPermissionDenied}) {
+    if (GrpcCode(one) == code) return one;
+  }
+  return kInternal;
 }
 
 google::rpc::Status Build(ErrorCode code,
@@ -108,6 +130,21 @@ grpc::Status ToGrpcStatus(const Error& error) {
                       ReasonOf(error),
                       error.what(),
                       service_error != nullptr ? service_error->violations() : kNone));
+}
+
+void ThrowIfFailed(const grpc::Status& status) {
+  if (status.ok()) return;
+  const ErrorCode code = CodeOf(status.error_code());
+  google::rpc::Status details;
+  if (details.ParseFromString(status.error_details())) {
+    for (const google::protobuf::Any& any : details.details()) {
+      google::rpc::ErrorInfo info;
+      if (!any.UnpackTo(&info)) continue;
+      const std::optional<ErrorReason> reason = ErrorReasonFromName(info.reason());
+      if (reason) throw ServiceError(code, *reason, status.error_message());
+    }
+  }
+  throw Error(code, status.error_message());
 }
 
 google::rpc::Status ToRpcStatus(const JobError& error) {

@@ -15,6 +15,10 @@ namespace color3d {
 
 grpc::Status ToGrpcStatus(const Error& error);
 
+// Throws the error that ToGrpcStatus made this status of, without its violations; an error of the
+// transport as Error of the same code. Does nothing if the status is OK.
+void ThrowIfFailed(const grpc::Status& status);
+
 // Stored error of a job as google.rpc.Status.
 google::rpc::Status ToRpcStatus(const JobError& error);
 

@@ -23,6 +23,7 @@
 #include "server/rpc/calls/executor.h"
 #include "server/rpc/calls/silence_watch.h"
 #include "server/rpc/calls/stream_limit.h"
+#include "server/rpc/calls/worker_messages.h"
 #include "server/storage/blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/chore_store.h"
@@ -80,12 +81,14 @@ struct StreamLimits {
 struct RpcParts {
   ClientStore& store;  // of all projects; clients see theirs through Call::store
   ChoreStore& chores;
+  WorkerStore& workers;
   BlobStore& blobs;
   UploadStore& uploads;
-  Executor& quick;   // reads of the job store and of cached files, e.g. GetJob
-  Executor& slow;    // hashing, syncing, writing, remote calls
-  Executor& bulk;    // downloads and uploads of blobs; one may hash 8 GiB
-  Executor& checks;  // validation of whole scenes
+  Executor& quick;    // reads of the job store and of cached files, e.g. GetJob
+  Executor& slow;     // hashing, syncing, writing, remote calls
+  Executor& bulk;     // downloads and uploads of blobs; one may hash 8 GiB
+  Executor& checks;   // validation of whole scenes
+  Executor& errands;  // calls of workers, which clients must not delay
   StreamLimits& streams;
   SilenceWatch& silence;
   CallMemory& memory;
@@ -97,6 +100,7 @@ struct RpcParts {
   UserModels models;
   FileDigests& digests;
   BackendProbe probe_backends;
+  WorkerTimes worker_times;
   std::filesystem::path job_logs;           // folder; empty: no logs
   std::vector<std::string> notify_allowed;  // see CheckNotifyUrl
   std::function<void()> drain;              // asks the program to end
@@ -126,8 +130,39 @@ v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limi
 // Returns why workers get no jobs, for people; empty if they do.
 std::string HoldReason(const RpcParts& parts);
 
-// Runs `body(call)`, which reads the request and fills the response, on the executor, in the queue
-// of the caller's project, if the caller has the role. `body` may block and throw.
+// Runs `body(caller)`, which reads the request and fills the response, on the executor. `admit()`
+// returns the caller and the owner of its queue, or throws. `body` may block and throw.
+template <typename Request, typename Response, typename AdmitCaller, typename Body>
+grpc::ServerUnaryReactor* AnswerAdmitted(CallMemory& memory,
+                                         Executor& executor,
+                                         grpc::CallbackServerContext* context,
+                                         const Request* request,
+                                         Response* response,
+                                         const AdmitCaller& admit,
+                                         Body body) {
+  auto* reactor = new UnaryReactor(memory, context->peer());
+  reactor->Hold(*request);
+  std::optional<decltype(admit())> admitted;
+  const grpc::Status allowed = Guard([&] { admitted = admit(); });
+  if (!allowed.ok()) {
+    reactor->Finish(allowed);
+    return reactor;
+  }
+  const std::string owner = admitted->second;
+  const bool accepted = executor.TryPost(
+      [caller = std::move(admitted->first), reactor, response, body] {
+        reactor->Finish(Guard([&] {
+          reactor->RequireShare();
+          body(caller);
+          reactor->Hold(*response);
+        }));
+      },
+      owner);
+  if (!accepted) reactor->Finish(OverloadedStatus());
+  return reactor;
+}
+
+// The same with `body(call)`, in the queue of the caller's project, if the caller has the role.
 template <typename Request, typename Response, typename Body>
 grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       Executor& executor,
@@ -136,26 +171,12 @@ grpc::ServerUnaryReactor* AnswerUnary(const RpcParts& parts,
                                       const Request* request,
                                       Response* response,
                                       Body body) {
-  auto* reactor = new UnaryReactor(parts.memory, context->peer());
-  reactor->Hold(*request);
-  std::optional<Call> call;
-  const grpc::Status allowed = Guard([&] { call = Admit(parts, role, *context); });
-  if (!allowed.ok()) {
-    reactor->Finish(allowed);
-    return reactor;
-  }
-  const std::string owner = call->caller.project;
-  const bool accepted = executor.TryPost(
-      [call = *std::move(call), reactor, response, body] {
-        reactor->Finish(Guard([&] {
-          reactor->RequireShare();
-          body(call);
-          reactor->Hold(*response);
-        }));
-      },
-      owner);
-  if (!accepted) reactor->Finish(OverloadedStatus());
-  return reactor;
+  const auto admit = [&] {
+    Call call = Admit(parts, role, *context);
+    std::string project = call.caller.project;
+    return std::pair(std::move(call), std::move(project));
+  };
+  return AnswerAdmitted(parts.memory, executor, context, request, response, admit, std::move(body));
 }
 
 // For calls that only read, and for calls that write, hash or sync.

@@ -12,8 +12,8 @@
 #include "core/base/memory.h"
 #include "server/ops/socket_folder.h"
 #include "server/storage/data_folder.h"
-#include "server/store/sqlite_job_store.h"
 #include "server/worker/live/inference_queue.h"
+#include "server/worker/remote/remote_store.h"
 
 namespace color3d {
 namespace {
@@ -28,8 +28,9 @@ class InferenceWorker {
                   const std::atomic<bool>& draining)
       : options_(options),
         id_(options.name + "-" + std::to_string(::getpid())),
-        store_(DataPaths(options.data_folder).Store(), StoreRole::kWorker, SystemClocks()),
         sockets_(DataPaths(options.data_folder).Sockets()),
+        link_({sockets_.Address(kWorkerSocket)}, {std::chrono::seconds(2), {}}),
+        store_(link_, ""),
         draining_(draining),
         queue_(engine, options.max_batch, options.max_waiting) {}
 
@@ -43,8 +44,9 @@ class InferenceWorker {
 
   const InferenceOptions options_;
   const std::string id_;
-  SqliteJobStore store_;
   const SocketFolder sockets_;
+  WorkerLink link_;
+  RemoteStore store_;
   const std::atomic<bool>& draining_;
   InferenceQueue queue_;
   std::unique_ptr<grpc::Server> server_;

@@ -20,8 +20,6 @@ namespace color3d {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr int kEndMs = 2'000;  // maximum time until a killed process has ended
-
 std::vector<std::string> CommandLineOf(pid_t pid) {
   std::ifstream stream("/proc/" + std::to_string(pid) + "/cmdline", std::ios::binary);
   std::vector<std::string> words;
@@ -51,9 +49,9 @@ std::optional<std::string> OrphanId(pid_t pid, const fs::path& data_folder) {
   return name + "-" + std::to_string(pid);
 }
 
-bool HasExited(int handle, int wait_ms) {
+bool HasExited(int handle) {
   pollfd look{handle, POLLIN, 0};
-  return ::poll(&look, 1, wait_ms) == 1;
+  return ::poll(&look, 1, 0) == 1;
 }
 
 }  // namespace
@@ -78,10 +76,6 @@ OrphanedWorkers::OrphanedWorkers(const fs::path& data_folder, std::chrono::milli
     spdlog::info("{} has outlived its server", *id);
     orphans_.push_back({*id, pid, handle, false});
   }
-  Look();
-  for (const Orphan& orphan : orphans_) {
-    if (orphan.killed) HasExited(orphan.handle, kEndMs);
-  }
 }
 
 OrphanedWorkers::~OrphanedWorkers() {
@@ -92,7 +86,7 @@ std::vector<std::string> OrphanedWorkers::Look() {
   std::vector<std::string> gone;
   const bool late = std::chrono::steady_clock::now() >= end_at_;
   for (Orphan& orphan : orphans_) {
-    if (HasExited(orphan.handle, 0)) {
+    if (HasExited(orphan.handle)) {
       gone.push_back(orphan.id);
       ::close(orphan.handle);
       orphan.handle = -1;

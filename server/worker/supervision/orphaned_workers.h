@@ -1,5 +1,5 @@
 // Workers that have outlived their server. Normally they save and end when it dies; the next server
-// on the data folder ends the remaining ones, e.g. frozen ones. Not thread-safe.
+// on the data folder, to which they release their jobs, ends the remaining ones. Not thread-safe.
 #pragma once
 
 #include <sys/types.h>
@@ -13,15 +13,14 @@ namespace color3d {
 
 class OrphanedWorkers {
  public:
-  // Finds processes of this user that another server started for this data folder. Ends frozen ones
-  // at once, because one may hold the write lock of the store.
+  // Finds processes of this user that another server started for this data folder.
   OrphanedWorkers(const std::filesystem::path& data_folder, std::chrono::milliseconds grace);
   ~OrphanedWorkers();
   OrphanedWorkers(const OrphanedWorkers&) = delete;
   OrphanedWorkers& operator=(const OrphanedWorkers&) = delete;
 
-  // Ends frozen ones, and all after the grace period. Returns the ids ("worker-1-4711") of those
-  // that have ended since the last call.
+  // Ends all after the grace period, and frozen ones at once, because they release nothing. Returns
+  // the ids ("worker-1-4711") of those that have ended since the last call.
   std::vector<std::string> Look();
 
  private:

@@ -157,24 +157,10 @@ void Supervisor::KillIfFrozen(Slot* slot) {
     slot->last_moving = now;
     return;
   }
-  const auto stopped = now - slot->last_moving;
-  const bool too_long = stopped > options_.max_stopped;
-  if (!too_long && (stopped <= options_.max_stopped_holding || !AreWritesBlocked())) return;
-  spdlog::error("{} (pid {}) is stopped{}; killing it",
-                slot->name,
-                slot->pid,
-                too_long ? " for too long" : " and blocks writes to the store");
+  if (now - slot->last_moving <= options_.max_stopped) return;
+  spdlog::error("{} (pid {}) is stopped for too long; killing it", slot->name, slot->pid);
   ::kill(slot->pid, SIGKILL);
   slot->last_moving = now;
-}
-
-bool Supervisor::AreWritesBlocked() const {
-  try {
-    return store_.IsHeld();
-  } catch (const Error& e) {
-    spdlog::warn("cannot check whether the store is blocked: {}", e.what());
-    return false;
-  }
 }
 
 bool Supervisor::IsStoreFull() const {

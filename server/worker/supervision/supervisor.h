@@ -49,9 +49,6 @@ struct SupervisorOptions {
   std::chrono::milliseconds max_backoff{10'000};
   // A worker that is stopped (SIGSTOP, debugger) for this time has lost its lease and is killed.
   std::chrono::milliseconds max_stopped{180'000};
-  // The same while writes to the store are blocked, because the stopped worker may hold the lock:
-  // less than a lease, so that others do not lose theirs.
-  std::chrono::milliseconds max_stopped_holding{10'000};
   // Workers of an earlier server, to be ended; may be null.
   std::shared_ptr<OrphanedWorkers> orphans;
   // A running worker without a report for this time is killed, unless the full disk prevents
@@ -95,7 +92,6 @@ class Supervisor {
   void CheckWorker(Slot* slot);
   void OnExit(Slot* slot, int status);
   void KillIfFrozen(Slot* slot);
-  bool AreWritesBlocked() const;
   bool IsStoreFull() const;
   void KillSilentWorkers();
   void EndOrphans();

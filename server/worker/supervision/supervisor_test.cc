@@ -37,7 +37,7 @@ TEST_F(JobStoreTest, KillsSilentWorkerUnlessDiskIsFull) {
     }
     return done();
   };
-  FullStore store(File(), StoreRole::kWorker, TestClocks());
+  FullStore store(File(), StoreRole::kTool, TestClocks());
   SupervisorOptions options;
   options.program = program;
   options.first_backoff = options.max_backoff = std::chrono::milliseconds(10);

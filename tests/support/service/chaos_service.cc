@@ -44,8 +44,13 @@ uint64_t ChaosSeed() {
   return static_cast<uint64_t>(seed);
 }
 
-ChaosService::ChaosService(const fs::path& folder, std::vector<std::string> flags)
-    : folder_(folder), effects_(folder / "effects"), flags_(std::move(flags)) {
+ChaosService::ChaosService(const fs::path& folder,
+                           std::vector<std::string> flags,
+                           std::string program)
+    : folder_(folder),
+      effects_(folder / "effects"),
+      flags_(std::move(flags)),
+      program_(std::move(program)) {
   ::setenv("COLOR3D_TEST_EFFECTS", effects_.c_str(), 1);
   Start();
 }
@@ -55,7 +60,7 @@ ChaosService::~ChaosService() { ::unsetenv("COLOR3D_TEST_EFFECTS"); }
 void ChaosService::Start() {
   std::vector<std::string> flags = {"--max-attempts", "1000", "--log-level", "off"};
   flags.insert(flags.end(), flags_.begin(), flags_.end());
-  server_ = std::make_unique<ServerProcess>(folder_, flags, kWorkers);
+  server_ = std::make_unique<ServerProcess>(folder_, flags, kWorkers, 0, program_);
 }
 
 void ChaosService::Restart(int signal) {

@@ -30,7 +30,9 @@ enum class Fault {
 class ChaosService {
  public:
   // Starts a server on `folder`/data, whose jobs never fail for lost attempts.
-  explicit ChaosService(const std::filesystem::path& folder, std::vector<std::string> flags = {});
+  explicit ChaosService(const std::filesystem::path& folder,
+                        std::vector<std::string> flags = {},
+                        std::string program = COLOR3D_SERVER);
   ~ChaosService();
   ChaosService(const ChaosService&) = delete;
   ChaosService& operator=(const ChaosService&) = delete;
@@ -59,6 +61,7 @@ class ChaosService {
 
   const std::filesystem::path folder_, effects_;
   const std::vector<std::string> flags_;
+  const std::string program_;  // of the server
   std::unique_ptr<ServerProcess> server_;
   std::vector<Fault> round_;
   std::map<std::string, int> faults_;

@@ -67,7 +67,7 @@ class Faults {
 class FailingStore : public SqliteJobStore {
  public:
   FailingStore(const std::filesystem::path& file, const Clocks& clocks, Faults& faults)
-      : SqliteJobStore(file, StoreRole::kWorker, clocks), faults_(faults) {}
+      : SqliteJobStore(file, StoreRole::kTool, clocks), faults_(faults) {}
 
   SceneRecord GetScene(const std::string& name) override {
     return faults_.Around("GetScene", [&] { return SqliteJobStore::GetScene(name); });

@@ -76,8 +76,10 @@ class JobStoreTest : public ::testing::Test {
     graph.jobs = {Job("single")};
     return store_->CreateGraph(graph, {}, kNoLimit);
   }
-  JobRecord ClaimOne(const std::string& worker = "w") {
-    std::optional<JobRecord> job = store_->Claim(worker, kLease);
+  // The store as workers see it.
+  virtual WorkerStore& worker() { return *store_; }
+  JobRecord ClaimOne(const std::string& name = "w") {
+    std::optional<JobRecord> job = worker().Claim(name, kLease);
     EXPECT_TRUE(job.has_value());
     return job.value_or(JobRecord{});
   }
@@ -85,10 +87,10 @@ class JobStoreTest : public ::testing::Test {
   void Succeed(const JobRecord& job, const std::string& artifact = "result") {
     Publication publication;
     publication.artifacts = {{artifact, {Sha256Hex(artifact + job.kind), 3}, "text/plain"}};
-    store_->Publish(LeaseOf(job), publication);
+    worker().Publish(LeaseOf(job), publication);
   }
   void FailWith(const JobRecord& job, ErrorCode code) {
-    store_->Fail(LeaseOf(job), {code, "TEST", "it broke"}, {});
+    worker().Fail(LeaseOf(job), {code, "TEST", "it broke"}, {});
   }
   JobState StateOf(const std::string& name) { return store_->GetJob(name).state; }
   JobRecord Child(const JobRecord& root, const std::string& kind) {

@@ -25,7 +25,8 @@ constexpr char kUuid[] = "3f0c9a52-7e4b-4c1d-9b1e-2f6d8a7c5b40";
 
 class RpcTest : public ::testing::Test {
  protected:
-  RpcTest() {
+  explicit RpcTest(int64_t max_blob_bytes = 1 << 20)
+      : uploads_(scratch_.path() / "uploads", blobs_, max_blob_bytes) {
     RpcServerOptions options;
     options.listen = "127.0.0.1:0";
     options.watch.poll = std::chrono::milliseconds(10);
@@ -96,7 +97,7 @@ class RpcTest : public ::testing::Test {
 
   ScratchFolder scratch_;
   FileBlobStore blobs_{scratch_.path() / "blobs", {0}};
-  UploadStore uploads_{scratch_.path() / "uploads", blobs_, 1 << 20};
+  UploadStore uploads_;
   SqliteJobStore store_{scratch_.path() / "jobs.db", StoreRole::kServer, SystemClocks()};
   std::unique_ptr<RpcServer> server_;
   std::unique_ptr<TestClient> client_;

@@ -2,9 +2,7 @@
 // kind writes the artifacts that its successors read. A select_key_view job with STRATEGY_MANUAL
 // takes its script from `view`: words separated by commas.
 //   steps=N  ms=N       N steps of the given milliseconds, a checkpoint after each
-//   crash, throw, oom, unavailable_once, hang (ignores cancellation), freeze_writing (stops itself
-//   once while it holds the store's write lock)
-#include <signal.h>
+//   crash, throw, oom, unavailable_once, hang (ignores cancellation)
 #include <unistd.h>
 
 #include <algorithm>
@@ -18,8 +16,6 @@
 #include "core/catalogue/artifacts.h"
 #include "core/catalogue/stages.h"
 #include "server/planning/spec_check.h"
-#include "server/storage/data_folder.h"
-#include "server/store/sqlite_db.h"
 #include "server/worker/worker_loop.h"
 
 namespace color3d {
@@ -81,26 +77,16 @@ class ScriptedRunner : public StageRunner {
                   const CancellationToken& cancel) override;
 
  private:
-  static void Misbehave(const Script& script, const StageRun& run, CheckpointStore& checkpoints);
+  static void Misbehave(const Script& script, CheckpointStore& checkpoints);
 };
 
-void ScriptedRunner::Misbehave(const Script& script,
-                               const StageRun& run,
-                               CheckpointStore& checkpoints) {
+void ScriptedRunner::Misbehave(const Script& script, CheckpointStore& checkpoints) {
   if (script.Has("crash")) std::abort();
   if (script.Has("throw")) throw InvalidArgument("scripted failure");
   if (script.Has("oom")) throw std::bad_alloc();
   if (script.Has("unavailable_once") && !checkpoints.Load()) {
     checkpoints.Save("tried");
     throw Error(ErrorCode::kUnavailable, "scripted outage");
-  }
-  if (script.Has("freeze_writing") && !checkpoints.Load()) {
-    checkpoints.Save("");
-    // data/scratch/<attempt>/tmp
-    const DataPaths paths(run.scratch_folder.parent_path().parent_path().parent_path());
-    SqliteDatabase db(paths.Store(), SqliteAccess::kWrite);
-    SqliteTransaction held(db);
-    ::raise(SIGSTOP);
   }
   while (script.Has("hang")) std::this_thread::sleep_for(std::chrono::milliseconds(20));
 }
@@ -113,7 +99,7 @@ StageOutput ScriptedRunner::Run(const StageRun& run,
   const std::string kind = KindOf(run.spec);
   for (const FileDigest& digest : SpecBlobs(run.spec)) ReadFile(blobs.Fetch(digest.sha256));
   const Script script = ParseScript(run.spec.select_key_view().view());
-  Misbehave(script, run, checkpoints);
+  Misbehave(script, checkpoints);
   // The state has a line for each step with its process. Each Save is fenced, so the published
   // trace has every step once, whatever is killed in between.
   std::string trace = checkpoints.Load().value_or("");

@@ -29,10 +29,11 @@ class ServerProcess {
   ServerProcess(const std::filesystem::path& folder,
                 std::vector<std::string> extra,
                 int workers = 1,
-                rlim_t max_descriptors = 0) {
+                rlim_t max_descriptors = 0,
+                const std::string& program = COLOR3D_SERVER) {
     const std::filesystem::path port_file = folder / "port";
     std::filesystem::remove(port_file);
-    std::vector<std::string> arguments = {COLOR3D_SERVER,
+    std::vector<std::string> arguments = {program,
                                           "serve",
                                           "--port-file",
                                           port_file,
@@ -66,7 +67,7 @@ class ServerProcess {
     if (pid_ == 0) {
       const rlimit limit{max_descriptors, max_descriptors};
       if (max_descriptors > 0) ::setrlimit(RLIMIT_NOFILE, &limit);
-      ::execv(COLOR3D_SERVER, argv.data());
+      ::execv(program.c_str(), argv.data());
       ::_exit(127);
     }
     for (int i = 0; i < 400 && !std::filesystem::exists(port_file) && !HasEnded(); ++i) SleepMs(25);

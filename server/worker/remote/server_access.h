@@ -1,0 +1,49 @@
+// What a worker has of its server: job store and blobs. On the server's machine it calls the
+// private socket and shares the folder of blobs, so that files are linked and not sent; from
+// another machine it calls the server's port and has a cache. Thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "server/ops/socket_folder.h"
+#include "server/storage/data_folder.h"
+#include "server/worker/remote/blob_cache.h"
+#include "server/worker/remote/log_sender.h"
+#include "server/worker/remote/remote_store.h"
+#include "server/worker/remote/worker_link.h"
+
+namespace color3d {
+
+class ServerAccess {
+ public:
+  // On the server's machine: `paths` is its data folder.
+  ServerAccess(const DataPaths& paths,
+               const LinkTiming& timing,
+               const std::string& release,
+               int64_t reserve_bytes);
+  // On another machine: `paths` is a folder of this worker. Log lines of jobs go to the server.
+  ServerAccess(const DataPaths& paths,
+               const LinkTiming& timing,
+               const std::string& release,
+               const WorkerTarget& target,
+               int64_t cache_bytes);
+
+  WorkerStore& store() { return store_; }
+  // For heartbeats: with its own connection, so that transfers do not delay them.
+  WorkerStore& heartbeat_store() { return heartbeat_store_; }
+  WorkerBlobs& blobs() { return *blobs_; }
+  // Null on the server's machine, where they are written to files.
+  const std::shared_ptr<LogSender>& logs() const { return logs_; }
+
+ private:
+  std::optional<SocketFolder> sockets_;  // gives addresses that are valid while it lives
+  WorkerLink link_, heartbeat_link_;
+  RemoteStore store_, heartbeat_store_;
+  std::optional<BlobCache> cache_;
+  std::unique_ptr<WorkerBlobs> blobs_;
+  std::shared_ptr<LogSender> logs_;
+};
+
+}  // namespace color3d
