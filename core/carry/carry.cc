@@ -231,16 +231,23 @@ double Coverage(const CarriedColor& color, float least) {
   return static_cast<double>(covered) / static_cast<double>(color.confidence.data.size());
 }
 
-void Agreement::Add(const CarriedColor& color) {
-  for (float value : color.confidence.data) {
+Agreement AgreementOf(const Image& confidence) {
+  Agreement agreement;
+  for (float value : confidence.data) {
     if (!(value > static_cast<float>(kMinMatchProbability))) continue;
-    confidence_sum += value;
-    ++pixels;
+    agreement.confidence_sum += value;
+    ++agreement.pixels;
   }
+  return agreement;
 }
 
-double Agreement::Mean() const {
-  return pixels > 0 ? confidence_sum / static_cast<double>(pixels) : 1.0;
+double MeanAgreement(const std::vector<Agreement>& views) {
+  Agreement all;
+  for (const Agreement& view : views) {
+    all.confidence_sum += view.confidence_sum;
+    all.pixels += view.pixels;
+  }
+  return all.pixels > 0 ? all.confidence_sum / static_cast<double>(all.pixels) : 1.0;
 }
 
 }  // namespace color3d

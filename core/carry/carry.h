@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "core/base/image.h"
 #include "core/scene/camera.h"
@@ -57,14 +58,17 @@ void FillFrom(const CarriedColor& other, CarriedColor* color);
 // Share of the pixels whose confidence is above `least`, 0..1.
 double Coverage(const CarriedColor& color, float least);
 
-// How well depth and luminance of the views agree where they show the same surfaces. It is low when
-// the geometry or the poses are wrong, or when surfaces look different from each side.
+// How well depth and luminance of a view agree with those of key views where they show the same
+// surfaces. It is low when the geometry or the poses are wrong, or when surfaces look different
+// from each side.
 struct Agreement {
   double confidence_sum = 0.0;  // over the pixels with carried colours
   int64_t pixels = 0;
-  void Add(const CarriedColor& color);
-  // Mean match probability, 0..1; 1 without pixels.
-  double Mean() const;
 };
+
+// `confidence`: of carried colours, 1 channel, 0..1.
+Agreement AgreementOf(const Image& confidence);
+// Mean match probability of the views' pixels with carried colours, 0..1; 1 without any.
+double MeanAgreement(const std::vector<Agreement>& views);
 
 }  // namespace color3d

@@ -127,14 +127,14 @@ TEST_F(CarryStageTest, CarriesKeyViewIntoEveryView) {
 
 TEST_F(CarryStageTest, CarriesNothingIfViewsAgreeTooLittle) {
   Run();
-  Agreement agreement;
-  for (const int other : {0, 2, 3, 4})
-    agreement.Add({Carried(other).ab, Carried(other).confidence});
-  EXPECT_GT(agreement.Mean(), 0.8) << "the geometry is right";
-  options_.min_agreement = agreement.Mean() - 1e-4;
+  std::vector<Agreement> agreements;
+  for (const int other : {0, 2, 3, 4}) agreements.push_back(AgreementOf(Carried(other).confidence));
+  const double agreement = MeanAgreement(agreements);
+  EXPECT_GT(agreement, 0.8) << "the geometry is right";
+  options_.min_agreement = agreement - 1e-4;
   EXPECT_GT(Run()["coverage"], 0.4);
   EXPECT_EQ(observer_.text, "");
-  options_.min_agreement = agreement.Mean() + 1e-4;
+  options_.min_agreement = agreement + 1e-4;
   const nlohmann::json facts = Run();
   EXPECT_EQ(facts["coverage"], 0.0);
   EXPECT_EQ(facts["views"][1]["coverage"], 1.0) << "the key view";

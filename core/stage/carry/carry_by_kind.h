@@ -3,6 +3,7 @@
 // where a killed worker has stopped.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "core/scene/scene.h"
@@ -17,6 +18,8 @@ struct CarryInputs {
   const Scene& scene;
   std::vector<int> key_views;     // indices, in order of importance
   const GaussianModel& geometry;  // empty for films
+
+  bool IsKeyView(int view) const { return std::ranges::find(key_views, view) != key_views.end(); }
 };
 
 // Static scenes: by depth and visibility.

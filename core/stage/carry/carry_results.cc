@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "core/carry/confidence.h"
 #include "core/catalogue/error_model.h"
 #include "core/stage/formats/carry_facts.h"
@@ -14,14 +12,12 @@ namespace {
 constexpr double kSmallCoverage = 0.01;  // below, the user is warned
 
 // Mean over the views that are not key views.
-double MeanCoverage(const std::vector<double>& coverage, const std::vector<int>& key_views) {
+double MeanCoverage(const CarryInputs& inputs, const std::vector<double>& coverage) {
   double sum = 0.0;
   for (size_t i = 0; i < coverage.size(); ++i) {
-    if (std::ranges::find(key_views, static_cast<int>(i)) == key_views.end()) {
-      sum += coverage[i];
-    }
+    if (!inputs.IsKeyView(static_cast<int>(i))) sum += coverage[i];
   }
-  const size_t others = coverage.size() - key_views.size();
+  const size_t others = coverage.size() - inputs.key_views.size();
   return others > 0 ? sum / static_cast<double>(others) : 1.0;
 }
 
@@ -35,7 +31,7 @@ double WriteCoverage(const CarryInputs& inputs,
   const std::vector<View>& views = inputs.scene.views;
   CarryFacts facts;
   for (const int view : inputs.key_views) facts.key_views.push_back(views[view].name);
-  const double mean = MeanCoverage(coverage, inputs.key_views);
+  const double mean = MeanCoverage(inputs, coverage);
   facts.coverage = mean;
   for (size_t i = 0; i < coverage.size(); ++i) facts.view_coverage[views[i].name] = coverage[i];
   context.progress().OnError(0, kCoverageCurve, mean);

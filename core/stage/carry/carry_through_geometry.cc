@@ -31,31 +31,15 @@ void AddChannel(const Image& plane, Image* image) {
   image->data.insert(image->data.end(), plane.data.begin(), plane.data.end());
 }
 
-bool IsKeyView(const CarryInputs& inputs, int view) {
-  return std::ranges::find(inputs.key_views, view) != inputs.key_views.end();
-}
-
-double MeasureAgreement(const CarryInputs& inputs,
-                        const CarryCheckpoint& done,
-                        StageContext& context) {
-  Agreement agreement;
-  for (int view = 0; view < static_cast<int>(inputs.scene.views.size()); ++view) {
-    context.ThrowIfCancelled();
-    if (IsKeyView(inputs, view)) continue;
-    AbMap map = DecodeAbPng(done.Png(view), inputs.scene.views[view].name);
-    agreement.Add({std::move(map.ab), std::move(map.confidence)});
-  }
-  return agreement.Mean();
-}
-
+// Only key views keep their colours.
 void RemoveCarried(const CarryInputs& inputs, CarryCheckpoint& done, StageContext& context) {
   for (int view = 0; view < static_cast<int>(inputs.scene.views.size()); ++view) {
     context.ThrowIfCancelled();
-    if (IsKeyView(inputs, view)) continue;
-    const std::string& name = inputs.scene.views[view].name;
-    const Image old = DecodeAbPng(done.Png(view), name).confidence;
-    done.Replace(
-        view, 0.0, EncodeAbPng(Image(old.width, old.height, 2), Image(old.width, old.height, 1)));
+    if (inputs.IsKeyView(view)) continue;
+    const ImageInfo size = ProbeImage(done.Png(view), inputs.scene.views[view].name);
+    done.Replace(view,
+                 0.0,
+                 EncodeAbPng(Image(size.width, size.height, 2), Image(size.width, size.height, 1)));
   }
 }
 
@@ -110,16 +94,24 @@ void CarryIntoViews(const CarryInputs& inputs,
                     StageContext& context) {
   CarryCheckpoint done(inputs.scene, context);
   const std::vector<int> order = inputs.scene.ViewsInOrderOfTime();
+  std::vector<Agreement> agreements(inputs.scene.views.size());  // none of key views
   context.pool().ForEach(std::ssize(order), [&](int64_t index, int) {
     context.ThrowIfCancelled();
     const int view = order[index];
-    if (done.WasDone(view)) return;
     const auto key = std::ranges::find(keys, view, &ColoredKeyView::view);
     const bool is_key = key != keys.end();
+    if (done.WasDone(view)) {
+      if (!is_key) {
+        const std::string& name = inputs.scene.views[view].name;
+        agreements[view] = AgreementOf(DecodeAbPng(done.Png(view), name).confidence);
+      }
+      return;
+    }
     const CarriedColor color = is_key ? key->color : carry(view);
+    if (!is_key) agreements[view] = AgreementOf(color.confidence);
     done.Add(view, is_key ? 1.0 : CoveredShare(color), EncodeCarriedPng(color));
   });
-  const double agreement = min_agreement > 0.0 ? MeasureAgreement(inputs, done, context) : 1.0;
+  const double agreement = MeanAgreement(agreements);
   if (agreement >= min_agreement) {
     WarnOfSmallCoverage(WriteCoverage(inputs, done.coverage(), context), context);
     return;

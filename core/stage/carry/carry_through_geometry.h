@@ -36,7 +36,7 @@ std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
 
 // Writes the colours of all views: those of key views as they are, of other ones as `carry` gives
 // them. `carry` is called from several threads, for views of one time after each other. If the
-// views agree less than `min_agreement` (Agreement::Mean), the user is warned and only key views
+// views agree less than `min_agreement` (MeanAgreement), the user is warned and only key views
 // keep their colours.
 void CarryIntoViews(const CarryInputs& inputs,
                     const std::vector<ColoredKeyView>& keys,

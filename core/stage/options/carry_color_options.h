@@ -16,7 +16,7 @@ struct CarryColorOptions {
   int depth_sources = 4;    // views that each view is compared with, 1..16
   PlaneSweepOptions sweep;
   CarryOptions carry;
-  // Of static scenes: nothing is carried if the views agree less (Agreement::Mean), 0..1.
+  // Of static scenes: nothing is carried if the views agree less (MeanAgreement), 0..1.
   double min_agreement = 0.5;
   FilmCarryOptions film;  // of films
   // Names or unique file stems, in order of importance, at most kMaxAdditionalKeyViews. Each gives
