@@ -11,14 +11,14 @@ packages=(
   libtorch-dev libopenblas0-pthread # without the latter LibTorch multiplies matrices 30 times slower
   libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libabsl-dev
   libopencv-dev libeigen3-dev colmap
-  libsqlite3-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
+  libsqlite3-dev libpqxx-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
   prometheus-cpp-dev libcurl4-openssl-dev
   libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev liblcms2-dev libzstd-dev libseccomp-dev
   libavcodec-dev libavformat-dev libavutil-dev libswscale-dev # film
 )
 case "${1:-}" in
   "") ;;
-  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus systemd
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus postgresql-15 systemd
     python3-grpcio python3-protobuf python3-numpy python3-pil
     python3-venv python3-setuptools python3-wheel mypy python3-yaml) ;;
   --fuzz) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang libclang-rt-dev) ;;

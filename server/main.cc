@@ -1,6 +1,6 @@
-// color3d-server: `serve` answers RPCs and supervises workers; `token`, `backup`, `restore` and
-// `fsck` are for operators; `worker` executes color3d-worker, the program beside this one that
-// links the method library.
+// color3d-server: `serve` answers RPCs and supervises workers; `token`, `backup`, `restore`,
+// `fsck` and `migrate` are for operators; `worker` executes color3d-worker, the program beside this
+// one that links the method library.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
@@ -20,6 +20,7 @@
 #include "server/keeping/fsck.h"
 #include "server/ops/process.h"
 #include "server/serve.h"
+#include "server/store/postgresql/copy_store.h"
 
 namespace color3d {
 namespace {
@@ -32,6 +33,10 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
       ->capture_default_str();
   serve->add_option("--data-dir", options->data_folder, "Data folder with jobs and files")
       ->required();
+  serve->add_option("--store",
+                    options->store,
+                    "postgresql://ROLE@HOST:PORT/DATABASE with the jobs, which several servers may "
+                    "share; default: jobs.db in the data folder");
   serve
       ->add_option(
           "--workers", options->workers, "Number of worker processes; each runs one job at a time")
@@ -201,6 +206,7 @@ void TakeFromEnvironment(const char* variable, std::vector<std::string>* values)
 
 struct KeepingArguments {
   std::filesystem::path data_folder, copy;
+  std::string address;  // of a PostgreSQL store
   bool repair = false;
   std::function<int()> run;  // empty: another command
 };
@@ -252,9 +258,11 @@ int RunRestore(const KeepingArguments& arguments) {
 
 int RunFsck(const KeepingArguments& arguments) {
   const bool is_terminal = ::isatty(2) == 1;
-  const FsckResult result = Fsck(arguments.data_folder, arguments.repair, [&](int64_t blobs) {
+  const auto progress = [&](int64_t blobs) {
     if (is_terminal && blobs % 100 == 0) std::cerr << "\r" << blobs << " blobs" << std::flush;
-  });
+  };
+  const FsckResult result =
+      Fsck(arguments.data_folder, arguments.address, arguments.repair, progress);
   if (is_terminal) std::cerr << "\r";
   for (const std::string& problem : result.store_problems)
     std::cout << "jobs.db: " << problem << "\n";
@@ -284,6 +292,25 @@ int RunFsck(const KeepingArguments& arguments) {
   return result.IsGood() ? 0 : 1;
 }
 
+int RunMigrate(const KeepingArguments& arguments) {
+  const bool is_terminal = ::isatty(2) == 1;
+  const CopiedStore copied =
+      CopyToPostgresql(arguments.data_folder / "jobs.db",
+                       arguments.address,
+                       [&](const std::string& table, int64_t rows) {
+                         if (is_terminal)
+                           std::cerr << fmt::format("\r{}: {} rows   ", table, rows) << std::flush;
+                       });
+  if (is_terminal) std::cerr << "\r";
+  std::cout << fmt::format(
+      "{} scenes, {} jobs and {} events copied and verified; start color3d-server serve --store on "
+      "it with the same blobs\n",
+      copied.rows.at("scene"),
+      copied.rows.at("job"),
+      copied.rows.at("job_event"));
+  return 0;
+}
+
 void AddKeeping(CLI::App* app, KeepingArguments* arguments) {
   const auto add = [&](const char* name, const char* what, int (*run)(const KeepingArguments&)) {
     CLI::App* command = app->add_subcommand(name, what);
@@ -298,8 +325,14 @@ void AddKeeping(CLI::App* app, KeepingArguments* arguments) {
   add("restore", "Restore a backup to a new data folder", RunRestore)
       ->add_option("FOLDER", arguments->copy, "Folder of the backup")
       ->required();
-  add("fsck", "Check a data folder; no server may use it", RunFsck)
-      ->add_flag("--repair", arguments->repair, "Set damaged blobs aside");
+  CLI::App* fsck = add("fsck", "Check a data folder; no server may use it", RunFsck);
+  fsck->add_flag("--repair", arguments->repair, "Set damaged blobs aside");
+  fsck->add_option("--store", arguments->address, "As for serve, if jobs are in PostgreSQL");
+  add("migrate", "Copy the jobs of a data folder to PostgreSQL; the server may run", RunMigrate)
+      ->add_option("--to",
+                   arguments->address,
+                   "postgresql://ROLE@HOST:PORT/DATABASE: empty, or a copy that no server has used")
+      ->required();
 }
 
 // Replaces this process with color3d-worker and the arguments after "worker".

@@ -110,7 +110,7 @@ std::chrono::milliseconds Maintenance::Reap() {
     const int reaped = store_.ReapExpired();
     counts_.attempts_lost += reaped;
     if (reaped > 0) spdlog::warn("{} attempts were lost with their worker", reaped);
-    PauseWhenSpaceIsLow();
+    if (timing_.has_chores()) PauseWhenSpaceIsLow();
     ReturnFreeSpace();
     ForgetLostWorkers();
   } catch (const std::exception& e) {
@@ -167,18 +167,13 @@ void Maintenance::PauseWhenSpaceIsLow() {
 
 std::chrono::milliseconds Maintenance::Sweep() {
   try {
-    const auto [uploads, unread_uploads] = uploads_.ReapOlderThan(timing_.grace);
+    const bool has_chores = timing_.has_chores();
+    auto [uploads, unreadable] = uploads_.ReapOlderThan(timing_.grace);
     if (uploads > 0) spdlog::info("swept {} unfinished uploads", uploads);
-    auto [blobs, unreadable] = ListBlobs(blobs_, [this] { return IsStopping(); });
-    unreadable.insert(unreadable.end(), unread_uploads.begin(), unread_uploads.end());
-    ExpireJobs();
-    CollectBlobs(blobs);
     SweepScratch(&unreadable);
     SweepJobLogs(&unreadable);
-    const auto before = [this](std::chrono::milliseconds age) { return clock_() - age.count(); };
-    store_.Compact(before(timing_.keep_events), before(timing_.keep_request_ids));
-    Scrub(blobs, &unreadable);
-    if (unreadable.empty()) return timing_.sweep;
+    if (has_chores) SweepForAll(&unreadable);
+    if (unreadable.empty()) return has_chores ? timing_.sweep : timing_.sweep_again;
     ++counts_.sweeps_failed;
     constexpr size_t kTold = 5;
     for (size_t i = 0; i < std::min(kTold, unreadable.size()); ++i) {
@@ -193,6 +188,16 @@ std::chrono::milliseconds Maintenance::Sweep() {
     spdlog::error("the sweep failed and is tried again soon: {}", e.what());
   }
   return timing_.sweep_again;
+}
+
+void Maintenance::SweepForAll(std::vector<std::string>* unreadable) {
+  const auto [blobs, unread] = ListBlobs(blobs_, [this] { return IsStopping(); });
+  unreadable->insert(unreadable->end(), unread.begin(), unread.end());
+  ExpireJobs();
+  CollectBlobs(blobs);
+  const auto before = [this](std::chrono::milliseconds age) { return clock_() - age.count(); };
+  store_.Compact(before(timing_.keep_events), before(timing_.keep_request_ids));
+  Scrub(blobs, unreadable);
 }
 
 // Once per regular sweep, not per retry of a failed one.

@@ -38,6 +38,9 @@ struct MaintenanceTiming {
   // Created while more than `reserve_bytes` are free, released if a deletion needs the space.
   Ballast* ballast = nullptr;
   int64_t reserve_bytes = 0;
+  // Returns true if this server, of all servers on the store, collects blobs, expires jobs and
+  // pauses the queue.
+  std::function<bool()> has_chores = [] { return true; };
 };
 
 // Sets damaged blobs aside, so that an upload or another run replaces them. Cycles through all
@@ -71,7 +74,8 @@ class Maintenance {
  public:
   const ChoreCounts& counts() const { return counts_; }
 
-  // Sweeps at once, then every `sweep`. The arguments must outlive this object.
+  // Sweeps at once, then every `sweep`, or every `sweep_again` while it has no chores. The
+  // arguments must outlive this object.
   Maintenance(JobStore& store,
               BlobStore& blobs,
               UploadStore& uploads,
@@ -87,6 +91,8 @@ class Maintenance {
   void Repeat(const std::function<std::chrono::milliseconds()>& chore);
   std::chrono::milliseconds Reap();
   std::chrono::milliseconds Sweep();
+  // The part that one of all servers does.
+  void SweepForAll(std::vector<std::string>* unreadable);
   void PauseWhenSpaceIsLow();
   void ReturnFreeSpace();
   void ForgetLostWorkers();

@@ -38,7 +38,7 @@
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
-#include "server/store/sqlite_job_store.h"
+#include "server/store/open_store.h"
 #include "server/worker/supervision/supervisor.h"
 #include "server/worker/supervision/worker_settings.h"
 
@@ -261,7 +261,9 @@ void Serve(const ServeOptions& options) {
   store_options.program_version = COLOR3D_VERSION;
   store_options.retry_backoff_ms = options.worker.retry_backoff_ms;
   store_options.max_attempts = options.max_attempts;
-  SqliteJobStore store(paths.Store(), StoreRole::kServer, SystemClocks(), store_options);
+  const OpenedStore opened = OpenStore(options.store, paths.Store(), store_options);
+  JobStore& store = *opened.store;
+  notify.sends = opened.has_chores;
   BlobStoreOptions blob_options;
   blob_options.reserve_bytes = options.worker.reserve_mib << 20;
   FileBlobStore blobs(paths.Blobs(), blob_options);
@@ -326,6 +328,7 @@ void Serve(const ServeOptions& options) {
   chores.keep_uncommitted = std::chrono::hours(24) * options.keep_uncommitted_days;
   chores.forget_workers = 3 * Milliseconds(options.worker.lease_seconds);
   chores.low_space_bytes = options.low_space_mib << 20;
+  chores.has_chores = opened.has_chores;
   chores.ballast = &ballast;
   chores.reserve_bytes = options.worker.reserve_mib << 20;
   chores.on_life = [&probe] {
@@ -342,13 +345,14 @@ void Serve(const ServeOptions& options) {
     });
     spdlog::info("metrics on port {}", port);
   }
-  spdlog::info("listening on {}{}{}, data in {}, {} workers",
+  spdlog::info("listening on {}{}{}, data in {}, jobs in {}, {} workers",
                server.address(),
                tls.empty() ? "" : " with TLS",
                options.tokens.empty() && options.certificate_roles.empty()
                    ? ""
                    : ", for those with a token or a role",
                paths.root.string(),
+               opened.name,
                options.workers);
 
   NotifyServiceManager("READY=1");

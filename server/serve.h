@@ -21,6 +21,8 @@ struct ServeOptions {
   std::filesystem::path certificate_roles;
   int max_connections = 4096;
   std::filesystem::path data_folder;
+  // postgresql://..., shared with other servers; empty: jobs.db in the data folder.
+  std::string store;
   std::filesystem::path port_file;  // empty: none
   int workers = 1;
   // Passed to the workers, except for folder, threads, memory and grace, which `serve` sets.

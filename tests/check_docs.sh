@@ -11,8 +11,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 
 other_flags='--build --install --prefix --preset --target --test-dir --output-on-failure --gtest_filter
-  --plugin --python_out --grpc_python_out --ignore-scripts'
-other_names='add_secure_port transport_socket per_connection_buffer_limit_bytes'
+  --plugin --python_out --grpc_python_out --ignore-scripts --pwprompt --owner --encoding --template
+  --format --file --dbname'
+other_names='add_secure_port transport_socket per_connection_buffer_limit_bytes pg_dump target_session_attrs'
 
 lists=$(mktemp -d)
 trap 'rm -rf "$lists"' EXIT

@@ -1,28 +1,30 @@
 #include "server/keeping/fsck.h"
 
+#include <memory>
 #include <set>
 
 #include "core/base/digest.h"
 #include "core/base/error.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/file_blob_store.h"
-#include "server/store/sqlite_job_store.h"
+#include "server/store/open_store.h"
 #include "server/store/store_file.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
 
 FsckResult Fsck(const fs::path& data_folder,
+                const std::string& address,
                 bool repair,
                 const std::function<void(int64_t blobs)>& progress) {
   const DataPaths paths(data_folder);
-  RequireStore(paths.Store());
+  if (address.empty()) RequireStore(paths.Store());
   const DataFolderLock lock(paths);
   FsckResult result;
-  result.store_problems = StoreProblems(paths.Store());
+  if (address.empty()) result.store_problems = StoreProblems(paths.Store());
   if (!result.store_problems.empty()) return result;  // its references are unreliable
-  SqliteJobStore store(paths.Store(), StoreRole::kTool, SystemClocks());
-  std::set<std::string> named = store.ReferencedBlobs();
+  const std::unique_ptr<JobStore> store = OpenStoreAsTool(address, paths.Store());
+  std::set<std::string> named = store->ReferencedBlobs();
   FileBlobStore blobs(paths.Blobs());
   std::vector<std::string> damaged;
   const auto check = [&](const StoredBlob& blob) {
@@ -44,7 +46,7 @@ FsckResult Fsck(const fs::path& data_folder,
   const std::vector<std::string> unlisted = blobs.ForEach(check);
   result.unreadable.insert(result.unreadable.end(), unlisted.begin(), unlisted.end());
   // Referenced blobs that the scan did not find are looked up by name.
-  const std::set<std::string> awaited = store.AwaitedBlobs();
+  const std::set<std::string> awaited = store->AwaitedBlobs();
   for (const std::string& sha256 : std::vector<std::string>(named.begin(), named.end())) {
     try {
       if (const auto blob = blobs.Look(sha256)) {

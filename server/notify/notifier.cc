@@ -103,7 +103,7 @@ std::optional<Notification> Notifier::NextDue() {
   const auto now = Steady::now();
   if (now < next_poll_) return std::nullopt;
   next_poll_ = now + options_.poll;
-  due_ = store_.DueNotifications(kOfEachReceiver);
+  due_ = options_.sends() ? store_.DueNotifications(kOfEachReceiver) : std::vector<Notification>();
   std::set<Key> owed;
   for (const Notification& due : due_) owed.insert(NotificationKey(due));
   // Forgets notifications that the store no longer owes, unless their outcome is not stored yet.

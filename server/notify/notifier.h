@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -38,6 +39,8 @@ struct NotifierOptions {
   std::chrono::milliseconds silence{10'000};
   // Pause before the store is asked again to accept outcomes.
   std::chrono::milliseconds store_pause{5'000};
+  // Returns true if this server, of all servers on the store, sends.
+  std::function<bool()> sends = [] { return true; };
 };
 
 // {"type": "job.succeeded", "timestamp": ..., "data": {"name": "jobs/...", ...}}.

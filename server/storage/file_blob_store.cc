@@ -12,6 +12,8 @@
 #include <ctime>
 #include <memory>
 #include <optional>
+#include <random>
+#include <string>
 #include <vector>
 
 #include "core/base/files.h"
@@ -42,6 +44,30 @@ class FolderLock {
   int fd_;
   bool held_ = false;
 };
+
+// Moves a file of another file system beside `place`, where it can be renamed. Returns its path.
+fs::path OnSameDisk(const fs::path& file, const fs::path& place) {
+  struct stat own {
+  }, other{};
+  if (::stat(file.c_str(), &own) != 0 || ::stat(place.parent_path().c_str(), &other) != 0 ||
+      own.st_dev == other.st_dev) {
+    return file;
+  }
+  // Unique over all machines that share the folder.
+  std::random_device random;
+  const fs::path beside = place.parent_path() / ("." + place.filename().string() + "." +
+                                                 std::to_string(random()) + ".part");
+  std::error_code error;
+  if (!fs::copy_file(file, beside, error)) {
+    fs::remove(beside);
+    throw ServiceError(ErrorReason::kStorageFull,
+                       "cannot copy a blob to {}: {}; free some disk space there",
+                       place.parent_path().string(),
+                       error.message());
+  }
+  fs::remove(file, error);
+  return beside;
+}
 
 // Returns nothing if there is no such file. Throws if the disk cannot tell.
 std::optional<struct stat> StatusOf(const fs::path& path) {
@@ -183,8 +209,9 @@ void FileBlobStore::Adopt(const fs::path& file, const FileDigest& digest) {
   }
   const fs::path path = PlaceFor(digest.sha256);
   ::chmod(file.c_str(), 0444);
+  const fs::path beside = OnSameDisk(file, path);
   FolderLock lock(folder_, LOCK_SH);
-  PublishFile(file, path);
+  PublishFile(beside, path);
   struct stat status {};
   if (::stat(path.c_str(), &status) == 0) TouchFile(path, status);
 }

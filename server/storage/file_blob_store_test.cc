@@ -42,6 +42,19 @@ TEST_F(FileBlobStoreTest, MovesFilesIn) {
   EXPECT_FALSE(fs::exists(file)) << "a duplicate is dropped";
 }
 
+// At least one of the folders is on another file system than the blobs.
+TEST_F(FileBlobStoreTest, MovesFilesInFromAnotherDisk) {
+  for (const fs::path& folder : {fs::path("/dev/shm"), fs::temp_directory_path()}) {
+    if (!fs::is_directory(folder)) continue;
+    const fs::path file = folder / ("color3d-blob-" + std::to_string(::getpid()));
+    WriteFileAtomic(file, "from " + folder.string());
+    const FileDigest digest = blobs_.PutFile(file);
+    EXPECT_FALSE(fs::exists(file));
+    EXPECT_EQ(ReadFile(blobs_.Fetch(digest.sha256)), "from " + folder.string());
+    EXPECT_EQ(blobs_.RemoveLeftovers(std::chrono::seconds(0)), 0);
+  }
+}
+
 TEST_F(FileBlobStoreTest, RemovesUntouchedBlobsOnly) {
   const auto stored = [&] {
     std::map<std::string, StoredBlob> all;

@@ -3,12 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/support/service/job_store_fixture.h"
+#include "tests/support/service/any_store_fixture.h"
 
 namespace color3d {
 namespace {
 
-class ProjectStoreTest : public JobStoreTest {
+class ProjectStoreTest : public AnyStoreTest {
  protected:
   ProjectStoreTest() {
     for (const ProjectStore& project : {a_, b_}) {
@@ -31,8 +31,9 @@ class ProjectStoreTest : public JobStoreTest {
 
   ProjectStore a_{*store_, "a"}, b_{*store_, "b"}, none_{*store_, ""};
 };
+COLOR3D_FOR_ALL_STORES(ProjectStoreTest);
 
-TEST_F(ProjectStoreTest, ProjectsSeeOnlyTheirJobsAndScenes) {
+TEST_P(ProjectStoreTest, ProjectsSeeOnlyTheirJobsAndScenes) {
   const JobRecord job = Create(a_);
   EXPECT_EQ(job.scene, "scenes/house");
   EXPECT_EQ(a_.GetJob(job.name).scene, "scenes/house");
@@ -65,7 +66,7 @@ TEST_F(ProjectStoreTest, ProjectsSeeOnlyTheirJobsAndScenes) {
   EXPECT_EQ(StateOf(job.name), JobState::kQueued);
 }
 
-TEST_F(ProjectStoreTest, ScenesAndColorizersKeepPublicNames) {
+TEST_P(ProjectStoreTest, ScenesAndColorizersKeepPublicNames) {
   Create(a_);
   const JobRecord job = ClaimOne();
   EXPECT_EQ(store_->GetScene(job.scene).files.size(), 1u) << "as workers look for it";
@@ -74,7 +75,7 @@ TEST_F(ProjectStoreTest, ScenesAndColorizersKeepPublicNames) {
   EXPECT_EQ(a_.GetScene("scenes/house").name, "scenes/house");
 }
 
-TEST_F(ProjectStoreTest, RequestIdsBelongToProject) {
+TEST_P(ProjectStoreTest, RequestIdsBelongToProject) {
   const RequestKey key{"CreateJob", "id", "body"};
   const JobRecord of_a = a_.CreateGraph(Graph(), key, kNoLimit);
   const JobRecord of_b = b_.CreateGraph(Graph(), {"CreateJob", "id", "another body"}, kNoLimit);
@@ -89,7 +90,7 @@ TEST_F(ProjectStoreTest, RequestIdsBelongToProject) {
   EXPECT_EQ(ReasonThrown([&] { a_.Delete(of_a.name, {}); }), "JOB_NOT_FOUND");
 }
 
-TEST_F(ProjectStoreTest, BlobsAreReadableByTheirHolders) {
+TEST_P(ProjectStoreTest, BlobsAreReadableByTheirHolders) {
   const FileDigest photo{Sha256Hex("photo"), 5};
   EXPECT_FALSE(a_.HoldsBlob(photo)) << "to know its digest is not to have it";
   a_.HoldBlob(photo);
@@ -116,7 +117,7 @@ TEST_F(ProjectStoreTest, BlobsAreReadableByTheirHolders) {
   EXPECT_EQ(b_.Usage().stored_bytes, 0);
 }
 
-TEST_F(ProjectStoreTest, RowsCountTowardsQuota) {
+TEST_P(ProjectStoreTest, RowsCountTowardsQuota) {
   const int64_t before = a_.Usage().row_bytes;
   SceneRecord scene;
   scene.name = "scenes/long";
@@ -149,7 +150,7 @@ TEST_F(ProjectStoreTest, RowsCountTowardsQuota) {
   EXPECT_GT(a_.Usage().row_bytes, before + 2048 + 300 - 1) << "request ids have rows, too";
 }
 
-TEST_F(ProjectStoreTest, LimitsScenesAndUncommittedScenes) {
+TEST_P(ProjectStoreTest, LimitsScenesAndUncommittedScenes) {
   const SceneLimits limits{4, 2};
   const auto create = [&](const ProjectStore& project, const std::string& name) {
     SceneRecord scene;
@@ -168,7 +169,7 @@ TEST_F(ProjectStoreTest, LimitsScenesAndUncommittedScenes) {
   EXPECT_EQ(create(a_, "four"), "nothing");
 }
 
-TEST_F(ProjectStoreTest, OneProjectCannotFillQueue) {
+TEST_P(ProjectStoreTest, OneProjectCannotFillQueue) {
   const QueueLimits limits(5, 2);
   Create(a_, limits);
   Create(a_, limits);
@@ -180,7 +181,7 @@ TEST_F(ProjectStoreTest, OneProjectCannotFillQueue) {
   EXPECT_EQ(ReasonThrown([&] { Create(b_, QueueLimits(5, 9)); }), "QUEUE_FULL");
 }
 
-TEST_F(ProjectStoreTest, ProjectsTakeTurns) {
+TEST_P(ProjectStoreTest, ProjectsTakeTurns) {
   for (int i = 0; i < 4; ++i) Create(a_);
   for (int i = 0; i < 2; ++i) Create(b_);
   std::string order;

@@ -35,30 +35,30 @@ void SqliteConnections::ReleaseReader(std::unique_ptr<SqliteDatabase> reader) {
   reader_is_back_.NotifyOne();
 }
 
-// The members of a scoped capability are not analysed.
-SqliteConnections::Writer::Writer(SqliteConnections& connections) COLOR3D_NO_THREAD_SAFETY_ANALYSIS
-    : lock_(connections.writing_),
-      db_(connections.writer_) {}
-
-SqliteConnections::Writer::~Writer() COLOR3D_NO_THREAD_SAFETY_ANALYSIS = default;
-
-SqliteConnections::Reader::Reader(SqliteConnections& connections)
-    : connections_(connections), db_(connections.AcquireReader()) {
-  try {
-    db_->Exec("begin");
-  } catch (...) {
-    connections_.ReleaseReader(std::move(db_));
-    throw;
-  }
+void SqliteConnections::RunRead(const Action& action) {
+  std::unique_ptr<SqliteDatabase> db = AcquireReader();
+  const std::shared_ptr<void> back(nullptr, [&](void*) { ReleaseReader(std::move(db)); });
+  db->Exec("begin");
+  const std::shared_ptr<void> end(nullptr, [&](void*) {
+    try {
+      db->Exec("rollback");
+    } catch (const Error&) {
+      // SQLite has ended the transaction by itself (I/O error).
+    }
+  });
+  action(*db);
 }
 
-SqliteConnections::Reader::~Reader() {
-  try {
-    db_->Exec("rollback");
-  } catch (const Error&) {
-    // SQLite has ended the transaction by itself (I/O error).
-  }
-  connections_.ReleaseReader(std::move(db_));
+void SqliteConnections::RunWrite(const Action& action, bool durable) {
+  const MutexLock lock(writing_);
+  SqliteTransaction transaction(writer_, durable);
+  action(writer_);
+  transaction.Commit();
+}
+
+void SqliteConnections::Maintain(const std::function<void(SqliteDatabase&)>& action) {
+  const MutexLock lock(writing_);
+  action(writer_);
 }
 
 }  // namespace color3d

@@ -6,8 +6,10 @@
 #include <atomic>
 #include <cerrno>
 #include <exception>
+#include <string>
 
 #include "server/base/service_error.h"
+#include "server/store/schema.h"
 
 namespace color3d {
 namespace {
@@ -44,65 +46,69 @@ std::atomic<int64_t> g_steps{0};
   }
 }
 
+constexpr SqlDialect kSqliteDialect = {
+    .ordered_join = "cross join",
+    .by_blob_index = "indexed by artifact_blob",
+    .unindexed = "+",
+    .position = "instr",
+    .newest_revision = "select seq from sqlite_sequence where name='job_event'",
+    .claim_lock = "",
+    .keyed_table = "without rowid",
+    .schema_version = kSchemaVersion};
+
+class SqliteCursor : public SqlCursor {
+ public:
+  SqliteCursor(sqlite3* db, std::string_view sql) : db_(db) {
+    Check(sqlite3_prepare_v2(db_, sql.data(), static_cast<int>(sql.size()), &statement_, nullptr),
+          "cannot prepare a statement");
+  }
+  ~SqliteCursor() override {
+    if (statement_ != nullptr) {
+      g_steps += sqlite3_stmt_status(statement_, SQLITE_STMTSTATUS_VM_STEP, 0);
+    }
+    sqlite3_finalize(statement_);
+  }
+  SqliteCursor(const SqliteCursor&) = delete;
+  SqliteCursor& operator=(const SqliteCursor&) = delete;
+
+  void Bind(int64_t value) override {
+    Check(sqlite3_bind_int64(statement_, next_parameter_++, value), "cannot bind a number");
+  }
+  void Bind(double value) override {
+    Check(sqlite3_bind_double(statement_, next_parameter_++, value), "cannot bind a number");
+  }
+  void Bind(std::string_view text) override {
+    const char* data = text.data() != nullptr ? text.data() : "";
+    Check(sqlite3_bind_text64(
+              statement_, next_parameter_++, data, text.size(), SQLITE_TRANSIENT, SQLITE_UTF8),
+          "cannot bind text");
+  }
+  void Bind(SqlBytes bytes) override { Bind(bytes.bytes); }
+  bool Step() override {
+    const int code = sqlite3_step(statement_);
+    if (code == SQLITE_ROW) return true;
+    if (code == SQLITE_DONE) return false;
+    ThrowSqlite(db_, code, "cannot run a statement");
+  }
+  int64_t Int(int column) const override { return sqlite3_column_int64(statement_, column); }
+  double Double(int column) const override { return sqlite3_column_double(statement_, column); }
+  std::string Text(int column) const override {
+    const void* data = sqlite3_column_blob(statement_, column);
+    const int size = sqlite3_column_bytes(statement_, column);
+    return data != nullptr ? std::string(static_cast<const char*>(data), size) : std::string();
+  }
+
+ private:
+  void Check(int code, const char* what) const {
+    if (code != SQLITE_OK) ThrowSqlite(db_, code, what);
+  }
+
+  sqlite3* db_;
+  sqlite3_stmt* statement_ = nullptr;
+  int next_parameter_ = 1;
+};
+
 }  // namespace
-
-SqliteStatement::SqliteStatement(SqliteDatabase& db, std::string_view sql) : db_(db.handle()) {
-  const int code =
-      sqlite3_prepare_v2(db_, sql.data(), static_cast<int>(sql.size()), &statement_, nullptr);
-  if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot prepare a statement");
-}
-
-SqliteStatement::~SqliteStatement() {
-  if (statement_ != nullptr) {
-    g_steps += sqlite3_stmt_status(statement_, SQLITE_STMTSTATUS_VM_STEP, 0);
-  }
-  sqlite3_finalize(statement_);
-}
-
-void SqliteStatement::BindOne(int64_t value) {
-  const int code = sqlite3_bind_int64(statement_, next_parameter_++, value);
-  if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot bind a number");
-}
-
-void SqliteStatement::BindOne(double value) {
-  const int code = sqlite3_bind_double(statement_, next_parameter_++, value);
-  if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot bind a number");
-}
-
-void SqliteStatement::BindOne(std::string_view text) {
-  const char* data = text.data() != nullptr ? text.data() : "";
-  const int code = sqlite3_bind_text64(
-      statement_, next_parameter_++, data, text.size(), SQLITE_TRANSIENT, SQLITE_UTF8);
-  if (code != SQLITE_OK) ThrowSqlite(db_, code, "cannot bind text");
-}
-
-bool SqliteStatement::Step() {
-  const int code = sqlite3_step(statement_);
-  if (code == SQLITE_ROW) return true;
-  if (code == SQLITE_DONE) return false;
-  ThrowSqlite(db_, code, "cannot run a statement");
-}
-
-void SqliteStatement::Run() {
-  while (Step()) {
-  }
-}
-
-std::vector<std::string> SqliteStatement::Texts() {
-  return All([](const SqliteStatement& row) { return row.Text(0); });
-}
-
-int64_t SqliteStatement::Int(int column) const { return sqlite3_column_int64(statement_, column); }
-
-double SqliteStatement::Double(int column) const {
-  return sqlite3_column_double(statement_, column);
-}
-
-std::string SqliteStatement::Text(int column) const {
-  const void* data = sqlite3_column_blob(statement_, column);
-  const int size = sqlite3_column_bytes(statement_, column);
-  return data != nullptr ? std::string(static_cast<const char*>(data), size) : std::string();
-}
 
 SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess access) {
   // Without memory statistics, connections do not share a lock.
@@ -137,7 +143,7 @@ SqliteDatabase::SqliteDatabase(const std::filesystem::path& path, SqliteAccess a
 SqliteDatabase::~SqliteDatabase() { sqlite3_close(db_); }
 
 bool SqliteDatabase::IsEmpty() {
-  SqliteStatement pages(*this, "pragma page_count");
+  SqlStatement pages(*this, "pragma page_count");
   return !pages.Step() || pages.Int(0) == 0;
 }
 
@@ -168,8 +174,18 @@ void SqliteDatabase::Rebuild(const std::filesystem::path& temporary) {
 }
 
 int64_t SqliteDatabase::Steps() { return g_steps; }
-int64_t SqliteDatabase::LastInsertId() const { return sqlite3_last_insert_rowid(db_); }
 int64_t SqliteDatabase::Changes() const { return sqlite3_changes64(db_); }
+const SqlDialect& SqliteDatabase::dialect() const { return kSqliteDialect; }
+
+std::unique_ptr<SqlCursor> SqliteDatabase::Prepare(std::string_view sql) {
+  return std::make_unique<SqliteCursor>(db_, sql);
+}
+
+int64_t SqliteDatabase::Time() const {
+  return std::chrono::duration_cast<std::chrono::milliseconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
 
 SqliteTransaction::SqliteTransaction(SqliteDatabase& db, bool durable)
     : db_(db), durable_(durable) {

@@ -5,97 +5,38 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <string>
+#include <memory>
 #include <string_view>
-#include <type_traits>
-#include <vector>
+
+#include "server/store/sql_database.h"
 
 struct sqlite3;
-struct sqlite3_stmt;
 
 namespace color3d {
 
-class SqliteDatabase;
-
-class SqliteStatement {
- public:
-  SqliteStatement(SqliteDatabase& db, std::string_view sql);
-  // Binds the first parameters.
-  template <typename... Values>
-  SqliteStatement(SqliteDatabase& db, std::string_view sql, const Values&... values)
-      : SqliteStatement(db, sql) {
-    Bind(values...);
-  }
-  ~SqliteStatement();
-  SqliteStatement(const SqliteStatement&) = delete;
-  SqliteStatement& operator=(const SqliteStatement&) = delete;
-
-  // Binds the next parameters, from the left.
-  template <typename... Values>
-  SqliteStatement& Bind(const Values&... values) {
-    (BindOne(values), ...);
-    return *this;
-  }
-  // Moves to the next row; returns false if there is none. Throws on errors.
-  bool Step();
-  // Steps through all rows; for statements whose rows do not matter.
-  void Run();
-  // Returns the first column of the next row, or 0 if there is none.
-  int64_t NextInt() { return Step() ? Int(0) : 0; }
-  // Returns read(row) for each of the remaining rows.
-  template <typename Read>
-  auto All(const Read& read) {
-    std::vector<std::invoke_result_t<Read, const SqliteStatement&>> rows;
-    while (Step()) rows.push_back(read(*this));
-    return rows;
-  }
-  // Returns the first column of the remaining rows.
-  std::vector<std::string> Texts();
-
-  int64_t Int(int column) const;
-  double Double(int column) const;
-  std::string Text(int column) const;  // text or blob; NULL is empty
-
- private:
-  void BindOne(int64_t value);
-  void BindOne(int value) { BindOne(static_cast<int64_t>(value)); }
-  void BindOne(bool value) { BindOne(static_cast<int64_t>(value)); }
-  void BindOne(double value);
-  void BindOne(std::string_view text);
-  void BindOne(const std::string& text) { BindOne(std::string_view(text)); }
-  void BindOne(const char* text) { BindOne(std::string_view(text)); }
-
-  sqlite3* db_;
-  sqlite3_stmt* statement_ = nullptr;
-  int next_parameter_ = 1;
-};
+using SqliteStatement = SqlStatement;
 
 enum class SqliteAccess { kRead, kWrite };
 
-class SqliteDatabase {
+class SqliteDatabase : public SqlDatabase {
  public:
   // Uses WAL, synchronous=FULL, foreign keys and a busy time-out of 10 s. kWrite creates the file
   // if there is none.
   SqliteDatabase(const std::filesystem::path& path, SqliteAccess access);
-  ~SqliteDatabase();
+  ~SqliteDatabase() override;
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
   // Maximum time that a statement waits for other writers.
   void SetBusyTimeout(std::chrono::milliseconds timeout);
-  void Exec(const char* sql);
+  void Exec(const char* sql) override;
+  std::unique_ptr<SqlCursor> Prepare(std::string_view sql) override;
+  int64_t Changes() const override;
+  const SqlDialect& dialect() const override;
+  int64_t Time() const override;
   // Rewrites the file without its free pages (vacuum), with temporary files in `temporary`. Changes
   // nothing if it throws. Requires: no other thread uses any database.
   void Rebuild(const std::filesystem::path& temporary);
-  // Prepares, binds and runs a statement; returns the number of changed rows.
-  template <typename... Values>
-  int64_t Run(std::string_view sql, const Values&... values) {
-    SqliteStatement(*this, sql, values...).Run();
-    return Changes();
-  }
-  sqlite3* handle() { return db_; }
-  int64_t LastInsertId() const;
-  int64_t Changes() const;
   // Number of steps of SQLite's virtual machine in all finished statements of all databases: their
   // cost, independent of the machine.
   static int64_t Steps();

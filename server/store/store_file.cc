@@ -30,11 +30,11 @@ void DropCheckpoint(const fs::path& file, const std::string& sha256) {
 std::vector<std::string> StoreProblems(const fs::path& file) {
   std::vector<std::string> problems;
   SqliteDatabase db(file, SqliteAccess::kRead);
-  SqliteStatement integrity(db, "pragma integrity_check(20)");
+  SqlStatement integrity(db, "pragma integrity_check(20)");
   while (integrity.Step()) {
     if (integrity.Text(0) != "ok") problems.push_back(integrity.Text(0));
   }
-  SqliteStatement references(db, "pragma foreign_key_check");
+  SqlStatement references(db, "pragma foreign_key_check");
   while (references.Step()) {
     problems.push_back("a row of " + references.Text(0) + " names a " + references.Text(2) +
                        " that is not there");

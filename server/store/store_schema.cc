@@ -20,11 +20,10 @@ constexpr int64_t kSpareBytes = int64_t{16} << 20;
 
 // Returns nothing if the file has no tables.
 std::optional<int64_t> VersionOf(SqliteDatabase& db) {
-  if (!SqliteStatement(db,
-                       "select 1 from sqlite_master where type='table' and name='schema_version'")
+  if (!SqlStatement(db, "select 1 from sqlite_master where type='table' and name='schema_version'")
            .Step())
     return std::nullopt;
-  SqliteStatement version(db, "select version from schema_version");
+  SqlStatement version(db, "select version from schema_version");
   return version.Step() ? std::optional(version.Int(0)) : std::nullopt;
 }
 
@@ -59,7 +58,7 @@ void Migrate(SqliteDatabase& db) {
 // Stores created before version 6 never return the space of deleted rows. Rebuilding takes twice
 // the size of the file; without that space it is left to a later start.
 void EnableSpaceReturn(const fs::path& file, SqliteDatabase& db) {
-  const auto number = [&](const char* pragma) { return SqliteStatement(db, pragma).NextInt(); };
+  const auto number = [&](const char* pragma) { return SqlStatement(db, pragma).NextInt(); };
   if (number("pragma auto_vacuum") != 0) return;
   const int64_t bytes =
       (number("pragma page_count") - number("pragma freelist_count")) * number("pragma page_size");
@@ -91,10 +90,10 @@ void MakeTables(SqliteDatabase& db) {
 }
 
 bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
-  return SqliteStatement(db,
-                         "select 1 from server where version=? and boot_id=?",
-                         identity.program_version,
-                         identity.boot_id)
+  return SqlStatement(db,
+                      "select 1 from server where version=? and boot_id=?",
+                      identity.program_version,
+                      identity.boot_id)
       .Step();
 }
 
@@ -102,7 +101,7 @@ bool IsKnown(SqliteDatabase& db, const ServerIdentity& identity) {
 void RecordServerIdentity(SqliteDatabase& db, const ServerIdentity& identity) {
   if (IsKnown(db, identity)) return;
   SqliteTransaction transaction(db);
-  if (!SqliteStatement(db, "select 1 from server where boot_id=?", identity.boot_id).Step()) {
+  if (!SqlStatement(db, "select 1 from server where boot_id=?", identity.boot_id).Step()) {
     db.Exec("update job set lease_expires_ms=0 where state='RUNNING'");
     db.Exec(
         "update meta set value=0 where name in('collected_steady_ms', "

@@ -31,7 +31,7 @@ class StoreSchemaTest : public JobStoreTest {
   // Columns, indexes and triggers of all tables, each on a line.
   static std::vector<std::string> DescribeTables(const fs::path& file) {
     SqliteDatabase db(file, SqliteAccess::kRead);
-    return SqliteStatement(
+    return SqlStatement(
                db,
                "select t.name||'.'||c.name||' '||lower(c.type)||' '||c.\"notnull\"||' '||"
                "coalesce(c.dflt_value, '')||' '||c.pk as line from sqlite_master t, "
@@ -42,7 +42,7 @@ class StoreSchemaTest : public JobStoreTest {
   }
   int64_t VersionOf(const fs::path& file) {
     SqliteDatabase db(file, SqliteAccess::kWrite);
-    SqliteStatement version(db, "select version from schema_version");
+    SqlStatement version(db, "select version from schema_version");
     return version.Step() ? version.Int(0) : 0;
   }
   // Makes a store of version 1.
@@ -52,7 +52,7 @@ class StoreSchemaTest : public JobStoreTest {
     old.Exec("pragma auto_vacuum=NONE");
     old.Exec("vacuum");
     const std::vector<std::string> triggers =
-        SqliteStatement(old, "select name from sqlite_master where type='trigger'").Texts();
+        SqlStatement(old, "select name from sqlite_master where type='trigger'").Texts();
     for (const std::string& trigger : triggers) old.Exec(("drop trigger " + trigger).c_str());
     old.Exec(
         "drop index scene_file_blob; alter table scene_file rename to newer; create table "
@@ -163,7 +163,7 @@ TEST_F(StoreSchemaTest, RefusesStoreOfNewerVersion) {
 int64_t FreePages(const fs::path& file) {
   SqliteDatabase db(file, SqliteAccess::kWrite);
   db.Run("pragma wal_checkpoint(truncate)");
-  SqliteStatement free(db, "pragma freelist_count");
+  SqlStatement free(db, "pragma freelist_count");
   return free.Step() ? free.Int(0) : -1;
 }
 

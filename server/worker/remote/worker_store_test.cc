@@ -11,10 +11,12 @@
 namespace color3d {
 namespace {
 
-INSTANTIATE_TEST_SUITE_P(Store,
+INSTANTIATE_TEST_SUITE_P(Stores,
                          WorkerStoreTest,
-                         ::testing::Values(StorePath::kDirect, StorePath::kRemote),
-                         NameOfStorePath);
+                         ::testing::Combine(::testing::ValuesIn(StoresToTest()),
+                                            ::testing::Values(StorePath::kDirect,
+                                                              StorePath::kRemote)),
+                         NameOfWorkerStore);
 
 TEST_P(WorkerStoreTest, RefusesWritesWithOldEpoch) {
   const JobRecord job = CreateSingle();
@@ -257,7 +259,7 @@ TEST_P(WorkerStoreTest, JobsThatLostWorkerAreNotBatched) {
   EXPECT_EQ(ClaimOne().attempt, 2);
 }
 
-TEST_P(WorkerStoreTest, ThreadsNeverClaimSameJob) {
+TEST_P(WorkerStoreTest, WorkersNeverClaimSameJob) {
   constexpr int kJobs = 60;
   for (int i = 0; i < kJobs; ++i) CreateSingle();
   std::atomic<int> claims{0};
@@ -266,7 +268,9 @@ TEST_P(WorkerStoreTest, ThreadsNeverClaimSameJob) {
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&, t] {
-      while (const auto job = worker().Claim("w" + std::to_string(t), kLease)) {
+      const auto other = OpenOther();  // of another server on the same data
+      WorkerStore& own = t < 2 ? worker() : *other;
+      while (const auto job = own.Claim("w" + std::to_string(t), kLease)) {
         ++claims;
         std::lock_guard lock(mutex);
         names.insert(job->name);

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "server/keeping/fsck.h"
-#include "server/store/sqlite_db.h"
 #include "tests/support/service/scripted_trace.h"
 
 namespace color3d::testing {
@@ -73,18 +72,20 @@ void ChaosService::Restart(int signal) {
 }
 
 std::vector<Fault> ChaosService::AllFaults() {
-  return {Fault::kWorkerKilled,
-          Fault::kWorkerFrozen,
-          Fault::kWorkerKilled,
-          Fault::kWorkerFrozen,
-          Fault::kWorkerToldToEnd,
-          Fault::kServerKilled,
-          Fault::kWorkerKilled,
-          Fault::kWorkerFrozen,
-          Fault::kWorkerKilled,
-          Fault::kWorkerFrozen,
-          Fault::kWorkerToldToEnd,
-          Fault::kServerRestarted};
+  std::vector<Fault> faults = {Fault::kWorkerKilled,
+                               Fault::kWorkerFrozen,
+                               Fault::kWorkerKilled,
+                               Fault::kWorkerFrozen,
+                               Fault::kWorkerToldToEnd,
+                               Fault::kServerKilled,
+                               Fault::kWorkerKilled,
+                               Fault::kWorkerFrozen,
+                               Fault::kWorkerKilled,
+                               Fault::kWorkerFrozen,
+                               Fault::kWorkerToldToEnd,
+                               Fault::kServerRestarted};
+  if (TestsUsePostgresql()) faults.insert(faults.end(), 2, Fault::kDatabaseKilled);
+  return faults;
 }
 
 void ChaosService::Disturb(Random& random, const std::vector<Fault>& kinds) {
@@ -98,6 +99,9 @@ void ChaosService::Disturb(Random& random, const std::vector<Fault>& kinds) {
   if (fault == Fault::kServerKilled || fault == Fault::kServerRestarted) {
     Restart(fault == Fault::kServerKilled ? SIGKILL : SIGTERM);
     ++faults_[fault == Fault::kServerKilled ? "server killed" : "server restarted"];
+  } else if (fault == Fault::kDatabaseKilled) {
+    RestartTestDatabase();
+    ++faults_["database killed"];
   } else {
     const pid_t victim = ChooseVictim(*server_, random);
     if (victim == 0) return;  // all are starting
@@ -138,8 +142,8 @@ void ChaosService::CheckLeases() {
 }
 
 int64_t ChaosService::Count(const char* sql) const {
-  SqliteDatabase db(folder_ / "data" / "jobs.db", SqliteAccess::kRead);
-  SqliteStatement select(db, sql);
+  const std::unique_ptr<SqlDatabase> db = OpenTestDatabase(folder_ / "data");
+  SqlStatement select(*db, sql);
   return select.Step() ? select.Int(0) : -1;
 }
 
@@ -155,7 +159,8 @@ std::vector<std::string> ChaosService::EndAndAudit() {
   require_none(Count("select count(*) - count(distinct job_id) from job_attempt where "
                      "outcome='SUCCEEDED'"),
                "jobs that succeeded twice");
-  const FsckResult whole = Fsck(folder_ / "data", /*repair=*/false, [](int64_t) {});
+  const FsckResult whole =
+      Fsck(folder_ / "data", TestStoreAddress(folder_ / "data"), /*repair=*/false, [](int64_t) {});
   require_none(static_cast<int64_t>(whole.store_problems.size()), "problems of jobs.db");
   require_none(static_cast<int64_t>(whole.missing.size()), "blobs that are missing");
   require_none(static_cast<int64_t>(whole.damaged.size()), "blobs that are damaged");

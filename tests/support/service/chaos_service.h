@@ -24,7 +24,8 @@ enum class Fault {
   kWorkerFrozen,
   kWorkerToldToEnd,
   kServerKilled,
-  kServerRestarted
+  kServerRestarted,
+  kDatabaseKilled,  // only of PostgreSQL
 };
 
 class ChaosService {

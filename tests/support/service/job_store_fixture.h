@@ -1,5 +1,5 @@
-// Fixture of the job store tests: a store in a scratch folder, a clock set by the test, and one
-// active scene.
+// Fixtures of the job store tests: a store, a clock set by the test, and one active scene.
+// JobStoreTest is for SQLite alone, any_store_fixture.h for all stores.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,9 +20,13 @@ namespace color3d {
 inline constexpr int64_t kLease = 1000;
 inline constexpr int64_t kNoLimit = 1'000'000;
 
-class JobStoreTest : public ::testing::Test {
+class JobStoreFixture {
  protected:
-  JobStoreTest() {
+  virtual ~JobStoreFixture() = default;
+  virtual std::unique_ptr<SqlJobStore> MakeStore(StoreRole role, const StoreOptions& options) = 0;
+
+  // Must be called by the constructor.
+  void Begin() {
     Open();
     SceneRecord scene;
     scene.name = "scenes/test";
@@ -34,8 +38,10 @@ class JobStoreTest : public ::testing::Test {
     StoreOptions options;
     options.retry_backoff_ms = 100;
     options.boot_id = boot_id_;
-    store_ = std::make_unique<SqliteJobStore>(File(), StoreRole::kServer, TestClocks(), options);
+    store_ = MakeStore(StoreRole::kServer, options);
   }
+  // Another store object on the same data, like that of another process.
+  std::unique_ptr<SqlJobStore> OpenOther() { return MakeStore(StoreRole::kTool, {}); }
   std::filesystem::path File() const { return scratch_.path() / "jobs.db"; }
   Clocks TestClocks() {
     return {[this] { return wall_.load(); }, [this] { return now_.load(); }};
@@ -105,7 +111,15 @@ class JobStoreTest : public ::testing::Test {
   std::atomic<int64_t> now_{1'000'000};   // of leases and pauses
   std::atomic<int64_t> wall_{1'000'000};  // of recorded times
   std::string boot_id_ = "boot 1";
-  std::unique_ptr<SqliteJobStore> store_;
+  std::unique_ptr<SqlJobStore> store_;
+};
+
+class JobStoreTest : public ::testing::Test, protected JobStoreFixture {
+ protected:
+  JobStoreTest() { Begin(); }
+  std::unique_ptr<SqlJobStore> MakeStore(StoreRole role, const StoreOptions& options) override {
+    return std::make_unique<SqliteJobStore>(File(), role, TestClocks(), options);
+  }
 };
 
 template <typename Body>

@@ -15,8 +15,8 @@
 #include "core/catalogue/stages.h"
 #include "server/rpc/rpc_server.h"
 #include "server/storage/file_blob_store.h"
-#include "server/store/sqlite_job_store.h"
 #include "tests/support/service/rpc_support.h"
+#include "tests/support/service/test_store.h"
 
 namespace color3d::testing {
 
@@ -98,7 +98,8 @@ class RpcTest : public ::testing::Test {
   ScratchFolder scratch_;
   FileBlobStore blobs_{scratch_.path() / "blobs", {0}};
   UploadStore uploads_;
-  SqliteJobStore store_{scratch_.path() / "jobs.db", StoreRole::kServer, SystemClocks()};
+  std::unique_ptr<JobStore> opened_ = OpenTestStore(scratch_.path() / "jobs.db");
+  JobStore& store_ = *opened_;
   std::unique_ptr<RpcServer> server_;
   std::unique_ptr<TestClient> client_;
 };

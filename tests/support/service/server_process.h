@@ -1,4 +1,5 @@
-// One `color3d-server serve` with scripted workers, for the process tests. Dies with the test.
+// One `color3d-server serve` with scripted workers, for the process tests, on the kind of job store
+// of test_store.h. Dies with the test.
 #pragma once
 
 #include <grpcpp/grpcpp.h>
@@ -17,6 +18,7 @@
 #include <vector>
 
 #include "tests/support/service/rpc_support.h"
+#include "tests/support/service/test_store.h"
 
 namespace color3d::testing {
 
@@ -60,6 +62,8 @@ class ServerProcess {
       }
     }
     arguments.insert(arguments.end(), extra.begin(), extra.end());
+    const std::string store = TestStoreAddress(folder / "data");
+    if (!store.empty()) arguments.insert(arguments.end(), {"--store", store});
     std::vector<char*> argv;
     for (std::string& argument : arguments) argv.push_back(argument.data());
     argv.push_back(nullptr);

@@ -1,26 +1,33 @@
-// Fixture of the tests of WorkerStore: each runs on the SQLite store itself and through a server.
+// Fixture of the tests of WorkerStore: each runs on each kind of store, directly and through a
+// server.
 #pragma once
 
 #include <memory>
+#include <string>
+#include <tuple>
 
 #include "server/ops/socket_folder.h"
 #include "server/rpc/rpc_server.h"
 #include "server/storage/file_blob_store.h"
 #include "server/worker/remote/remote_store.h"
-#include "tests/support/service/job_store_fixture.h"
+#include "tests/support/service/any_store_fixture.h"
 
 namespace color3d {
 
 enum class StorePath { kDirect, kRemote };
 
-inline std::string NameOfStorePath(const ::testing::TestParamInfo<StorePath>& info) {
-  return info.param == StorePath::kDirect ? "Direct" : "Remote";
+using WorkerStoreCase = std::tuple<StoreKind, StorePath>;
+
+inline std::string NameOfWorkerStore(const ::testing::TestParamInfo<WorkerStoreCase>& info) {
+  const auto [kind, path] = info.param;
+  return NameOfStore(kind) + (path == StorePath::kDirect ? "Direct" : "Remote");
 }
 
-class WorkerStoreTest : public JobStoreTest, public ::testing::WithParamInterface<StorePath> {
+class WorkerStoreTest : public AnyStoreFixture, public ::testing::TestWithParam<WorkerStoreCase> {
  protected:
   WorkerStoreTest() {
-    if (GetParam() == StorePath::kDirect) return;
+    BeginWith(std::get<StoreKind>(GetParam()));
+    if (std::get<StorePath>(GetParam()) == StorePath::kDirect) return;
     sockets_ = std::make_unique<SocketFolder>(scratch_.path() / "sockets");
     blobs_ = std::make_unique<FileBlobStore>(scratch_.path() / "blobs", BlobStoreOptions{0});
     uploads_ = std::make_unique<UploadStore>(scratch_.path() / "uploads", *blobs_, 1 << 20);

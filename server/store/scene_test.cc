@@ -1,12 +1,13 @@
 #include <gtest/gtest.h>
 
-#include "tests/support/service/job_store_fixture.h"
+#include "tests/support/service/any_store_fixture.h"
 
 namespace color3d {
 namespace {
-using SqliteSceneTest = JobStoreTest;
+class SceneTest : public AnyStoreTest {};
+COLOR3D_FOR_ALL_STORES(SceneTest);
 
-TEST_F(SqliteSceneTest, AcceptsOnlyColoredKeyViewOfScene) {
+TEST_P(SceneTest, AcceptsOnlyColoredKeyViewOfScene) {
   SceneRecord other;
   other.name = "scenes/other";
   store_->CreateScene(other, {}, {});
@@ -31,7 +32,7 @@ TEST_F(SqliteSceneTest, AcceptsOnlyColoredKeyViewOfScene) {
   EXPECT_EQ(store_->GetScene("scenes/test").key_color_job, "") << "a job that is gone";
 }
 
-TEST_F(SqliteSceneTest, ColorizersAreListedOncePerFile) {
+TEST_P(SceneTest, ColorizersAreListedOncePerFile) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("personalize")};

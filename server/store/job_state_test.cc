@@ -1,14 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/service/job_store_fixture.h"
+#include "tests/support/service/any_store_fixture.h"
 
 namespace color3d {
 namespace {
-using SqliteJobStateTest = JobStoreTest;
+class JobStateTest : public AnyStoreTest {};
+COLOR3D_FOR_ALL_STORES(JobStateTest);
 using ::testing::HasSubstr;
 
-TEST_F(SqliteJobStateTest, GraphRunsInOrderOfEdges) {
+TEST_P(JobStateTest, GraphRunsInOrderOfEdges) {
   const JobRecord root = CreateDiamond();
   EXPECT_EQ(root.state, JobState::kBlocked);
   EXPECT_EQ(root.kind, "root");
@@ -36,7 +37,7 @@ TEST_F(SqliteJobStateTest, GraphRunsInOrderOfEdges) {
   EXPECT_TRUE(store_->AllFinished(store_->ResolveWatch({root.name})));
 }
 
-TEST_F(SqliteJobStateTest, PlannedSkipsCountAsSatisfied) {
+TEST_P(JobStateTest, PlannedSkipsCountAsSatisfied) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("import"), Job("evaluate", {0}), Job("root", {0, 1})};
@@ -47,7 +48,7 @@ TEST_F(SqliteJobStateTest, PlannedSkipsCountAsSatisfied) {
   EXPECT_EQ(ClaimOne().name, root.name);
 }
 
-TEST_F(SqliteJobStateTest, FailureSkipsDependantsAndFailsRoot) {
+TEST_P(JobStateTest, FailureSkipsDependantsAndFailsRoot) {
   const JobRecord root = CreateDiamond();
   Succeed(ClaimOne());
   const JobRecord left = ClaimOne();
@@ -74,7 +75,7 @@ TEST_F(SqliteJobStateTest, FailureSkipsDependantsAndFailsRoot) {
   EXPECT_THAT(store_->GetJob(own.name).skip_reason, HasSubstr("failed: it broke"));
 }
 
-TEST_F(SqliteJobStateTest, CancelsQueuedAtOnceAndRunningAtHeartbeat) {
+TEST_P(JobStateTest, CancelsQueuedAtOnceAndRunningAtHeartbeat) {
   const JobRecord root = CreateDiamond();
   const JobRecord import = ClaimOne();
   EXPECT_EQ(store_->Cancel(root.name, {}).state, JobState::kCancelled);
@@ -88,14 +89,14 @@ TEST_F(SqliteJobStateTest, CancelsQueuedAtOnceAndRunningAtHeartbeat) {
   EXPECT_EQ(store_->Cancel(root.name, {}).state, JobState::kCancelled) << "idempotent";
 }
 
-TEST_F(SqliteJobStateTest, CancelledChildEndsGraph) {
+TEST_P(JobStateTest, CancelledChildEndsGraph) {
   const JobRecord root = CreateDiamond();
   store_->Cancel(Child(root, "left").name, {});
   EXPECT_EQ(StateOf(root.name), JobState::kCancelled);
   EXPECT_EQ(Child(root, "import").state, JobState::kQueued);
 }
 
-TEST_F(SqliteJobStateTest, RetryRequeuesFailedJobsAndKeepsPlannedSkips) {
+TEST_P(JobStateTest, RetryRequeuesFailedJobsAndKeepsPlannedSkips) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("import"),
@@ -126,7 +127,7 @@ TEST_F(SqliteJobStateTest, RetryRequeuesFailedJobsAndKeepsPlannedSkips) {
   EXPECT_EQ(StateOf(root.name), JobState::kSucceeded);
 }
 
-TEST_F(SqliteJobStateTest, RetryFromScratchDropsCheckpoint) {
+TEST_P(JobStateTest, RetryFromScratchDropsCheckpoint) {
   const JobRecord job = CreateSingle();
   const JobRecord running = ClaimOne();
   store_->SetCheckpoint(LeaseOf(running), {Sha256Hex("c"), 1});
@@ -135,7 +136,7 @@ TEST_F(SqliteJobStateTest, RetryFromScratchDropsCheckpoint) {
   EXPECT_FALSE(ClaimOne().checkpoint.has_value());
 }
 
-TEST_F(SqliteJobStateTest, QueueLimitCountsWholeGraphs) {
+TEST_P(JobStateTest, QueueLimitCountsWholeGraphs) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("a"), Job("b", {0})};
@@ -144,7 +145,7 @@ TEST_F(SqliteJobStateTest, QueueLimitCountsWholeGraphs) {
   EXPECT_EQ(store_->ListJobs({}, 0, 100, {}).size(), 2u) << "all of a graph or nothing";
 }
 
-TEST_F(SqliteJobStateTest, RefusesGraphOfInactiveScene) {
+TEST_P(JobStateTest, RefusesGraphOfInactiveScene) {
   SceneRecord scene;
   scene.name = "scenes/open";
   store_->CreateScene(scene, {}, {});
@@ -156,7 +157,7 @@ TEST_F(SqliteJobStateTest, RefusesGraphOfInactiveScene) {
   EXPECT_EQ(ReasonThrown([&] { store_->CreateGraph(graph, {}, kNoLimit); }), "SCENE_NOT_FOUND");
 }
 
-TEST_F(SqliteJobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
+TEST_P(JobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
   SceneRecord scene;
   scene.name = "scenes/other";
   store_->CreateScene(scene, {}, {});
@@ -170,7 +171,7 @@ TEST_F(SqliteJobStateTest, JobsOfAGraphMayBelongToOtherScenes) {
   EXPECT_EQ(children[1].scene, "scenes/other");
 }
 
-TEST_F(SqliteJobStateTest, RetryRequiresInputs) {
+TEST_P(JobStateTest, RetryRequiresInputs) {
   const JobRecord input = CreateSingle();
   Succeed(ClaimOne());
   NewGraph graph;
@@ -185,7 +186,7 @@ TEST_F(SqliteJobStateTest, RetryRequiresInputs) {
   EXPECT_EQ(StateOf(reader.name), JobState::kFailed);
 }
 
-TEST_F(SqliteJobStateTest, RetryObeysQueueLimit) {
+TEST_P(JobStateTest, RetryObeysQueueLimit) {
   const JobRecord root = CreateDiamond();
   FailWith(ClaimOne(), ErrorCode::kInternal);
   EXPECT_EQ(ReasonThrown([&] { store_->Retry(root.name, false, {}, 3); }), "QUEUE_FULL");

@@ -2,14 +2,14 @@
 
 #include <thread>
 
-#include "server/store/sqlite_db.h"
-#include "tests/support/service/job_store_fixture.h"
+#include "tests/support/service/any_store_fixture.h"
 
 namespace color3d {
 namespace {
-using SqliteJobStoreTest = JobStoreTest;
+class StoreTest : public AnyStoreTest {};
+COLOR3D_FOR_ALL_STORES(StoreTest);
 
-TEST_F(SqliteJobStoreTest, RequestIdMakesCallsIdempotent) {
+TEST_P(StoreTest, RequestIdMakesCallsIdempotent) {
   const RequestKey key{"CreateJob", "id-1", "body-1"};
   const JobRecord first = CreateDiamond(key);
   EXPECT_EQ(CreateDiamond(key).name, first.name);
@@ -28,8 +28,8 @@ TEST_F(SqliteJobStoreTest, RequestIdMakesCallsIdempotent) {
   EXPECT_EQ(store_->Retry(first.name, false, retry, kNoLimit).state, JobState::kFailed);
 }
 
-TEST_F(SqliteJobStoreTest, ConcurrentEqualRequestsCreateOneJob) {
-  SqliteJobStore other(File(), StoreRole::kTool, TestClocks());
+TEST_P(StoreTest, ConcurrentEqualRequestsCreateOneJob) {
+  const auto other = OpenOther();
   const RequestKey key{"CreateJob", "same", "body"};
   NewGraph graph;
   graph.scene = "scenes/test";
@@ -38,7 +38,7 @@ TEST_F(SqliteJobStoreTest, ConcurrentEqualRequestsCreateOneJob) {
   std::vector<std::thread> threads;
   for (size_t i = 0; i < names.size(); ++i) {
     threads.emplace_back([&, i] {
-      JobStore& store = i % 2 == 0 ? static_cast<JobStore&>(*store_) : other;
+      SqlJobStore& store = i % 2 == 0 ? *store_ : *other;
       names[i] = store.CreateGraph(graph, key, kNoLimit).name;
     });
   }
@@ -47,7 +47,7 @@ TEST_F(SqliteJobStoreTest, ConcurrentEqualRequestsCreateOneJob) {
   EXPECT_EQ(store_->ListJobs({}, 0, 100, {}).size(), 1u);
 }
 
-TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
+TEST_P(StoreTest, StateSurvivesReopening) {
   const JobRecord root = CreateDiamond();
   const JobRecord import = ClaimOne();
   store_.reset();
@@ -58,14 +58,16 @@ TEST_F(SqliteJobStoreTest, StateSurvivesReopening) {
   EXPECT_GT(store_->NewestRevision(), 0);
 }
 
-TEST_F(SqliteJobStoreTest, ReportsGarbageFile) {
+using SqliteStoreTest = JobStoreTest;
+
+TEST_F(SqliteStoreTest, ReportsGarbageFile) {
   store_.reset();
   std::filesystem::remove(scratch_.path() / "jobs.db-wal");
   WriteFileAtomic(scratch_.path() / "jobs.db", std::string(4096, 'x'));
   EXPECT_EQ(ReasonThrown([&] { Open(); }), "STORE_CORRUPT");
 }
 
-TEST_F(SqliteJobStoreTest, EventsResumeAndCoalesceProgress) {
+TEST_P(StoreTest, EventsResumeAndCoalesceProgress) {
   const JobRecord job = CreateSingle();
   const std::vector<int64_t> ids = store_->ResolveWatch({job.name});
   const JobRecord running = ClaimOne();
@@ -87,7 +89,7 @@ TEST_F(SqliteJobStoreTest, EventsResumeAndCoalesceProgress) {
   EXPECT_GT(later[0].revision, events[2].revision);
 }
 
-TEST_F(SqliteJobStoreTest, ReportsCompactedRevisions) {
+TEST_P(StoreTest, ReportsCompactedRevisions) {
   const JobRecord job = CreateSingle();
   const std::vector<int64_t> ids = store_->ResolveWatch({job.name});
   Succeed(ClaimOne());
@@ -99,7 +101,7 @@ TEST_F(SqliteJobStoreTest, ReportsCompactedRevisions) {
   EXPECT_EQ(store_->NewestRevision(), newest);
 }
 
-TEST_F(SqliteJobStoreTest, RequestIdsSurviveClockJump) {
+TEST_P(StoreTest, RequestIdsSurviveClockJump) {
   constexpr int64_t kDay = 24 * 3600 * 1000, kKept = 7 * kDay;
   const RequestKey key{"CreateJob", "id", "body"};
   CreateDiamond(key);
@@ -120,7 +122,7 @@ TEST_F(SqliteJobStoreTest, RequestIdsSurviveClockJump) {
   EXPECT_FALSE(sweep(3));
 }
 
-TEST_F(SqliteJobStoreTest, DeletesChildrenAndRefusesJobsInUse) {
+TEST_P(StoreTest, DeletesChildrenAndRefusesJobsInUse) {
   const JobRecord root = CreateDiamond();
   EXPECT_EQ(ReasonThrown([&] { store_->Delete(root.name, {}); }), "WRONG_STATE");
   EXPECT_EQ(ReasonThrown([&] { store_->DeleteScene("scenes/test", {}); }), "SCENE_IN_USE");
@@ -144,7 +146,7 @@ TEST_F(SqliteJobStoreTest, DeletesChildrenAndRefusesJobsInUse) {
   EXPECT_EQ(ReasonThrown([&] { store_->GetScene("scenes/test"); }), "SCENE_NOT_FOUND");
 }
 
-TEST_F(SqliteJobStoreTest, ListsArePagedNewestFirst) {
+TEST_P(StoreTest, ListsArePagedNewestFirst) {
   const JobRecord root = CreateDiamond();
   CreateSingle();
   const auto first = store_->ListJobs({}, 0, 3, {});
@@ -157,7 +159,7 @@ TEST_F(SqliteJobStoreTest, ListsArePagedNewestFirst) {
   EXPECT_TRUE(store_->ListJobs({"", "scenes/other"}, 0, 10, {}).empty());
 }
 
-TEST_F(SqliteJobStoreTest, ListsKeepBudgetWithLongRows) {
+TEST_P(StoreTest, ListsKeepBudgetWithLongRows) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.jobs = {Job("a")};

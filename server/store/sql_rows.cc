@@ -1,8 +1,9 @@
-#include "server/store/sqlite_rows.h"
+#include "server/store/sql_rows.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <string_view>
 #include <type_traits>
 
 namespace color3d {
@@ -77,7 +78,7 @@ void VisitColumns(SceneRecord& scene, Visit&& visit) {
 }
 
 template <typename T>
-void Read(const SqliteStatement& row, int column, T* value) {
+void Read(const SqlStatement& row, int column, T* value) {
   if constexpr (std::is_same_v<T, std::string>) {
     *value = row.Text(column);
   } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
@@ -94,7 +95,7 @@ void Read(const SqliteStatement& row, int column, T* value) {
 }
 
 template <typename T>
-void Write(SqliteStatement& statement, const T& value) {
+void Write(SqlStatement& statement, const T& value) {
   if constexpr (std::is_same_v<T, std::vector<std::string>>) {
     statement.Bind(JoinLines(value));
   } else if constexpr (std::is_same_v<T, JobState>) {
@@ -106,6 +107,11 @@ void Write(SqliteStatement& statement, const T& value) {
   }
 }
 
+template <typename T>
+void WriteBytes(SqlStatement& statement, const T& value) {
+  if constexpr (std::is_same_v<T, std::string>) statement.Bind(SqlBytes{value});
+}
+
 template <typename Record>
 std::vector<std::string> ColumnNames() {
   std::vector<std::string> names;
@@ -115,7 +121,7 @@ std::vector<std::string> ColumnNames() {
 }
 
 template <typename Record>
-Record RecordFromRow(const SqliteStatement& row) {
+Record RecordFromRow(const SqlStatement& row) {
   Record record;
   int column = 0;
   VisitColumns(record, [&](const char*, auto& value) { Read(row, column++, &value); });
@@ -123,20 +129,24 @@ Record RecordFromRow(const SqliteStatement& row) {
 }
 
 template <typename Record>
-int64_t InsertRow(SqliteDatabase& db, const char* table, Record record) {
+int64_t InsertRow(SqlDatabase& db, const char* table, Record record) {
   static const std::vector<std::string> names = ColumnNames<Record>();
   const auto inserted = names.begin() + 1;  // all except the id
   const std::vector<const char*> places(names.size() - 1, "?");
-  SqliteStatement insert(db,
-                         fmt::format("insert into {}({}) values({})",
-                                     table,
-                                     fmt::join(inserted, names.end(), ", "),
-                                     fmt::join(places, ",")));
+  SqlStatement insert(db,
+                      fmt::format("insert into {}({}) values({}) returning {}",
+                                  table,
+                                  fmt::join(inserted, names.end(), ", "),
+                                  fmt::join(places, ","),
+                                  names.front()));
   VisitColumns(record, [&](const char* name, const auto& value) {
-    if (name != names.front()) Write(insert, value);
+    if (name == std::string_view("spec")) {
+      WriteBytes(insert, value);
+    } else if (name != names.front()) {
+      Write(insert, value);
+    }
   });
-  insert.Run();
-  return db.LastInsertId();
+  return insert.NextInt();
 }
 
 }  // namespace
@@ -155,18 +165,18 @@ std::string SelectJobWithoutSpec(const std::string& tail) {
   return fmt::format("select {} from job {}", columns, tail);
 }
 
-JobRecord JobFromRow(const SqliteStatement& row) { return RecordFromRow<JobRecord>(row); }
+JobRecord JobFromRow(const SqlStatement& row) { return RecordFromRow<JobRecord>(row); }
 
-int64_t InsertJobRow(SqliteDatabase& db, const JobRecord& job) { return InsertRow(db, "job", job); }
+int64_t InsertJobRow(SqlDatabase& db, const JobRecord& job) { return InsertRow(db, "job", job); }
 
 std::string SelectScene(const std::string& tail) {
   static const std::string columns = fmt::format("{}", fmt::join(ColumnNames<SceneRecord>(), ", "));
   return fmt::format("select {} from scene {}", columns, tail);
 }
 
-SceneRecord SceneFromRow(const SqliteStatement& row) { return RecordFromRow<SceneRecord>(row); }
+SceneRecord SceneFromRow(const SqlStatement& row) { return RecordFromRow<SceneRecord>(row); }
 
-int64_t InsertSceneRow(SqliteDatabase& db, const SceneRecord& scene) {
+int64_t InsertSceneRow(SqlDatabase& db, const SceneRecord& scene) {
   return InsertRow(db, "scene", scene);
 }
 
@@ -194,6 +204,7 @@ std::vector<std::string> SplitLines(const std::string& text) {
 }
 
 std::string JoinIds(const std::vector<int64_t>& ids) {
+  if (ids.empty()) return "0";
   return fmt::format("{}", fmt::join(ids, ","));
 }
 

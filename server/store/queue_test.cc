@@ -1,13 +1,14 @@
 // Queue of the job store: holds, equal work, deletion of old jobs.
 #include <gtest/gtest.h>
 
-#include "tests/support/service/job_store_fixture.h"
+#include "tests/support/service/any_store_fixture.h"
 
 namespace color3d {
 namespace {
-using QueueTest = JobStoreTest;
+class QueueTest : public AnyStoreTest {};
+COLOR3D_FOR_ALL_STORES(QueueTest);
 
-TEST_F(QueueTest, HeldQueueGivesNoJobAndReason) {
+TEST_P(QueueTest, HeldQueueGivesNoJobAndReason) {
   const JobRecord job = CreateSingle();
   store_->UpdateWorker({"w", 1, "", 0, 0});
   for (const Hold hold : {Hold::kPaused, Hold::kStorage}) {
@@ -23,7 +24,7 @@ TEST_F(QueueTest, HeldQueueGivesNoJobAndReason) {
   EXPECT_EQ(ClaimOne().name, job.name);
 }
 
-TEST_F(QueueTest, WaitingJobHasPlaceAndTime) {
+TEST_P(QueueTest, WaitingJobHasPlaceAndTime) {
   const JobRecord first = CreateSingle(), second = CreateSingle();
   const JobRecord root = CreateDiamond();
   EXPECT_EQ(store_->PlaceInQueue(first).waits_for, "a worker; none is running");
@@ -45,7 +46,7 @@ TEST_F(QueueTest, WaitingJobHasPlaceAndTime) {
   EXPECT_EQ(store_->PlaceInQueue(second).position, 1);
 }
 
-TEST_F(QueueTest, RunsEqualWorkOnce) {
+TEST_P(QueueTest, RunsEqualWorkOnce) {
   CreateSingle();
   CreateSingle();
   store_->UpdateWorker({"w", 1, "", 0, 0});
@@ -63,7 +64,7 @@ TEST_F(QueueTest, RunsEqualWorkOnce) {
   EXPECT_FALSE(store_->JoinEqual(LeaseOf(again), "key")) << "nobody else does it now";
 }
 
-TEST_F(QueueTest, WaitingJobRunsWhenEqualJobFails) {
+TEST_P(QueueTest, WaitingJobRunsWhenEqualJobFails) {
   for (const char* end : {"fails", "is lost", "is cancelled", "is killed"}) {
     SCOPED_TRACE(end);
     const JobRecord first = CreateSingle(), second = CreateSingle();
@@ -87,7 +88,7 @@ TEST_F(QueueTest, WaitingJobRunsWhenEqualJobFails) {
   }
 }
 
-TEST_F(QueueTest, CancelledJobDoesNotWaitForEqualWork) {
+TEST_P(QueueTest, CancelledJobDoesNotWaitForEqualWork) {
   CreateSingle();
   const JobRecord root = CreateSingle();
   const JobRecord leader = ClaimOne(), follower = ClaimOne();
@@ -100,7 +101,7 @@ TEST_F(QueueTest, CancelledJobDoesNotWaitForEqualWork) {
       << "the retry is another wish";
 }
 
-TEST_F(QueueTest, KilledJobEndsAtOnce) {
+TEST_P(QueueTest, KilledJobEndsAtOnce) {
   const JobRecord root = CreateDiamond();
   const JobRecord running = ClaimOne();
   EXPECT_EQ(store_->Kill(root.name).state, JobState::kCancelled);
@@ -112,7 +113,7 @@ TEST_F(QueueTest, KilledJobEndsAtOnce) {
   EXPECT_EQ(store_->Retry(root.name, false, {}, kNoLimit).state, JobState::kBlocked);
 }
 
-TEST_F(QueueTest, DeletesOldJobsInTwoPhases) {
+TEST_P(QueueTest, DeletesOldJobsInTwoPhases) {
   constexpr int64_t kGrace = 1000;
   CreateSingle();
   const JobRecord old = ClaimOne();
@@ -139,7 +140,7 @@ TEST_F(QueueTest, DeletesOldJobsInTwoPhases) {
             "INVALID_ARGUMENT");
 }
 
-TEST_F(QueueTest, DeletesUnusedScenesInTwoPhases) {
+TEST_P(QueueTest, DeletesUnusedScenesInTwoPhases) {
   constexpr int64_t kGrace = 1000;
   SceneRecord abandoned;
   abandoned.name = "scenes/abandoned";  // never committed
@@ -158,7 +159,7 @@ TEST_F(QueueTest, DeletesUnusedScenesInTwoPhases) {
   EXPECT_EQ(unused(wall_), std::vector<std::string>{abandoned.name});
 }
 
-TEST_F(QueueTest, DeletesUncommittedScenesEarlier) {
+TEST_P(QueueTest, DeletesUncommittedScenesEarlier) {
   constexpr int64_t kGrace = 1000;
   SceneRecord scene;
   for (const char* name : {"scenes/abandoned", "scenes/young"}) {
@@ -175,7 +176,7 @@ TEST_F(QueueTest, DeletesUncommittedScenesEarlier) {
   EXPECT_TRUE(unused().empty());
 }
 
-TEST_F(QueueTest, NotificationsAreFairBetweenReceivers) {
+TEST_P(QueueTest, NotificationsAreFairBetweenReceivers) {
   const auto end = [&](const std::string& url) {
     NewGraph graph;
     graph.scene = "scenes/test";
@@ -197,7 +198,7 @@ TEST_F(QueueTest, NotificationsAreFairBetweenReceivers) {
                                       "https://good.example.org/hook"}));
 }
 
-TEST_F(QueueTest, NotificationStaysDueUntilDelivered) {
+TEST_P(QueueTest, NotificationStaysDueUntilDelivered) {
   NewGraph graph;
   graph.scene = "scenes/test";
   graph.notify_url = "https://hooks.example.org";
