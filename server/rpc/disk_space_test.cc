@@ -4,6 +4,7 @@
 #include <atomic>
 
 #include "server/base/service_error.h"
+#include "server/store/sqlite_job_store.h"
 #include "tests/support/service/rpc_fixture.h"
 
 namespace color3d::testing {
