@@ -38,66 +38,73 @@ const std::string kClaimable =
 // Other workers may claim the first ones meanwhile.
 constexpr size_t kMaxCandidates = 16;
 
+// Workers that were silent for longer are not counted on.
+constexpr int64_t kWorkerSilenceMs = 60'000;
+
+bool HasModels(const ClaimTerms& terms, const JobNeeds& needs) {
+  return !terms.models || std::ranges::all_of(needs.models, [&](const std::string& model) {
+    return terms.models->contains(model);
+  });
+}
+
 bool IsRetryable(ErrorCode code) {
   return code == ErrorCode::kUnavailable || code == ErrorCode::kAborted;
 }
 
 }  // namespace
 
-std::optional<JobRecord> SqlJobStore::Claim(const std::string& worker, int64_t lease_ms) {
-  return ClaimAccepted(worker, lease_ms, [](const JobRecord&) { return true; });
-}
-
-std::optional<JobRecord> SqlJobStore::ClaimAccepted(const std::string& worker,
-                                                    int64_t lease_ms,
-                                                    const JobChoice& accept) {
-  // The project whose turn was last comes after all others of the same priority.
-  constexpr char kOrder[] =
-      "order by priority, coalesce((select turn from project where name=job.project), 0), job_id";
-  return ClaimFirst(worker, lease_ms, Waiting(kOrder, "", accept));
-}
-
-std::optional<JobRecord> SqlJobStore::ClaimForBatch(const std::string& worker,
-                                                    int64_t lease_ms,
-                                                    const std::string& kind,
-                                                    const JobChoice& accept) {
+std::vector<int64_t> SqlJobStore::FindSuitable(const ClaimTerms& terms) {
+  // ?2: worker; ?3: memory limit, 0: none.
+  const std::string suits =
+      kClaimable +
+      "and (preferred_until_ms<=?1 or preferred_worker=?2) and (?3=0 or needs_memory_bytes<=?3) ";
+  const std::string next =
+      suits +
+      "order by priority, coalesce((select turn from project where name=job.project), 0), "
+      "case when deadline_ms=0 then 1 else 0 end, deadline_ms, job_id";
   // Neither a project nor a submitted job keeps out the jobs of another.
-  constexpr char kBatch[] =
-      "and kind=?2 and lost_attempts=0 and joins_key='' and not exists("
-      "select 1 from job o where o.state='QUEUED' and o.kind<>?2 and o.run_after_ms<=?1 and "
+  const std::string beside =
+      suits +
+      "and kind=?4 and batch_group=?5 and lost_attempts=0 and joins_key='' and not exists("
+      "select 1 from job o where o.state='QUEUED' and o.kind<>?4 and o.run_after_ms<=?1 and "
       "o.joins_key='' and (o.priority, o.job_id)<(job.priority, job.job_id)) "
       "order by priority, (select count(*) from job r where r.state='RUNNING' and "
-      "r.project=job.project), (select count(*) from job r where r.state='RUNNING' and "
-      "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
-      "limit 16";
-  return ClaimFirst(worker, lease_ms, Waiting(kBatch, kind, accept));
-}
-
-std::vector<int64_t> SqlJobStore::Waiting(const std::string& rest,
-                                          const std::string& kind,
-                                          const JobChoice& accept) {
+      "r.project=job.project)*100/coalesce((select weight from project where name=job.project), "
+      "1), "
+      "(select count(*) from job r where r.state='RUNNING' and "
+      "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id";
+  const bool for_batch = !terms.batch_kind.empty();
   return connections_->Read([&](SqlDatabase& db) {
+    const bool has_most = !SqlStatement(db,
+                                        "select 1 from worker where memory_limit_bytes>? and "
+                                        "heartbeat_ms>? limit 1",
+                                        terms.memory_limit_bytes,
+                                        Now(db) - kWorkerSilenceMs)
+                               .Step();
+    SqlStatement select(db,
+                        SelectJob(for_batch ? beside : next),
+                        SteadyNow(db),
+                        Qualified(terms.worker),
+                        has_most ? int64_t{0} : terms.memory_limit_bytes);
+    if (for_batch) select.Bind(terms.batch_kind, terms.batch_group);
     std::vector<int64_t> ids;
-    SqlStatement select(db, SelectJob(kClaimable + rest), SteadyNow(db));
-    if (!kind.empty()) select.Bind(kind);
     while (ids.size() < kMaxCandidates && select.Step()) {
       const JobRecord job = JobFromRow(select);
-      if (accept(job)) ids.push_back(job.id);
+      if (HasModels(terms, job.needs)) ids.push_back(job.id);
     }
     return ids;
   });
 }
 
-std::optional<JobRecord> SqlJobStore::ClaimFirst(const std::string& worker,
-                                                 int64_t lease_ms,
-                                                 const std::vector<int64_t>& candidates) {
+std::optional<JobRecord> SqlJobStore::Claim(const ClaimTerms& terms) {
+  const std::vector<int64_t> candidates = FindSuitable(terms);
   if (candidates.empty()) return std::nullopt;  // an idle worker only reads
   return connections_->Write([&](SqlDatabase& db) -> std::optional<JobRecord> {
-    const std::string claim =
+    const std::string still_waits =
         "select job_id from job " + kClaimable + "and job_id=?2" + db.dialect().claim_lock;
     for (const int64_t id : candidates) {
-      if (!SqlStatement(db, claim, SteadyNow(db), id).Step()) continue;
-      return BeginAttempt(db, id, worker, lease_ms);
+      if (!SqlStatement(db, still_waits, SteadyNow(db), id).Step()) continue;
+      return BeginAttempt(db, id, terms.worker, terms.lease_ms);
     }
     return std::nullopt;
   });
@@ -117,9 +124,12 @@ JobRecord SqlJobStore::BeginAttempt(SqlDatabase& db,
       SteadyNow(db) + lease_ms,
       Now(db),
       id);
+  // An idle project keeps the claim to one turn.
   db.Run(
-      "update project set turn=(select max(turn)+1 from project) where name="
-      "(select project from job where job_id=?)",
+      "update project set turn=?1/weight+(select case when m.newest-?1>project.turn then "
+      "m.newest-?1 else project.turn end from (select max(turn) as newest from project) m) where "
+      "name=(select project from job where job_id=?2)",
+      kProjectTurn,
       id);
   db.Run(
       "insert into job_attempt(job_id, epoch, worker, start_ms) "
@@ -128,6 +138,20 @@ JobRecord SqlJobStore::BeginAttempt(SqlDatabase& db,
       id);
   AddEvent(db, id, /*progress=*/false);
   return JobById(db, id);
+}
+
+void SqlJobStore::PreferWorker(SqlDatabase& db, int64_t job_id, int64_t earlier) {
+  SqlStatement worker(db,
+                      "select worker_id from worker join job e on e.job_id=? and "
+                      "worker_id=e.lease_owner and (worker.job='' or (worker.job=e.name and "
+                      "e.state='SUCCEEDED')) where cache_limit_bytes>0 and heartbeat_ms>?",
+                      earlier,
+                      Now(db) - kWorkerSilenceMs);
+  if (!worker.Step()) return;
+  db.Run("update job set preferred_worker=?, preferred_until_ms=? where job_id=?",
+         worker.Text(0),
+         SteadyNow(db) + options_.preference_ms,
+         job_id);
 }
 
 std::vector<JobRecord> SqlJobStore::GetInputs(int64_t job_id) {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "server/store/user_models.h"
 #include "server/worker/lease_keeper.h"
@@ -39,6 +40,7 @@ struct WorkerOptions {
   pid_t parent = 0;  // 0: started by hand
   std::string code_version;
   std::string release;  // for messages
+  std::string simd;     // as in WorkerRecord
   UserModels models;
 };
 
@@ -53,6 +55,7 @@ void RunWorker(const WorkerOptions& options,
 struct WorkerProgram {
   std::unique_ptr<StageRunner> (*make_runner)();
   std::unique_ptr<LiveEngine> (*make_engine)(const LiveEngineSetup&);  // --inference
+  std::string_view (*instruction_set)() = nullptr;
 };
 
 // Runs the whole program: command line, log, signals. Returns the exit status.

@@ -364,6 +364,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
       Complete(&arguments);
       if (!arguments.IsElsewhere()) LogJobsTo(paths.JobLogs());
       const std::unique_ptr<EndAhead> until = EndBefore(arguments);
+      if (program.instruction_set != nullptr) arguments.options.simd = program.instruction_set();
       const std::unique_ptr<StageRunner> runner = program.make_runner();
       RunWorker(arguments.options, *runner, g_draining);
     } else {

@@ -101,6 +101,7 @@ v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limi
   usage.set_max_scenes(limits.project_max_scenes);
   usage.set_uncommitted_scenes(project.uncommitted_scenes);
   usage.set_max_uncommitted_scenes(limits.project_max_uncommitted_scenes);
+  usage.set_weight(project.weight);
   return usage;
 }
 

@@ -62,6 +62,9 @@ create table job(
   queued_since_ms bigint not null default 0, running_key text not null default '',
   joins_key text not null default '', notify_url text not null default '',
   trace text not null default '', row_bytes bigint not null default 0,
+  deadline_ms bigint not null default 0, needs_memory_bytes bigint not null default 0,
+  needs_models text not null default '', batch_group text not null default '',
+  preferred_worker text not null default '', preferred_until_ms bigint not null default 0,
   check((state='RUNNING') = (lease_expires_ms is not null)),
   check((state in('SUCCEEDED','FAILED','CANCELLED','SKIPPED')) = (end_ms <> 0)));
 create index job_claim on job(priority, job_id) where state='QUEUED';
@@ -112,11 +115,17 @@ create table request_id(
 create index request_id_age on request_id(at_ms);
 create table worker(
   worker_id text collate "C" primary key, pid bigint not null, job text not null,
-  memory_bytes bigint not null, heartbeat_ms bigint not null);
+  memory_bytes bigint not null, heartbeat_ms bigint not null,
+  machine text not null default '', release text not null default '',
+  threads bigint not null default 0, memory_limit_bytes bigint not null default 0,
+  simd text not null default '', cache_bytes bigint not null default 0,
+  cache_limit_bytes bigint not null default 0, cache_hit_bytes bigint not null default 0,
+  cache_miss_bytes bigint not null default 0, finished_jobs bigint not null default 0);
 create table project(
   name text collate "C" primary key, turn bigint not null default 0,
   bytes bigint not null default 0, row_bytes bigint not null default 0,
-  scenes bigint not null default 0, uncommitted bigint not null default 0);
+  scenes bigint not null default 0, uncommitted bigint not null default 0,
+  weight bigint not null default 1);
 create table blob_holding(
   project text not null, sha256 text not null, size_bytes bigint not null,
   primary key(project, sha256));

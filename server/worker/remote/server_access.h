@@ -34,6 +34,8 @@ class ServerAccess {
   // For heartbeats: with its own connection, so that transfers do not delay them.
   WorkerStore& heartbeat_store() { return heartbeat_store_; }
   WorkerBlobs& blobs() { return *blobs_; }
+  // Without a cache: zeros.
+  CacheUse cache_use() const { return cache_ ? cache_->use() : CacheUse{}; }
   // Null on the server's machine, where they are written to files.
   const std::shared_ptr<LogSender>& logs() const { return logs_; }
 
