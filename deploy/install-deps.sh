@@ -18,7 +18,7 @@ packages=(
 )
 case "${1:-}" in
   "") ;;
-  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus postgresql-15 systemd
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime iproute2 prometheus postgresql-15 systemd
     python3-grpcio python3-protobuf python3-numpy python3-pil
     python3-venv python3-setuptools python3-wheel mypy python3-yaml) ;;
   --fuzz) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang libclang-rt-dev) ;;
