@@ -5,8 +5,8 @@
 Exits with 77 (skipped) where a package is missing.
 """
 
-import datetime
 import csv
+import datetime
 import json
 import os
 import re

@@ -80,7 +80,7 @@ v1::QueuedJob ToQueuedProto(const JobRecord& job, int64_t now_ms) {
   entry.set_worker(job.state == JobState::kRunning ? job.worker : job.preferred_worker);
   entry.set_seconds(since_ms == 0 ? 0.0 : static_cast<double>(now_ms - since_ms) / 1000.0);
   entry.set_memory_bytes(job.needs.memory_bytes);
-  if (job.deadline_ms != 0) *entry.mutable_deadline() = ToTimestamp(job.deadline_ms);
+  if (job.deadline_ms != kNoDeadline) *entry.mutable_deadline() = ToTimestamp(job.deadline_ms);
   return entry;
 }
 

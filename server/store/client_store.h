@@ -38,7 +38,7 @@ struct NewGraph {
   std::string notify_url;
   std::string trace;  // trace id of the call, for logs; may be empty
   int priority = 100;
-  int64_t deadline_ms = 0;  // 0: none
+  int64_t deadline_ms = kNoDeadline;
   std::vector<NewJob> jobs;
 };
 

@@ -70,6 +70,8 @@ struct JobError {
 };
 JobError MakeJobError(ErrorReason reason, std::string message);
 
+constexpr int64_t kNoDeadline = INT64_MAX;
+
 // What a worker must have to run a job.
 struct JobNeeds {
   int64_t memory_bytes = 0;         // expected peak memory; 0: unknown
@@ -88,7 +90,7 @@ struct JobRecord {
   JobState state = JobState::kBlocked;
   bool cancel_requested = false;
   int priority = 100;
-  int64_t deadline_ms = 0;  // 0: none
+  int64_t deadline_ms = kNoDeadline;
   JobNeeds needs;
   std::string preferred_worker;  // as it is stored; empty: any
   int attempt = 0;

@@ -9,7 +9,9 @@ namespace color3d {
 namespace {
 class PlacementTest : public AnyStoreTest {
  protected:
-  JobRecord Create(const std::string& project, int64_t deadline_ms = 0, int64_t memory_bytes = 0) {
+  JobRecord Create(const std::string& project,
+                   int64_t deadline_ms = kNoDeadline,
+                   int64_t memory_bytes = 0) {
     NewGraph graph;
     graph.scene = "scenes/test";
     graph.project = project;
@@ -74,7 +76,7 @@ TEST_P(PlacementTest, EarliestDeadlineOfProjectStartsFirst) {
 TEST_P(PlacementTest, JobsAreLeftToWorkersWithEnoughMemory) {
   Report("small", "", 1000, 0);
   Report("big", "", 4000, 0);
-  const JobRecord large = Create("", 0, 3000), fits = Create("", 0, 900);
+  const JobRecord large = Create("", kNoDeadline, 3000), fits = Create("", kNoDeadline, 900);
   EXPECT_EQ(ClaimWith("small", 1000), fits.name);
   EXPECT_EQ(ClaimWith("small", 1000), "");
   Report("big", "jobs/other", 4000, 0);
@@ -85,7 +87,7 @@ TEST_P(PlacementTest, JobsAreLeftToWorkersWithEnoughMemory) {
 TEST_P(PlacementTest, WorkerWithMostMemoryTakesAllJobs) {
   Report("small", "", 1000, 0);
   Report("big", "", 4000, 0);
-  const JobRecord huge = Create("", 0, 9000);
+  const JobRecord huge = Create("", kNoDeadline, 9000);
   EXPECT_EQ(ClaimWith("small", 1000), "");
   wall_ += 3'600'000;  // "big" is not heard of
   Report("small", "", 1000, 0);

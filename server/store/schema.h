@@ -70,12 +70,14 @@ constexpr int kSchemaVersion = 7;
 
 // Since version 7: needs, deadlines and preferred workers of jobs, weights of projects.
 #define COLOR3D_PLACEMENT                                                                      \
-  "alter table job add column deadline_ms integer not null default 0;"                         \
+  "alter table job add column deadline_ms integer not null default 9223372036854775807;"       \
   "alter table job add column needs_memory_bytes integer not null default 0;"                  \
   "alter table job add column needs_models text not null default '';"                          \
   "alter table job add column batch_group text not null default '';"                           \
   "alter table job add column preferred_worker text not null default '';"                      \
   "alter table job add column preferred_until_ms integer not null default 0;"                  \
+  "create index job_next on job(project, priority, deadline_ms, job_id) where state='QUEUED';" \
+  "create index job_models on job(needs_models) where state='QUEUED' and needs_models<>'';"    \
   "alter table project add column weight integer not null default 1;"                          \
   "drop table worker;"                                                                         \
   "create table worker(worker_id text primary key, pid integer not null, job text not null, "  \

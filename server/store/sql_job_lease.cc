@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <compare>
 
 #include "core/base/text/utf8.h"
 #include "server/base/service_error.h"
@@ -41,10 +42,74 @@ constexpr size_t kMaxCandidates = 16;
 // Workers that were silent for longer are not counted on.
 constexpr int64_t kWorkerSilenceMs = 60'000;
 
-bool HasModels(const ClaimTerms& terms, const JobNeeds& needs) {
-  return !terms.models || std::ranges::all_of(needs.models, [&](const std::string& model) {
-    return terms.models->contains(model);
-  });
+// Sets of models (needs_models) of waiting jobs that the worker has; none if it has all.
+std::vector<std::string> RunnableModelSets(SqlDatabase& db, const ClaimTerms& terms) {
+  if (!terms.models) return {};
+  std::vector<std::string> sets = {""};
+  SqlStatement waiting(
+      db, "select distinct needs_models from job where state='QUEUED' and needs_models<>''");
+  while (waiting.Step()) {
+    const std::string set = waiting.Text(0);
+    const bool has_all = std::ranges::all_of(
+        SplitLines(set), [&](const std::string& model) { return terms.models->contains(model); });
+    if (has_all) sets.push_back(set);
+  }
+  return sets;
+}
+
+// "?5,?6,?7"
+std::string Parameters(size_t first, size_t count) {
+  std::string text;
+  for (size_t i = 0; i < count; ++i) text += fmt::format("{}?{}", i == 0 ? "" : ",", first + i);
+  return text;
+}
+
+// Neither a project nor a submitted job keeps out the jobs of another. ?4: kind.
+std::string BesideOthers(size_t group_parameter) {
+  return fmt::format(
+      "and kind=?4 and batch_group=?{} and lost_attempts=0 and joins_key='' and not exists("
+      "select 1 from job o where o.state='QUEUED' and o.kind<>?4 and o.run_after_ms<=?1 and "
+      "o.joins_key='' and (o.priority, o.job_id)<(job.priority, job.job_id)) "
+      "order by priority, (select count(*) from job r where r.state='RUNNING' and "
+      "r.project=job.project)*100/coalesce((select weight from project where name=job.project), "
+      "1), (select count(*) from job r where r.state='RUNNING' and "
+      "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
+      "limit {}",
+      group_parameter,
+      kMaxCandidates);
+}
+
+std::vector<int64_t> FirstForBatch(SqlStatement waiting) {
+  return waiting.All([](const SqlStatement& row) { return row.Int(0); });
+}
+
+// `select(rest, project)` starts a statement for waiting jobs of a project. Asking for each project
+// finds its first jobs by an index, where sorting all waiting jobs would take long.
+template <typename Select>
+std::vector<int64_t> FirstInTurn(SqlDatabase& db, const Select& select) {
+  struct Candidate {
+    int64_t priority, turn, deadline_ms, id;
+    auto operator<=>(const Candidate&) const = default;
+  };
+  const std::string first =
+      fmt::format("and project=?4 order by priority, deadline_ms, job_id limit {}", kMaxCandidates);
+  std::vector<Candidate> found;
+  SqlStatement projects(db,
+                        "select name, turn from project where exists(select 1 from job where "
+                        "state='QUEUED' and project=project.name)");
+  const auto waiting =
+      projects.All([](const SqlStatement& row) { return std::pair(row.Text(0), row.Int(1)); });
+  for (const auto& [project, turn] : waiting) {
+    SqlStatement jobs = select(first, project);
+    while (jobs.Step()) found.push_back({jobs.Int(1), turn, jobs.Int(2), jobs.Int(0)});
+  }
+  std::ranges::sort(found);
+  std::vector<int64_t> ids;
+  for (const Candidate& candidate : found) {
+    if (ids.size() == kMaxCandidates) break;
+    ids.push_back(candidate.id);
+  }
+  return ids;
 }
 
 bool IsRetryable(ErrorCode code) {
@@ -54,45 +119,33 @@ bool IsRetryable(ErrorCode code) {
 }  // namespace
 
 std::vector<int64_t> SqlJobStore::FindSuitable(const ClaimTerms& terms) {
-  // ?2: worker; ?3: memory limit, 0: none.
-  const std::string suits =
-      kClaimable +
-      "and (preferred_until_ms<=?1 or preferred_worker=?2) and (?3=0 or needs_memory_bytes<=?3) ";
-  const std::string next =
-      suits +
-      "order by priority, coalesce((select turn from project where name=job.project), 0), "
-      "case when deadline_ms=0 then 1 else 0 end, deadline_ms, job_id";
-  // Neither a project nor a submitted job keeps out the jobs of another.
-  const std::string beside =
-      suits +
-      "and kind=?4 and batch_group=?5 and lost_attempts=0 and joins_key='' and not exists("
-      "select 1 from job o where o.state='QUEUED' and o.kind<>?4 and o.run_after_ms<=?1 and "
-      "o.joins_key='' and (o.priority, o.job_id)<(job.priority, job.job_id)) "
-      "order by priority, (select count(*) from job r where r.state='RUNNING' and "
-      "r.project=job.project)*100/coalesce((select weight from project where name=job.project), "
-      "1), "
-      "(select count(*) from job r where r.state='RUNNING' and "
-      "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id";
-  const bool for_batch = !terms.batch_kind.empty();
   return connections_->Read([&](SqlDatabase& db) {
-    const bool has_most = !SqlStatement(db,
-                                        "select 1 from worker where memory_limit_bytes>? and "
-                                        "heartbeat_ms>? limit 1",
-                                        terms.memory_limit_bytes,
-                                        Now(db) - kWorkerSilenceMs)
-                               .Step();
-    SqlStatement select(db,
-                        SelectJob(for_batch ? beside : next),
-                        SteadyNow(db),
-                        Qualified(terms.worker),
-                        has_most ? int64_t{0} : terms.memory_limit_bytes);
-    if (for_batch) select.Bind(terms.batch_kind, terms.batch_group);
-    std::vector<int64_t> ids;
-    while (ids.size() < kMaxCandidates && select.Step()) {
-      const JobRecord job = JobFromRow(select);
-      if (HasModels(terms, job.needs)) ids.push_back(job.id);
-    }
-    return ids;
+    const bool has_most_memory = !SqlStatement(db,
+                                               "select 1 from worker where memory_limit_bytes>? "
+                                               "and heartbeat_ms>? limit 1",
+                                               terms.memory_limit_bytes,
+                                               Now(db) - kWorkerSilenceMs)
+                                      .Step();
+    // ?2: worker; ?3: memory limit, 0: none; ?4: of the rest; then sets of models.
+    std::string suits = kClaimable +
+                        "and (preferred_until_ms<=?1 or preferred_worker=?2) and (?3=0 or "
+                        "needs_memory_bytes<=?3) ";
+    const std::vector<std::string> sets = RunnableModelSets(db, terms);
+    if (terms.models) suits += fmt::format("and needs_models in({}) ", Parameters(5, sets.size()));
+    const auto select = [&](const std::string& rest, const std::string& parameter) {
+      SqlStatement statement(db,
+                             "select job_id, priority, deadline_ms from job " + suits + rest,
+                             SteadyNow(db),
+                             Qualified(terms.worker),
+                             has_most_memory ? int64_t{0} : terms.memory_limit_bytes,
+                             parameter);
+      for (const std::string& set : sets) statement.Bind(set);
+      if (!terms.batch_kind.empty()) statement.Bind(terms.batch_group);
+      return statement;
+    };
+    return terms.batch_kind.empty()
+               ? FirstInTurn(db, select)
+               : FirstForBatch(select(BesideOthers(5 + sets.size()), terms.batch_kind));
   });
 }
 

@@ -150,8 +150,8 @@ std::vector<JobRecord> SqlJobStore::ListQueue(int max_waiting) {
     // The k-th job of a project has the project's turn after k claims.
     SqlStatement next(db,
                       "select job_id from (select job_id, priority, project, row_number() over("
-                      "partition by project, priority order by case when deadline_ms=0 then 1 else "
-                      "0 end, deadline_ms, job_id) as k from job where state='QUEUED') q join "
+                      "partition by project, priority order by deadline_ms, job_id) as k from job "
+                      "where state='QUEUED') q join "
                       "project p on p.name=q.project order by priority, turn+k*?/weight, job_id "
                       "limit ?",
                       kProjectTurn,

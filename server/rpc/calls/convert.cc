@@ -89,7 +89,7 @@ v1::Job ToProto(const JobRecord& job) {
   proto.set_peak_memory_bytes(job.usage.peak_memory_bytes);
   proto.set_queued_seconds(static_cast<double>(job.queued_ms) / 1000.0);
   proto.set_pinned(job.pinned);
-  if (job.deadline_ms != 0) *proto.mutable_deadline() = ToTimestamp(job.deadline_ms);
+  if (job.deadline_ms != kNoDeadline) *proto.mutable_deadline() = ToTimestamp(job.deadline_ms);
   return proto;
 }
 

@@ -62,12 +62,14 @@ create table job(
   queued_since_ms bigint not null default 0, running_key text not null default '',
   joins_key text not null default '', notify_url text not null default '',
   trace text not null default '', row_bytes bigint not null default 0,
-  deadline_ms bigint not null default 0, needs_memory_bytes bigint not null default 0,
+  deadline_ms bigint not null default 9223372036854775807, needs_memory_bytes bigint not null default 0,
   needs_models text not null default '', batch_group text not null default '',
   preferred_worker text not null default '', preferred_until_ms bigint not null default 0,
   check((state='RUNNING') = (lease_expires_ms is not null)),
   check((state in('SUCCEEDED','FAILED','CANCELLED','SKIPPED')) = (end_ms <> 0)));
 create index job_claim on job(priority, job_id) where state='QUEUED';
+create index job_next on job(project, priority, deadline_ms, job_id) where state='QUEUED';
+create index job_models on job(needs_models) where state='QUEUED' and needs_models<>'';
 create index job_lease on job(lease_expires_ms) where state='RUNNING';
 create index job_parent on job(parent, job_id);
 create index job_scene on job(scene, job_id);
