@@ -131,6 +131,7 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   settings.threads = threads;
   settings.memory_mib = memory_mib;
   settings.drain_grace_seconds = options.drain_seconds * 0.75;
+  settings.sends_logs = !options.store.empty();
   setup.arguments = ToFlags(settings);
   const std::vector<std::string> model_flags = ToFlags(models);
   setup.arguments.insert(setup.arguments.end(), model_flags.begin(), model_flags.end());
@@ -277,7 +278,8 @@ void Serve(const ServeOptions& options) {
   rpc.limits.project_max_stored_bytes = static_cast<int64_t>(options.project_gib * (1 << 30));
   rpc.limits.project_max_scenes = options.project_scenes;
   rpc.limits.low_space_bytes = options.low_space_mib << 20;
-  rpc.job_logs = paths.JobLogs();
+  rpc.job_logs = opened.job_logs == nullptr ? MakeFileJobLogs(paths.JobLogs())
+                                            : MakeSharedJobLogs(*opened.job_logs, paths.JobLogs());
   rpc.make_room = [&ballast] { return ballast.Release(); };
   rpc.notify_allowed = options.notify_allow;
   rpc.drain = [] { ::kill(::getpid(), SIGTERM); };

@@ -35,6 +35,7 @@ OpenedStore OpenPostgresql(const std::string& address, StoreOptions options) {
   auto store = std::make_unique<PostgresqlJobStore>(
       address, StoreRole::kServer, std::nullopt, std::move(options));
   opened.has_chores = [store = store.get()] { return store->HasChores(); };
+  opened.job_logs = store.get();
   opened.store = std::move(store);
   opened.name = WithoutPassword(address);
   return opened;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/store/job_store.h"
+#include "server/store/shared_job_logs.h"
 #include "server/store/sql_job_store.h"
 
 namespace color3d {
@@ -16,6 +17,8 @@ struct OpenedStore {
   std::string name;  // without password, for logs
   // Returns true if this server runs the chores that one of all servers runs. Outlived by `store`.
   std::function<bool()> has_chores;
+  // Part of `store`; null: job logs are files of this server.
+  SharedJobLogs* job_logs = nullptr;
 };
 
 // Opens the PostgreSQL database of `address`, or the SQLite file if it is empty, as a server, by

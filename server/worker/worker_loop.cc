@@ -275,6 +275,13 @@ void RequireEqualModels(const UserModels& models, const Greeting& greeting) {
   }
 }
 
+// Lines after the end of the access are dropped.
+void SendLogs(const ServerAccess& server) {
+  LogJobsTo([logs = std::weak_ptr(server.logs())](const std::string& job, const std::string& line) {
+    if (const auto sender = logs.lock()) sender->Add(job, line);
+  });
+}
+
 void RunElsewhere(WorkerOptions options, StageRunner& runner, const std::atomic<bool>& draining) {
   const std::optional<Greeting> greeting = GreetServer(options, draining);
   if (!greeting) return;
@@ -289,10 +296,7 @@ void RunElsewhere(WorkerOptions options, StageRunner& runner, const std::atomic<
                       options.release,
                       options.server,
                       options.cache_bytes);
-  // Lines after the end of the access are dropped.
-  LogJobsTo([logs = std::weak_ptr(server.logs())](const std::string& job, const std::string& line) {
-    if (const auto sender = logs.lock()) sender->Add(job, line);
-  });
+  SendLogs(server);
   WorkerLoop(options, server, runner, draining).Run();
 }
 
@@ -306,6 +310,7 @@ void RunWorker(const WorkerOptions& options,
                       LinkTiming::For(options.timing.lease),
                       options.release,
                       options.reserve_mib << 20);
+  if (options.sends_logs) SendLogs(server);
   WorkerLoop(options, server, runner, draining).Run();
 }
 

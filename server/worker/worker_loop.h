@@ -31,6 +31,7 @@ struct WorkerOptions {
   std::chrono::milliseconds checkpoint_interval{20'000};
   std::chrono::milliseconds poll{250};
   int64_t reserve_mib = WorkerSettings().reserve_mib;  // disk space to keep free
+  bool sends_logs = false;  // on the server's machine; those of others always do
   // The process ends (and is restarted) if it is idle above this memory or after this number of
   // jobs: the memory of torch grows with the number of distinct picture sizes.
   int64_t recycle_memory_bytes = int64_t{2} << 30;

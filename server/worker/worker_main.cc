@@ -132,6 +132,7 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
                [app](const char* flag, auto& value) { app->add_option(flag, value)->group(""); });
   app->add_option("--drain-grace-seconds", settings.drain_grace_seconds)->group("");
   app->add_option("--reserve-mib", settings.reserve_mib)->group("");
+  app->add_flag("--send-logs", settings.sends_logs)->group("");
   app->add_option("--recycle-jobs", options.recycle_jobs)->group("");
   app->add_option("--code-version", options.code_version)->group("");
 }
@@ -168,6 +169,7 @@ void Complete(WorkerArguments* arguments) {
   options.data_folder = settings.data_folder;
   options.threads = settings.threads;
   options.reserve_mib = settings.reserve_mib;
+  options.sends_logs = settings.sends_logs;
   options.release = COLOR3D_VERSION;
   options.timing.lease = Milliseconds(settings.lease_seconds);
   options.timing.heartbeat = Milliseconds(settings.heartbeat_seconds);
@@ -362,7 +364,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
     EnterSandbox(arguments);
     if (arguments.inference.empty()) {
       Complete(&arguments);
-      if (!arguments.IsElsewhere()) LogJobsTo(paths.JobLogs());
+      if (!arguments.IsElsewhere() && !settings.sends_logs) LogJobsTo(paths.JobLogs());
       const std::unique_ptr<EndAhead> until = EndBefore(arguments);
       if (program.instruction_set != nullptr) arguments.options.simd = program.instruction_set();
       const std::unique_ptr<StageRunner> runner = program.make_runner();

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
 
 #include "color3d/internal/v1/worker.grpc.pb.h"
 #include "core/base/text/utf8.h"
 #include "server/base/service_error.h"
-#include "server/ops/job_log.h"
 #include "server/rpc/blobs/blob_streams.h"
 #include "server/rpc/calls/convert.h"
 
@@ -218,11 +218,13 @@ class WorkerServiceImpl final : public wire::WorkerService::CallbackService {
                                     const wire::AppendJobLogsRequest* request,
                                     wire::Done* response) override {
     return Answer(context, request, response, [=, this](const WorkerCaller&) {
+      std::map<std::string, std::string> logs;  // lines by job
       for (const wire::JobLogLine& line : request->lines()) {
         CheckName(line.job(), "jobs");
-        if (parts_.job_logs.empty()) continue;
-        AppendJobLog(parts_.job_logs, line.job(), EscapeControls(line.text()));
+        logs[line.job()] += EscapeControls(CleanUtf8(line.text())) + "\n";
       }
+      if (!parts_.job_logs) return;
+      for (const auto& [job, lines] : logs) parts_.job_logs->Append(job, lines);
     });
   }
 

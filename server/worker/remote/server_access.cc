@@ -14,7 +14,8 @@ ServerAccess::ServerAccess(const DataPaths& paths,
       heartbeat_link_({sockets_->Address(kWorkerSocket)}, timing),
       store_(link_, release),
       heartbeat_store_(heartbeat_link_, release),
-      blobs_(std::make_unique<FileBlobStore>(paths.Blobs(), BlobStoreOptions{reserve_bytes})) {}
+      blobs_(std::make_unique<FileBlobStore>(paths.Blobs(), BlobStoreOptions{reserve_bytes})),
+      logs_(std::make_shared<LogSender>(heartbeat_link_)) {}
 
 ServerAccess::ServerAccess(const DataPaths& paths,
                            const LinkTiming& timing,

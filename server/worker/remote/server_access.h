@@ -36,7 +36,6 @@ class ServerAccess {
   WorkerBlobs& blobs() { return *blobs_; }
   // Without a cache: zeros.
   CacheUse cache_use() const { return cache_ ? cache_->use() : CacheUse{}; }
-  // Null on the server's machine, where they are written to files.
   const std::shared_ptr<LogSender>& logs() const { return logs_; }
 
  private:

@@ -22,6 +22,7 @@ std::vector<std::string> ToFlags(const WorkerSettings& settings) {
   VisitTimings(settings, [&](const char* flag, const auto& value) {
     flags.insert(flags.end(), {flag, fmt::to_string(value)});
   });
+  if (settings.sends_logs) flags.emplace_back("--send-logs");
   if (!settings.sandbox) flags.emplace_back("--no-sandbox");
   return flags;
 }
