@@ -19,6 +19,7 @@ namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using testing::OpenTestDatabase;
 using testing::ParseTrace;
 using testing::Range;
 using testing::RepeatedEffects;

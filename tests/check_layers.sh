@@ -185,7 +185,7 @@ public server/notify notifier webhook
 public server/planning asked_formats job_plan job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key time_budget
 public server/rpc calls/error_mapping calls/worker_messages rpc_server
 public server/storage ballast blob_store collector data_folder file_blob_store upload_store worker_blobs
-public server/store chore_store client_store job job_store open_store project_store worker_store sqlite_job_store postgresql/copy_store store_file user_models
+public server/store chore_store client_store job job_store open_store project_store shared_job_logs worker_store sqlite_job_store postgresql/copy_store store_file user_models
 public server/worker supervision/supervisor supervision/worker_settings
 
 # Branches on the kind of a capture belong to its tables (core/catalogue/captures) and to import, which

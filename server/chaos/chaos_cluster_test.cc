@@ -330,7 +330,8 @@ class ChaosClusterTest : public ::testing::Test {
   // Results as undisturbed, whose digests are checked.
   static std::string ResultOf(AnyServer& servers, const std::string& job) {
     return servers.Insist([&](TestClient& client) {
-      for (const v1::Artifact& artifact : client.Get(job).artifacts()) {
+      const v1::Job done = client.Get(job);
+      for (const v1::Artifact& artifact : done.artifacts()) {
         const std::string bytes = client.Download(artifact.digest());
         if (Sha256Hex(bytes) != artifact.digest().sha256()) return "damaged: " + artifact.name();
       }
