@@ -85,6 +85,7 @@ const TestNetwork::Machine& TestNetwork::Find(const std::string& machine) const 
 }
 
 std::string TestNetwork::Add(const std::string& name) {
+  if (machines_.contains(name)) return AddressOf(name);
   Machine machine{StartHolder(), static_cast<int>(machines_.size()) + 11};
   machines_[name] = machine;
   const int n = machine.number;

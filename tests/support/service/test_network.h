@@ -20,7 +20,7 @@ class TestNetwork {
   // Why the network cannot be used here; empty if it can.
   const std::string& problem() const { return problem_; }
 
-  // Adds a machine and returns its IPv4 address.
+  // Adds a machine, unless there is one of this name, and returns its IPv4 address.
   std::string Add(const std::string& machine);
   std::string AddressOf(const std::string& machine) const;
   // Returns a program that runs `program` on the machine, in the same process.
