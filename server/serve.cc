@@ -361,8 +361,7 @@ void Serve(const ServeOptions& options) {
   std::optional<Notifier> notifier;
   if (!options.notify_allow.empty()) notifier.emplace(store, clock, notify);
   Supervisor supervisor(worker_setup, store);
-  std::unique_ptr<ScaleCommand> scaling =
-      StartScaling(options, paths, store, opened.has_chores);
+  std::unique_ptr<ScaleCommand> scaling = StartScaling(options, paths, store, opened.has_chores);
   const std::shared_ptr<void> stop_metrics(nullptr, [&](void*) { metrics.StopListening(); });
   if (!options.metrics_listen.empty()) {
     const int port = metrics.Listen(options.metrics_listen, store, blobs, [&] {

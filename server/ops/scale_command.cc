@@ -43,7 +43,8 @@ std::string LastLine(const fs::path& file) {
 void CheckScaleCommand(const fs::path& program) {
   if (!program.is_absolute()) {
     throw InvalidArgument(
-        "--scale-command is '{}'; give the absolute path of a program, which is run with the number "
+        "--scale-command is '{}'; give the absolute path of a program, which is run with the "
+        "number "
         "of workers as its only argument",
         program.string());
   }

@@ -65,8 +65,8 @@ class ScaleCommand {
   // Of the thread.
   std::optional<int64_t> told_;
   Steady::time_point next_run_{}, next_repeat_{};
-  int failures_ = 0;      // consecutive
-  std::string problem_;   // last one logged
+  int failures_ = 0;     // consecutive
+  std::string problem_;  // last one logged
   Mutex mutex_;
   CondVar wake_;
   bool stopping_ COLOR3D_GUARDED_BY(mutex_) = false;

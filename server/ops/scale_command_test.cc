@@ -144,7 +144,8 @@ TEST_F(ScaleCommandTest, LogsFailureOnceAndTriesAgainLessOften) {
   EXPECT_EQ(Runs().size(), 7u) << "told once it worked";
   const std::string log = Log();
   EXPECT_EQ(Count(log, "error"), 1) << log;
-  EXPECT_THAT(log, HasSubstr("exit status 1; run it by hand as this user (it printed: Invalid account;"));
+  EXPECT_THAT(
+      log, HasSubstr("exit status 1; run it by hand as this user (it printed: Invalid account;"));
   EXPECT_THAT(log, HasSubstr("4 workers are wanted"));
 }
 

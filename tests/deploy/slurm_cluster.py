@@ -59,7 +59,7 @@ def why_not():
     """Why no cluster can run here; empty: one can."""
     missing = [program for program in PROGRAMS if not find(program)]
     if missing:
-        return f"no {', '.join(missing)} (deploy/install-deps.sh --cluster)"
+        return f"no {', '.join(missing)} (deploy/install-deps.sh --engines)"
     if os.geteuid() != 0:
         return "Slurm's daemons need root"
     return ""
