@@ -31,6 +31,7 @@
 #include "server/notify/webhook.h"
 #include "server/ops/notify.h"
 #include "server/ops/process.h"
+#include "server/ops/scale_command.h"
 #include "server/ops/socket_folder.h"
 #include "server/ops/stop_signals.h"
 #include "server/rpc/rpc_server.h"
@@ -86,6 +87,7 @@ void CheckOptions(const ServeOptions& options) {
                 "127.0.0.1:PORT, or --insecure-any-address in a trusted network",
                 options.metrics_listen);
   }
+  if (!options.scale_command.empty()) CheckScaleCommand(options.scale_command);
   if (!options.certificate_roles.empty() && options.tls_client_ca.empty()) {
     throw InvalidArgument(
         "--certificate-roles requires --tls-client-ca: clients present no certificates without it");
@@ -223,6 +225,27 @@ ServerSample SampleOf(const ServeOptions& options,
   return sample;
 }
 
+// Null without --scale-command.
+std::unique_ptr<ScaleCommand> StartScaling(const ServeOptions& options,
+                                           const DataPaths& paths,
+                                           JobStore& store,
+                                           const std::function<bool()>& has_chores) {
+  if (options.scale_command.empty()) return nullptr;
+  ScaleCommandOptions scale;
+  scale.program = options.scale_command;
+  scale.max_workers = options.scale_max;
+  scale.output = paths.root / "scale-command.log";
+  scale.pause = Milliseconds(options.scale_seconds);
+  // Of all servers on the store one asks. Its own workers need no engine.
+  return std::make_unique<ScaleCommand>(
+      scale, [&store, has_chores, own = options.workers]() -> std::optional<int64_t> {
+        if (!has_chores()) return std::nullopt;
+        const JobCounts counts = store.CountJobs();
+        const int64_t waiting = store.Holds().empty() ? counts.queued - counts.blocked : 0;
+        return waiting + counts.running - own;
+      });
+}
+
 // Probes like a client. While the gate has no room, it has reported that itself.
 std::string ProbeOwnServer(const RpcServer& server,
                            const TlsFiles& tls,
@@ -340,6 +363,7 @@ void Serve(const ServeOptions& options) {
   std::optional<Notifier> notifier;
   if (!options.notify_allow.empty()) notifier.emplace(store, clock, notify);
   Supervisor supervisor(worker_setup, store);
+  std::unique_ptr<ScaleCommand> scaling = StartScaling(options, paths, store, opened.has_chores);
   const std::shared_ptr<void> stop_metrics(nullptr, [&](void*) { metrics.StopListening(); });
   if (!options.metrics_listen.empty()) {
     const int port = metrics.Listen(options.metrics_listen, store, blobs, [&] {
@@ -369,6 +393,7 @@ void Serve(const ServeOptions& options) {
   NotifyServiceManager("STOPPING=1");
   spdlog::info("draining: no new jobs, running ones are saved and released");
   signals.ExitOnNext();
+  scaling.reset();
   server.StartDraining();
   supervisor.Drain(Milliseconds(options.drain_seconds * 0.9));
   supervisor.Wait();
