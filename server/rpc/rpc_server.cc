@@ -114,7 +114,8 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   interceptors.push_back(
       MakeCallWatch(options.on_call,
                     {[this](const std::string& peer) { gate_->BeginCall(peer); },
-                     [this](const std::string& peer) { gate_->EndCall(peer); }}));
+                     [this](const std::string& peer) { gate_->EndCall(peer); }},
+                    options.tracer));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   server_ = builder.BuildAndStart();
   if (!server_) {

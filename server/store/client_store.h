@@ -35,7 +35,7 @@ struct NewGraph {
   std::string project;
   std::string scene;  // stored
   std::string notify_url;
-  std::string trace;  // trace id of the call, for logs; may be empty
+  std::string trace;  // W3C traceparent of the call; may be empty
   int priority = 100;
   std::vector<NewJob> jobs;
 };

@@ -74,7 +74,8 @@ class WorkerLoop {
                  options_.models,
                  digests_,
                  draining,
-                 [this](const JobRecord& job) { ReportSelf(heartbeat_store_, job.name); }} {}
+                 [this](const JobRecord& job) { ReportSelf(heartbeat_store_, job.name); },
+                 options_.tracer.get()} {}
 
   void Run();
 

@@ -9,6 +9,7 @@
 #include <memory>
 #include <string>
 
+#include "core/trace/tracer.h"
 #include "server/store/user_models.h"
 #include "server/worker/lease_keeper.h"
 #include "server/worker/live/live_engine.h"
@@ -40,6 +41,7 @@ struct WorkerOptions {
   std::string code_version;
   std::string release;  // for messages
   UserModels models;
+  std::shared_ptr<Tracer> tracer;  // records attempts; null: does not
 };
 
 // Returns when `draining` becomes true, the parent has ended, the process should be recycled, or

@@ -17,6 +17,7 @@ struct WorkerSettings {
   std::string log_level = "info";
   std::string log_format = "text";  // or "json"
   int64_t reserve_mib = 256;        // disk space to keep free
+  std::string otlp_endpoint;        // of traces; empty: that of the environment, if there is one
   double drain_grace_seconds = 15.0;
   // Hidden flags of both programs, for tests (VisitTimings).
   double lease_seconds = 60.0;
