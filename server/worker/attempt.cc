@@ -126,7 +126,7 @@ class Attempt {
 void Attempt::Run() {
   spdlog::info("{} begins {} of {}", tag_, job_.kind, job_.scene);
   try {
-    Prepare();
+    trace_.InPart("read inputs", [&] { Prepare(); });
     if (!ServeFromCache() && !JoinEqual()) Compute();
   } catch (const Error& e) {
     // Exceptions of libraries become internal errors with their text.
@@ -162,7 +162,6 @@ JobError Attempt::OutOfMemory(const std::exception& e) const {
 }
 
 void Attempt::Prepare() {
-  const AttemptTrace::Part part_of_trace(trace_, "read inputs");
   fs::remove_all(scratch_);
   run_.job_name = job_.name;
   run_.project = job_.project;
@@ -295,17 +294,14 @@ bool Attempt::JoinEqual() {
 
 void Attempt::Compute() {
   LinkedBlobs blobs(context_.blobs, scratch_ / "blobs");
-  StageOutput output;
-  {
-    const AttemptTrace::Part part(trace_, "run");
-    output = context_.runner.Run(run_, blobs, checkpoints_, keeper_, keeper_.token());
-  }
+  const StageOutput output = trace_.InPart("run", [&] {
+    return context_.runner.Run(run_, blobs, checkpoints_, keeper_, keeper_.token());
+  });
   RequireModelsUnchanged();
-  Publish(output);
+  trace_.InPart("publish", [&] { Publish(output); });
 }
 
 void Attempt::Publish(const StageOutput& output) {
-  const AttemptTrace::Part part(trace_, "publish");
   Publication publication;
   for (const std::string& name : output.passed_on) {
     const auto artifact = input_artifacts_.find(name);

@@ -36,6 +36,12 @@ class AttemptTrace {
     Span span_;
   };
 
+  template <typename Body>
+  auto InPart(const char* name, const Body& body) const {
+    const Part part(*this, name);
+    return body();
+  }
+
   // How the attempt ended, e.g. "succeeded"; the first one counts.
   void SetOutcome(const std::string& outcome);
   // The same for an attempt that was stopped, or failed with `error` (kNone).
