@@ -226,8 +226,7 @@ ServerSample SampleOf(const ServeOptions& options,
 
 // Null if traces are not exported.
 std::shared_ptr<Tracer> MakeTracer(const ServeOptions& options) {
-  const TraceSettings settings =
-      ReadTraceSettings("color3d-server", options.worker.otlp_endpoint);
+  const TraceSettings settings = ReadTraceSettings("color3d-server", options.worker.otlp_endpoint);
   for (const std::string& warning : settings.warnings) spdlog::warn("{}", warning);
   if (settings.target.url.empty()) return nullptr;
   spdlog::info("traces are sent to {}", settings.target.url);

@@ -17,9 +17,9 @@ struct TraceTarget {
 };
 
 struct TraceAnswer {
-  int status = 0;                              // of HTTP; 0: no answer
-  std::string problem;                         // why there was no answer
-  std::chrono::milliseconds retry_after{0};    // asked for by the collector; 0: not
+  int status = 0;                            // of HTTP; 0: no answer
+  std::string problem;                       // why there was no answer
+  std::chrono::milliseconds retry_after{0};  // asked for by the collector; 0: not
 };
 
 // Takes at most `target.limit`, less once `stop` is set. Follows no redirects, uses no proxy, reads

@@ -64,8 +64,8 @@ bool ReadPairs(std::string_view text, Pairs* pairs) {
     const std::string name = Trimmed(part.substr(0, equals));
     const std::string value =
         equals == std::string::npos ? "" : PercentDecoded(Trimmed(part.substr(equals + 1)));
-    const bool has_control = std::ranges::any_of(
-        name + value, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
+    const bool has_control =
+        std::ranges::any_of(name + value, [](unsigned char c) { return c < 0x20 || c == 0x7f; });
     if (equals == std::string::npos || name.empty() || has_control) {
       good = false;
     } else {

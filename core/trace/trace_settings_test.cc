@@ -31,10 +31,10 @@ TEST(TraceSettingsTest, ExportsNothingWithoutAddress) {
                         {"OTEL_SDK_DISABLED", "True"}};
   EXPECT_EQ(Read(on).target.url, "");
   EXPECT_EQ(Read(on, "http://c:4318").target.url, "");
-  EXPECT_EQ(Read({{"OTEL_EXPORTER_OTLP_ENDPOINT", "http://c:4318"},
-                  {"OTEL_TRACES_EXPORTER", "none"}})
-                .target.url,
-            "");
+  EXPECT_EQ(
+      Read({{"OTEL_EXPORTER_OTLP_ENDPOINT", "http://c:4318"}, {"OTEL_TRACES_EXPORTER", "none"}})
+          .target.url,
+      "");
 }
 
 // "Endpoint URLs for OTLP/HTTP" of the specification.
@@ -50,8 +50,13 @@ TEST(TraceSettingsTest, AddsPathToAddressOfAllSignalsOnly) {
 }
 
 TEST(TraceSettingsTest, MalformedOptionIsAnErrorAndMalformedVariableAWarning) {
-  for (const char* bad : {"localhost:4318", "grpc://c:4317", "http://", "http://:4318",
-                          "http://c:4318/?key=1", "http://c\n", "http://user:secret@c:4318"}) {
+  for (const char* bad : {"localhost:4318",
+                          "grpc://c:4317",
+                          "http://",
+                          "http://:4318",
+                          "http://c:4318/?key=1",
+                          "http://c\n",
+                          "http://user:secret@c:4318"}) {
     EXPECT_THROW(Read({}, bad), Error) << bad;
     const TraceSettings settings = Read({{"OTEL_EXPORTER_OTLP_ENDPOINT", bad}});
     EXPECT_EQ(settings.target.url, "") << bad;

@@ -30,9 +30,8 @@ std::shared_ptr<Tracer> Tracer::Make(const TraceSettings& settings,
                                  {"service.version", version},
                                  {"host.name", HostOfProcess()},
                                  {"process.pid", static_cast<int64_t>(::getpid())}};
-  options.resource.attributes.insert(options.resource.attributes.end(),
-                                     settings.attributes.begin(),
-                                     settings.attributes.end());
+  options.resource.attributes.insert(
+      options.resource.attributes.end(), settings.attributes.begin(), settings.attributes.end());
   options.on_problem = std::move(on_problem);
   return std::shared_ptr<Tracer>(new Tracer(settings.sampler, std::move(options)));
 }

@@ -77,9 +77,10 @@ void JobSpans::Poll() {
 void JobSpans::Record(const std::vector<EventRecord>& events) {
   std::set<int64_t> ids;
   for (const EventRecord& event : events) {
-    const bool begins = event.state == JobState::kRunning && queued_since_ms_.contains(event.job_id);
-    if (event.kind == EventKind::kState && (begins || event.state == JobState::kQueued ||
-                                            IsFinished(event.state))) {
+    const bool begins =
+        event.state == JobState::kRunning && queued_since_ms_.contains(event.job_id);
+    if (event.kind == EventKind::kState &&
+        (begins || event.state == JobState::kQueued || IsFinished(event.state))) {
       ids.insert(event.job_id);
     }
   }
@@ -107,7 +108,9 @@ void JobSpans::Record(const std::vector<EventRecord>& events) {
   }
 }
 
-void JobSpans::RecordWait(const JobRecord& job, const TraceContext& call, const EventRecord& begin) {
+void JobSpans::RecordWait(const JobRecord& job,
+                          const TraceContext& call,
+                          const EventRecord& begin) {
   const auto since = queued_since_ms_.find(job.id);
   if (since == queued_since_ms_.end()) return;
   Span span;

@@ -26,7 +26,7 @@ class BlobSource {
 };
 
 struct StageRun {
-  std::string job_name;  // "jobs/..."
+  std::string job_name;     // "jobs/..."
   std::string traceparent;  // W3C traceparent for calls of the stage; empty: none
   std::string project;      // project of the job; scenes of a batch take turns by project
   v1::JobSpec spec;

@@ -18,9 +18,9 @@ namespace {
 using std::chrono::seconds;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::Not;
 using testing::HttpReceiver;
 using testing::Named;
+using ::testing::Not;
 using testing::ReceivedSpan;
 using testing::SpansOf;
 
@@ -55,8 +55,13 @@ class TraceTest : public ServiceTest {
       options.height = 120;
       WriteProceduralScene(room, options);
     }
-    return Client(std::vector<std::string>{"colorize", room, "--auto", "--key-view", "view002",
-                                           "-o", Path("out" + std::to_string(++outs_)).string()} +
+    return Client(std::vector<std::string>{"colorize",
+                                           room,
+                                           "--auto",
+                                           "--key-view",
+                                           "view002",
+                                           "-o",
+                                           Path("out" + std::to_string(++outs_)).string()} +
                   QuickOptions() + more);
   }
   void ExpectOneTree(HttpReceiver& collector);
@@ -159,7 +164,7 @@ TEST_F(TraceTest, SpansOfJobFormOneTreeFromClientToStage) {
 }
 
 TEST_F(TraceTest, RealStagesFormOneTree) {
-  HttpReceiver collector({"503 Busy", "200 OK"});
+  HttpReceiver collector({"200 OK"});
   SetCollector(collector.url());
   StartServer();
   const ProcessResult result = Colorize();
@@ -171,9 +176,7 @@ TEST_F(TraceTest, RealStagesFormOneTree) {
                !Named(spans, "stage colorize_scene").empty();
       },
       seconds(20)));
-  std::set<std::string> services;
-  for (const ReceivedSpan& span : SpansOf(collector)) services.insert(span.service);
-  EXPECT_EQ(services, (std::set<std::string>{"color3d", "color3d-server", "color3d-worker"}));
+  ExpectOneTree(collector);
 }
 
 TEST_F(TraceTest, ServerSendsLastSpansAtItsEnd) {
@@ -220,8 +223,7 @@ TEST_F(TraceTest, BadCollectorNeitherSlowsNorFailsJobs) {
     nobody = gone.url();
   }
   double usual = 0.0;
-  for (const std::string& collector :
-       {std::string(), hanging.url(), failing.url(), nobody}) {
+  for (const std::string& collector : {std::string(), hanging.url(), failing.url(), nobody}) {
     SetCollector(collector);
     StartScripted();
     const ProcessResult result = Colorize({"--seed", std::to_string(outs_ + 1)});

@@ -174,9 +174,9 @@ TEST_F(TracedCallsTest, FailuresHaveTheirCodeAndHealthChecksNoSpan) {
   grpc::ByteBuffer empty, answer;
   const grpc::internal::RpcMethod health("/grpc.health.v1.Health/Check",
                                          grpc::internal::RpcMethod::NORMAL_RPC);
-  EXPECT_TRUE(grpc::internal::BlockingUnaryCall(
-                  caller_->channel.get(), health, &context, empty, &answer)
-                  .ok());
+  EXPECT_TRUE(
+      grpc::internal::BlockingUnaryCall(caller_->channel.get(), health, &context, empty, &answer)
+          .ok());
   const std::vector<ReceivedSpan> spans = Spans();
   ASSERT_EQ(spans.size(), 1u);
   EXPECT_EQ(spans[0].attributes.at("rpc.grpc.status_code"), "5");

@@ -80,8 +80,7 @@ class HttpReceiver {
         continue;
       }
       const std::string text = "HTTP/1.1 " + answer + "\r\nContent-Length: 0\r\n\r\n";
-      [[maybe_unused]] const ssize_t sent =
-          ::send(fd, text.data(), text.size(), MSG_NOSIGNAL);
+      [[maybe_unused]] const ssize_t sent = ::send(fd, text.data(), text.size(), MSG_NOSIGNAL);
       ::close(fd);
     }
   }
