@@ -1,6 +1,6 @@
 #include "core/trace/otlp_json.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <chrono>
 #include <cmath>

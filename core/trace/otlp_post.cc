@@ -16,8 +16,10 @@ constexpr int kTickMs = 50;
 
 struct Release {
   void operator()(CURL* curl) const { curl_easy_cleanup(curl); }
-  void operator()(CURLM* curl) const { curl_multi_cleanup(curl); }
   void operator()(curl_slist* list) const { curl_slist_free_all(list); }
+};
+struct ReleaseMulti {  // CURL and CURLM are the same type
+  void operator()(CURLM* curl) const { curl_multi_cleanup(curl); }
 };
 
 size_t CountAnswer(char*, size_t size, size_t count, void* seen) {
@@ -27,7 +29,7 @@ size_t CountAnswer(char*, size_t size, size_t count, void* seen) {
 
 // curl_easy_perform would notice a stop only once a second.
 CURLcode Perform(CURL* curl, const std::atomic<bool>& stop) {
-  const std::unique_ptr<CURLM, Release> multi(curl_multi_init());
+  const std::unique_ptr<CURLM, ReleaseMulti> multi(curl_multi_init());
   if (!multi || curl_multi_add_handle(multi.get(), curl) != CURLM_OK) return CURLE_FAILED_INIT;
   CURLcode code = CURLE_ABORTED_BY_CALLBACK;
   for (int running = 1; !stop.load();) {

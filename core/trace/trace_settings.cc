@@ -218,6 +218,12 @@ std::string VariableOfProcess(const char* name) {
   return value == nullptr ? "" : value;
 }
 
+TraceSettings ReadTraceSettings(const std::string& service,
+                                const std::string& endpoint,
+                                const GetVariable& get) {
+  return SettingsReader(get).Read(service, endpoint);
+}
+
 void CheckTraceEndpoint(const std::string& source, const std::string& url) {
   const size_t scheme = url.starts_with("http://")    ? 7
                         : url.starts_with("https://") ? 8
