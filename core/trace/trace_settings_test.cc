@@ -55,7 +55,7 @@ TEST(TraceSettingsTest, MalformedOptionIsAnErrorAndMalformedVariableAWarning) {
                           "http://",
                           "http://:4318",
                           "http://c:4318/?key=1",
-                          "http://c\n",
+                          "http://c d",
                           "http://user:secret@c:4318"}) {
     EXPECT_THROW(Read({}, bad), Error) << bad;
     const TraceSettings settings = Read({{"OTEL_EXPORTER_OTLP_ENDPOINT", bad}});
