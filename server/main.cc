@@ -74,6 +74,10 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--metrics-listen",
                     options->metrics_listen,
                     "HOST:PORT of the metrics for Prometheus (/metrics)");
+  serve->add_option("--otlp-endpoint",
+                    options->worker.otlp_endpoint,
+                    "http[s]://HOST:PORT of a collector of OpenTelemetry that receives traces "
+                    "(OTLP over HTTP). Default: OTEL_EXPORTER_OTLP_ENDPOINT");
   serve->add_flag("!--no-sandbox",
                   options->worker.sandbox,
                   "Run workers, COLMAP and scripts without a sandbox");

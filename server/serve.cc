@@ -16,6 +16,7 @@
 #include "core/base/files.h"
 #include "core/base/memory.h"
 #include "core/base/text/address.h"
+#include "core/trace/tracer.h"
 #include "server/access/certificate_roles.h"
 #include "server/access/notify_targets.h"
 #include "server/access/tls.h"
@@ -40,6 +41,7 @@
 #include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/open_store.h"
+#include "server/tracing/job_spans.h"
 #include "server/worker/supervision/supervisor.h"
 #include "server/worker/supervision/worker_settings.h"
 
@@ -246,6 +248,21 @@ std::unique_ptr<ScaleCommand> StartScaling(const ServeOptions& options,
       });
 }
 
+// Null if traces are not exported.
+std::shared_ptr<Tracer> MakeTracer(const ServeOptions& options) {
+  const TraceSettings settings = ReadTraceSettings("color3d-server", options.worker.otlp_endpoint);
+  for (const std::string& warning : settings.warnings) spdlog::warn("{}", warning);
+  if (settings.target.url.empty()) return nullptr;
+  spdlog::info("traces are sent to {}", settings.target.url);
+  if (options.workers > 0 && !settings.target.headers.empty()) {
+    spdlog::warn(
+        "workers of this machine do not get OTEL_EXPORTER_OTLP_HEADERS, because they decode "
+        "uploads: if the collector requires them, run one without on this machine");
+  }
+  return Tracer::Make(
+      settings, COLOR3D_VERSION, [](const std::string& problem) { spdlog::warn("{}", problem); });
+}
+
 // Probes like a client. While the gate has no room, it has reported that itself.
 std::string ProbeOwnServer(const RpcServer& server,
                            const TlsFiles& tls,
@@ -269,6 +286,7 @@ void Serve(const ServeOptions& options) {
   RequireReadable(models);
   for (const auto& [name, address] : models.backends) ParseBackendAddress(name, address);
   SupervisorOptions worker_setup = WorkerSetup(options, models);
+  const std::shared_ptr<Tracer> tracer = MakeTracer(options);
   NotifierOptions notify;
   notify.allowed = options.notify_allow;
   if (!options.notify_secret.empty()) notify.secret = ReadWebhookSecret(options.notify_secret);
@@ -309,6 +327,7 @@ void Serve(const ServeOptions& options) {
   rpc.models = models;
   rpc.worker_socket = sockets.Address(kWorkerSocket);
   rpc.worker_times = TimesOfWorkers(options.worker);
+  rpc.tracer = tracer;
   rpc.inference = InferenceSetup(options, models, sockets, &worker_setup);
   const auto prober = std::make_shared<BackendProber>(models.backends);
   rpc.probe_backends = [prober] { return ProbeForInfo(*prober); };
@@ -321,6 +340,12 @@ void Serve(const ServeOptions& options) {
   rpc.max_connections = options.max_connections;
   UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);
   ExpireDeadWorkers(store);
+  std::optional<JobSpans> job_spans;
+  if (tracer) {
+    JobSpansOptions spans;
+    spans.records = opened.has_chores;
+    job_spans.emplace(store, tracer, spans);
+  }
 
   ServerMetrics metrics(COLOR3D_VERSION);
   rpc.on_call = [&metrics](const std::string& method, grpc::StatusCode code, double seconds) {
@@ -398,6 +423,8 @@ void Serve(const ServeOptions& options) {
   supervisor.Drain(Milliseconds(options.drain_seconds * 0.9));
   supervisor.Wait();
   server.Shutdown(Milliseconds(std::min(2.0, options.drain_seconds * 0.1)));
+  job_spans.reset();
+  if (tracer && !tracer->Flush()) spdlog::warn("the last traces were not sent");
   spdlog::info("ended");
   if (!deaf.empty()) {
     throw Error(ErrorCode::kUnavailable,

@@ -51,6 +51,7 @@ struct RpcServerOptions {
   ColorizeLimits live;
   std::string worker_socket;  // gRPC address for workers on this machine; empty: none
   WorkerTimes worker_times;
+  std::shared_ptr<Tracer> tracer;  // records calls; null: does not
 };
 
 class RpcServer {

@@ -36,7 +36,7 @@ struct NewGraph {
   std::string project;
   std::string scene;  // stored
   std::string notify_url;
-  std::string trace;  // trace id of the call, for logs; may be empty
+  std::string trace;  // W3C traceparent of the call; may be empty
   int priority = 100;
   int64_t deadline_ms = kNoDeadline;
   std::vector<NewJob> jobs;

@@ -105,7 +105,7 @@ struct JobRecord {
   bool cached = false;
   bool pinned = false;
   std::string notify_url;  // notified when the job ends; empty: none
-  std::string trace;       // W3C trace id of the call, 32 hexadecimal digits, or empty
+  std::string trace;       // W3C traceparent of the call, in old jobs its trace id; or empty
   std::optional<FileDigest> checkpoint;
   int64_t queued_ms = 0;        // time spent waiting for a worker before the present wait
   int64_t queued_since_ms = 0;  // begin of the present wait; 0: not waiting

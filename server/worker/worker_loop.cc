@@ -63,7 +63,8 @@ class WorkerLoop {
                  options_.models,
                  digests_,
                  draining,
-                 [this](const JobRecord& job) { ReportSelf(heartbeat_store_, job.name); }} {
+                 [this](const JobRecord& job) { ReportSelf(heartbeat_store_, job.name); },
+                 options_.tracer.get()} {
     const int64_t memory = std::min(MachineMemoryBytes(), OwnMemoryLimitBytes());
     facts_.worker_id = id_;
     facts_.pid = ::getpid();

@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/trace/tracer.h"
 #include "server/store/user_models.h"
 #include "server/worker/lease_keeper.h"
 #include "server/worker/live/live_engine.h"
@@ -43,6 +44,7 @@ struct WorkerOptions {
   std::string release;  // for messages
   std::string simd;     // as in WorkerRecord
   UserModels models;
+  std::shared_ptr<Tracer> tracer;  // records attempts; null: does not
 };
 
 // Returns when `draining` becomes true, the parent has ended, the process should be recycled, or

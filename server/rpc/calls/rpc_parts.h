@@ -112,7 +112,7 @@ struct RpcParts {
 struct Call {
   Caller caller;
   ProjectStore store;
-  std::string trace;  // W3C trace id of the call; empty: none
+  std::string trace;  // W3C traceparent of the call; empty: none
 };
 // Throws as Access::Require.
 Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context);

@@ -11,6 +11,7 @@
 
 #include "color3d/v1/job.grpc.pb.h"
 #include "core/catalogue/stages.h"
+#include "core/trace/trace_context.h"
 #include "server/access/notify_targets.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_plan.h"
@@ -258,7 +259,7 @@ JobRecord CreateJobRecord(const RpcParts& parts,
   spdlog::info("[job={}{}{}] accepted {} of {} ({} jobs)",
                job.name,
                call.trace.empty() ? "" : " trace=",
-               call.trace,
+               TraceIdOf(call.trace),
                job.kind,
                job.scene,
                graph.jobs.size());

@@ -18,6 +18,7 @@ struct WorkerSettings {
   std::string log_format = "text";  // or "json"
   int64_t reserve_mib = 256;        // disk space to keep free
   bool sends_logs = false;          // lines of job logs go to the server, not to its data folder
+  std::string otlp_endpoint;        // of traces; empty: that of the environment, if there is one
   double drain_grace_seconds = 15.0;
   // Hidden flags of both programs, for tests (VisitTimings).
   double lease_seconds = 60.0;
