@@ -32,7 +32,7 @@ QueueModel IdealModel(SimulatedScene scene, int workers, int64_t scenes) {
   model.kinds = {std::move(scene)};
   model.writers = model.readers = model.cores = 0;
   model.cache_bytes = int64_t{1} << 40;
-  model.poll = 1e-3;
+  model.poll = 0.01;
   model.progress = 0.0;
   model.retry_pause = 0.0;
   model.restart = 0.0;
@@ -59,7 +59,7 @@ TEST(QueueSimulationTest, OneWorkerTakesTheSumOfAllTimes) {
 
 TEST(QueueSimulationTest, ManyWorkersTakeTheLongestPath) {
   const QueueResult result = SimulateQueue(IdealModel(Diamond(), 100, 10));
-  EXPECT_NEAR(result.makespan, 2.0 + 5.0 + 1.0, 0.01) << "and pauses of idle workers";
+  EXPECT_NEAR(result.makespan, 2.0 + 5.0 + 1.0, 0.1) << "and pauses of idle workers";
 }
 
 TEST(QueueSimulationTest, WithoutLimitsWorkersScale) {
@@ -76,7 +76,7 @@ TEST(QueueSimulationTest, OneWriterBoundsTheRateOfJobs) {
   model.times.claim_write = 0.006;
   model.times.publish_write = 0.004;
   const QueueResult result = SimulateQueue(model);
-  EXPECT_NEAR(result.jobs_per_second, 100.0, 1.0);
+  EXPECT_NEAR(result.jobs_per_second, 100.0, 2.0) << "and the last claims find no job";
   EXPECT_EQ(result.bottleneck, "database writes");
   EXPECT_NEAR(ShareOf(result, "database writes"), 1.0, 0.01);
   EXPECT_NEAR(result.most_workers, 100.0, 2.0) << "each is busy for a second a job";
@@ -128,13 +128,14 @@ TEST(QueueSimulationTest, LostWorkerDelaysItsJobByTheLease) {
   QueueModel model = IdealModel({{Timed(300.0)}}, 1, 1);
   model.losses_per_hour = 15.0;
   model.lease = 1'000.0;
+  model.poll = 0.1;
   model.most_losses = 100;
   int64_t lost_attempts = 0;
   for (model.seed = 1; model.seed <= 20; ++model.seed) {
     const QueueResult result = SimulateQueue(model);
     EXPECT_EQ(result.attempts, result.losses + 1);
     // The lease begins with the claim; losses of an idle worker delay nothing.
-    EXPECT_NEAR(result.makespan, 300.0 + 1'000.0 * static_cast<double>(result.losses), 0.01)
+    EXPECT_NEAR(result.makespan, 300.0 + 1'000.0 * static_cast<double>(result.losses), 1.0)
         << "seed " << model.seed;
     lost_attempts += result.losses;
   }
@@ -152,7 +153,7 @@ TEST(QueueSimulationTest, PreemptedJobGoesOnFromItsCheckpointAtOnce) {
     const QueueResult result = SimulateQueue(model);
     EXPECT_EQ(result.finished_scenes, 1) << "no try is lost";
     EXPECT_GE(result.makespan, 300.0 - 0.01);
-    EXPECT_LE(result.makespan, 300.0 + 1.01 * static_cast<double>(result.preemptions))
+    EXPECT_LE(result.makespan, 300.01 + 1.02 * static_cast<double>(result.preemptions))
         << "seed " << model.seed;
     preemptions += result.preemptions;
   }
