@@ -86,9 +86,11 @@ class QueueRunner {
     SetPaused(true);
     const int jobs = workers_ * options_.jobs_per_worker;
     std::string last;
+    // It makes progress ten times a second, so that heartbeats are sent as often as they may be.
+    const int steps = std::max(1, options_.stage_ms / 100);
+    const std::string script = fmt::format("steps={},ms={}", steps, options_.stage_ms / steps);
     for (int i = 0; i < jobs; ++i) {
-      v1::JobSpec spec =
-          ScriptedSpec(scene, fmt::format("steps=1,ms={}", options_.stage_ms), /*seed=*/i + 1);
+      v1::JobSpec spec = ScriptedSpec(scene, script, /*seed=*/i + 1);
       spec.add_inputs(imported);
       last = client().Create(spec).name();
     }
