@@ -51,7 +51,9 @@ QueueModel ModelOf(const SimulateArguments& args) {
 
 nlohmann::ordered_json ToJson(const QueueResult& result) {
   nlohmann::ordered_json uses;
-  for (const ResourceUse& use : result.uses) uses[use.name] = use.share;
+  for (const ResourceUse& use : result.uses) {
+    uses[use.name] = {{"share", use.share}, {"lost", use.lost}};
+  }
   return {{"workers", result.workers},
           {"scenes_per_hour", result.scenes_per_hour},
           {"jobs_per_second", result.jobs_per_second},
@@ -67,6 +69,7 @@ nlohmann::ordered_json ToJson(const QueueResult& result) {
           {"stored_bytes", result.stored_bytes},
           {"uses", uses},
           {"bottleneck", result.bottleneck},
+          {"next_bottleneck", result.next_bottleneck},
           {"most_workers", result.most_workers},
           {"events", result.events}};
 }
@@ -75,7 +78,7 @@ std::string CsvOf(const std::vector<QueueResult>& results, const SimulateArgumen
   std::string csv =
       "database,servers,seed,scenes,load,workers,scenes_per_hour,makespan_s,wait_p50_s,wait_p99_s";
   for (const ResourceUse& use : results.front().uses) csv += "," + use.name;
-  csv += ",bottleneck,most_workers,losses,preemptions,failed_scenes\n";
+  csv += ",bottleneck,next_bottleneck,most_workers,losses,preemptions,failed_scenes\n";
   for (const QueueResult& result : results) {
     csv += fmt::format("{},{},{},{},{},{},{:.1f},{:.0f},{:.3f},{:.3f}",
                        args.database,
@@ -89,8 +92,9 @@ std::string CsvOf(const std::vector<QueueResult>& results, const SimulateArgumen
                        result.wait_p50,
                        result.wait_p99);
     for (const ResourceUse& use : result.uses) csv += fmt::format(",{:.4f}", use.share);
-    csv += fmt::format(",{},{:.0f},{},{},{}\n",
+    csv += fmt::format(",{},{},{:.0f},{},{},{}\n",
                        result.bottleneck,
+                       result.next_bottleneck,
                        result.most_workers,
                        result.losses,
                        result.preemptions,
@@ -105,17 +109,19 @@ void PrintRow(const QueueResult& result, double seconds) {
   for (const ResourceUse& use : result.uses) {
     uses += fmt::format("{} {:.0f} %, ", use.name, 100.0 * use.share);
   }
-  fmt::print(stderr,
-             "{} workers: {:.0f} scenes/h, wait p50 {:.2f} s, p99 {:.2f} s; {}first limit: {}; "
-             "servers feed {:.0f} busy workers ({:.1f} s)\n",
-             result.workers,
-             result.scenes_per_hour,
-             result.wait_p50,
-             result.wait_p99,
-             uses,
-             result.bottleneck,
-             result.most_workers,
-             seconds);
+  fmt::print(
+      stderr,
+      "{} workers: {:.0f} scenes/h, wait p50 {:.2f} s, p99 {:.2f} s; {}limit: {}; next: {}, at "
+      "{:.0f} busy workers ({:.1f} s)\n",
+      result.workers,
+      result.scenes_per_hour,
+      result.wait_p50,
+      result.wait_p99,
+      uses,
+      result.bottleneck,
+      result.next_bottleneck,
+      result.most_workers,
+      seconds);
 }
 
 void RunSimulate(const SimulateArguments& args) {

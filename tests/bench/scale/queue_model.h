@@ -81,6 +81,7 @@ struct QueueModel {
 struct ResourceUse {
   std::string name;
   double share = 0.0;  // of its capacity until the last scene has ended
+  double lost = 0.0;   // share of the workers' time that passed in waiting for it
 };
 
 struct QueueResult {
@@ -99,10 +100,13 @@ struct QueueResult {
   int64_t stored_bytes = 0;
   int64_t events = 0;
   std::vector<ResourceUse> uses;  // the workers first
-  std::string bottleneck;         // the resource with the largest share
+  // The resource that the workers lose most time to, or "workers" if they lose less than 5 % to
+  // all.
+  std::string bottleneck;
   // Number of busy workers at which the most used resource of the servers would be full, from its
-  // present share.
+  // present share without heartbeats, which become fewer then; and the resource.
   double most_workers = 0.0;
+  std::string next_bottleneck;
 };
 
 // Throws Error{kInvalidArgument} for a model without workers, scenes or stages, with negative

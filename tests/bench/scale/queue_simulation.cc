@@ -14,6 +14,8 @@ namespace color3d {
 namespace {
 
 constexpr double kHour = 3600.0;
+// Share of the workers' time.
+constexpr double kNoticedLoss = 0.05;
 // Calls of an attempt (server/worker/attempt.cc) beside those for its files: state of the worker,
 // scene twice, inputs, graph, stage cache, equal work; publication, state of the worker.
 constexpr int kPrepareCalls = 7;
@@ -106,8 +108,14 @@ class QueueSimulation {
   void BeginLife(int64_t worker);
   void EndLife(const QueueEvent& event);
   void LoseJob(SimulatedWorker& worker);
+  // Returns when a request of a worker, which waits for it, is done.
+  double Wait(FifoResource& resource, double seconds) {
+    const double done = resource.Serve(now_, seconds);
+    resource.AddWait(done - now_);
+    return done;
+  }
   // Returns when the bytes have passed link, blobs and server, with the calls for their files.
-  double Move(int64_t bytes, int files);
+  double Move(int64_t bytes, int files, bool is_awaited = true);
   QueueResult Summarize();
 
   const QueueModel& model_;
@@ -179,18 +187,18 @@ void QueueSimulation::Handle(const QueueEvent& event) {
   if (event.attempt != WorkerOf(event).attempt) return;
   switch (event.step) {
     case Step::kClaim:
-      return Then(cpu_.Serve(now_, times.call_cpu), event, Step::kClaimRead);
+      return Then(Wait(cpu_, times.call_cpu), event, Step::kClaimRead);
     case Step::kClaimRead:
-      return Then(readers_.Serve(now_, times.claim_read), event, Step::kClaimWrite);
+      return Then(Wait(readers_, times.claim_read), event, Step::kClaimWrite);
     case Step::kClaimWrite:
       if (!scenes_.HasWork()) return Then(now_ + model_.poll, event, Step::kClaim);
-      return Then(writer_.Serve(now_, times.claim_write), event, Step::kClaimed);
+      return Then(Wait(writer_, times.claim_write), event, Step::kClaimed);
     case Step::kClaimed:
       return Claim(event);
     case Step::kPrepareRead:
-      return Then(readers_.Serve(now_, times.prepare_read), event, Step::kPrepareWrite);
+      return Then(Wait(readers_, times.prepare_read), event, Step::kPrepareWrite);
     case Step::kPrepareWrite:
-      return Then(writer_.Serve(now_, times.join_write + times.worker_write), event, Step::kFetch);
+      return Then(Wait(writer_, times.join_write + times.worker_write), event, Step::kFetch);
     case Step::kFetch:
       return Fetch(event);
     case Step::kCompute:
@@ -198,18 +206,18 @@ void QueueSimulation::Handle(const QueueEvent& event) {
     case Step::kStore:
       return Store(event);
     case Step::kPublish:
-      return Then(cpu_.Serve(now_, kPublishCalls * times.call_cpu), event, Step::kPublishWrite);
+      return Then(Wait(cpu_, kPublishCalls * times.call_cpu), event, Step::kPublishWrite);
     case Step::kPublishWrite: {
       const int files = scenes_.StageOf(WorkerOf(event).job).output_files;
       const double seconds =
           times.publish_write + times.worker_write + files * times.artifact_write;
-      return Then(writer_.Serve(now_, seconds), event, Step::kDone);
+      return Then(Wait(writer_, seconds), event, Step::kDone);
     }
     case Step::kDone:
       return FinishJob(event);
     case Step::kHeartbeat:
       if (WorkerOf(event).computing_since < 0.0) return;
-      return Then(cpu_.Serve(now_, times.call_cpu), event, Step::kHeartbeatWrite);
+      return Then(cpu_.ServeBeside(now_, times.call_cpu), event, Step::kHeartbeatWrite);
     case Step::kHeartbeatWrite:
       return Beat(event);
     default:
@@ -225,18 +233,24 @@ void QueueSimulation::Claim(const QueueEvent& event) {
   worker.seen_at = worker.saved_at = worker.reported_at = now_;
   ++result_.attempts;
   const double cpu = kPrepareCalls * model_.times.call_cpu + model_.local_cpu;
-  Then(cpu_.Serve(now_, cpu), event, Step::kPrepareRead);
+  Then(Wait(cpu_, cpu), event, Step::kPrepareRead);
 }
 
-double QueueSimulation::Move(int64_t bytes, int files) {
+double QueueSimulation::Move(int64_t bytes, int files, bool is_awaited) {
   const auto size = static_cast<double>(bytes);
+  FifoResource* slowest = &cpu_;
   double done = cpu_.Serve(
       now_, files * kCallsPerFile * model_.times.call_cpu + size * model_.times.byte_cpu);
-  if (link_.IsLimited())
-    done = std::max(done, link_.Serve(now_, size / model_.link_bytes_per_second));
-  if (blobs_.IsLimited()) {
-    done = std::max(done, blobs_.Serve(now_, size / model_.blob_bytes_per_second));
-  }
+  const auto pass = [&](FifoResource& resource, double bytes_per_second) {
+    if (!resource.IsLimited()) return;
+    const double passed = resource.Serve(now_, size / bytes_per_second);
+    if (passed <= done) return;
+    done = passed;
+    slowest = &resource;
+  };
+  pass(link_, model_.link_bytes_per_second);
+  pass(blobs_, model_.blob_bytes_per_second);
+  if (is_awaited) slowest->AddWait(done - now_);
   return done;
 }
 
@@ -283,10 +297,10 @@ void QueueSimulation::Beat(const QueueEvent& event) {
     scenes_.Save(worker.job, now_ - worker.saved_at);
     worker.saved_at = now_;
     seconds += model_.times.checkpoint_write;
-    Move(stage.checkpoint_bytes, 1);
+    Move(stage.checkpoint_bytes, 1, /*is_awaited=*/false);
     result_.stored_bytes += stage.checkpoint_bytes;
   }
-  worker.seen_at = writer_.Serve(now_, seconds);
+  worker.seen_at = writer_.ServeBeside(now_, seconds);
   Then(worker.seen_at + model_.progress, event, Step::kHeartbeat);
 }
 
@@ -359,17 +373,28 @@ QueueResult QueueSimulation::Summarize() {
   }
   result.wait_p50 = Percentile(scenes_.waits(), 0.5);
   result.wait_p99 = Percentile(scenes_.waits(), 0.99);
-  const double share = now_ > 0.0 ? computed_ / (model_.workers * now_) : 0.0;
-  result.uses.push_back({"workers", std::min(1.0, share)});
+  const double worker_time = std::max(1e-9, model_.workers * now_);
+  const double share = std::min(1.0, computed_ / worker_time);
+  result.uses.push_back({"workers", share, 0.0});
+  result.bottleneck = "workers";
+  double lost = 0.0, most_lost = 0.0, most_needed = 0.0;
   for (const FifoResource* resource : {&writer_, &readers_, &cpu_, &link_, &blobs_}) {
-    result.uses.push_back({resource->name(), resource->Share(now_)});
+    const ResourceUse use = {
+        resource->name(), resource->Share(now_), resource->waited() / worker_time};
+    result.uses.push_back(use);
+    lost += use.lost;
+    if (use.lost > most_lost) {
+      most_lost = use.lost;
+      result.bottleneck = use.name;
+    }
+    const double needed = resource->NeededShare(now_);
+    if (needed > most_needed) {
+      most_needed = needed;
+      result.next_bottleneck = use.name;
+    }
   }
-  const auto by_share = [](const ResourceUse& a, const ResourceUse& b) {
-    return a.share < b.share;
-  };
-  result.bottleneck = std::max_element(result.uses.begin(), result.uses.end(), by_share)->name;
-  const double most = std::max_element(result.uses.begin() + 1, result.uses.end(), by_share)->share;
-  result.most_workers = most > 0.0 ? model_.workers * share / most : 0.0;
+  if (lost < kNoticedLoss) result.bottleneck = "workers";
+  if (most_needed > 0.0) result.most_workers = model_.workers * share / most_needed;
   return result;
 }
 
