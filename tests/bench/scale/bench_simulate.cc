@@ -199,6 +199,8 @@ void AddSimulateCommand(CLI::App& app) {
       ->check(CLI::Range(0.0, 1e6));
   add("--progress", model.progress, "Pause between heartbeats of a stage with progress, s; 0: none")
       ->check(CLI::Range(0.0, 3600.0));
+  add("--preference", model.preference, "Wait for the worker that has a job's blobs, s; 0: none")
+      ->check(CLI::Range(0.0, 3600.0));
   add("--lease", model.lease, "Lease of a job, s")->check(CLI::Range(0.0, 1e6));
   add("--losses", model.losses_per_hour, "Losses of a worker an hour")
       ->check(CLI::Range(0.0, 3600.0));

@@ -49,6 +49,7 @@ void CheckModel(const QueueModel& model) {
                              model.lease,
                              model.checkpoint,
                              model.retry_pause,
+                             model.preference,
                              model.losses_per_hour,
                              model.preemptions_per_hour,
                              model.restart}) {

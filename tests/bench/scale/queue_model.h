@@ -69,6 +69,7 @@ struct QueueModel {
   double heartbeat = 10.0;       // pause between reports of the worker's state
   double lease = 60.0;
   double checkpoint = 20.0;  // least time between checkpoints
+  double preference = 3.0;   // while a job waits for the worker that has its blobs; 0: for none
   double retry_pause = 2.0;  // before the first repetition; doubles
   int most_losses = 3;       // a job that loses its worker so often fails
 

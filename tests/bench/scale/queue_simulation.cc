@@ -28,6 +28,7 @@ constexpr SimulatedJobId kNoJob = -1;
 enum class Step : uint8_t {
   kArrival,  // of the next scene
   kReady,    // a job may be claimed
+  kOffer,    // a job no longer waits for the worker that it prefers
   kClaim,
   kClaimRead,
   kClaimWrite,
@@ -177,6 +178,8 @@ void QueueSimulation::Handle(const QueueEvent& event) {
       return;
     case Step::kReady:
       return scenes_.Queue(event.subject, now_);
+    case Step::kOffer:
+      return scenes_.Offer(event.subject);
     case Step::kRelease:
       return At(writer_.Serve(now_, times.publish_write), event.subject, Step::kReady);
     case Step::kEnd:
@@ -191,7 +194,7 @@ void QueueSimulation::Handle(const QueueEvent& event) {
     case Step::kClaimRead:
       return Then(Wait(readers_, times.claim_read), event, Step::kClaimWrite);
     case Step::kClaimWrite:
-      if (!scenes_.HasWork()) return Then(now_ + model_.poll, event, Step::kClaim);
+      if (!scenes_.HasWork(event.subject)) return Then(now_ + model_.poll, event, Step::kClaim);
       return Then(Wait(writer_, times.claim_write), event, Step::kClaimed);
     case Step::kClaimed:
       return Claim(event);
@@ -226,7 +229,7 @@ void QueueSimulation::Handle(const QueueEvent& event) {
 }
 
 void QueueSimulation::Claim(const QueueEvent& event) {
-  const std::optional<SimulatedJobId> job = scenes_.Take(now_);
+  const std::optional<SimulatedJobId> job = scenes_.Take(event.subject, now_);
   if (!job) return Then(now_ + model_.poll, event, Step::kClaim);
   SimulatedWorker& worker = WorkerOf(event);
   worker.job = *job;
@@ -316,7 +319,8 @@ void QueueSimulation::Store(const QueueEvent& event) {
 
 void QueueSimulation::FinishJob(const QueueEvent& event) {
   SimulatedWorker& worker = WorkerOf(event);
-  scenes_.Finish(worker.job, now_);
+  const std::optional<SimulatedJobId> next = scenes_.Finish(worker.job, event.subject, now_);
+  if (next) At(now_ + model_.preference, *next, Step::kOffer);
   worker.job = kNoJob;
   ++worker.attempt;  // its heartbeats end
   ++done_jobs_;

@@ -20,7 +20,8 @@ SimulatedScenes::SimulatedScenes(const QueueModel& model)
     : model_(model),
       stride_(MostStages(model)),
       scenes_(static_cast<size_t>(model.scenes)),
-      jobs_(static_cast<size_t>(model.scenes * stride_)) {
+      jobs_(static_cast<size_t>(model.scenes * stride_)),
+      preferring_(static_cast<size_t>(model.workers)) {
   for (const SimulatedScene& kind : model.kinds) {
     auto& dependants = dependants_.emplace_back(kind.stages.size());
     for (size_t i = 0; i < kind.stages.size(); ++i) {
@@ -68,26 +69,58 @@ void SimulatedScenes::Queue(SimulatedJobId job, double now) {
   ready_.push(job);
 }
 
-std::optional<SimulatedJobId> SimulatedScenes::Take(double now) {
-  while (!ready_.empty()) {
-    const SimulatedJobId job = ready_.top();
-    ready_.pop();
-    if (scenes_[Place(job)].has_failed) continue;
-    waits_.push_back(static_cast<float>(now - Job(job).queued_since));
-    return job;
-  }
-  return std::nullopt;
+std::optional<SimulatedJobId> SimulatedScenes::First(int64_t worker) {
+  while (!ready_.empty() && scenes_[Place(ready_.top())].has_failed) ready_.pop();
+  std::optional<SimulatedJobId>& own = preferring_[static_cast<size_t>(worker)];
+  if (own && (!Job(*own).prefers_worker || scenes_[Place(*own)].has_failed)) own.reset();
+  if (ready_.empty()) return own;
+  return own ? std::min(*own, ready_.top()) : ready_.top();
 }
 
-void SimulatedScenes::Finish(SimulatedJobId job, double now) {
+bool SimulatedScenes::HasWork(int64_t worker) { return First(worker).has_value(); }
+
+std::optional<SimulatedJobId> SimulatedScenes::Take(int64_t worker, double now) {
+  const std::optional<SimulatedJobId> job = First(worker);
+  if (!job) return std::nullopt;
+  if (Job(*job).prefers_worker) {
+    Job(*job).prefers_worker = false;
+    preferring_[static_cast<size_t>(worker)].reset();
+  } else {
+    ready_.pop();
+  }
+  waits_.push_back(static_cast<float>(now - Job(*job).queued_since));
+  return job;
+}
+
+std::optional<SimulatedJobId> SimulatedScenes::Finish(SimulatedJobId job,
+                                                      int64_t worker,
+                                                      double now) {
   const SceneState& scene = scenes_[Place(job)];
   const auto position = static_cast<size_t>(job % stride_);
+  std::optional<SimulatedJobId> first;
   for (const int dependant : dependants_[scene.kind][position]) {
     const SimulatedJobId next = InputOf(job, dependant);
-    if (--Job(next).open_inputs == 0) Queue(next, now);
+    if (--Job(next).open_inputs > 0 || scene.has_failed) continue;
+    // An earlier job may still prefer this worker, which claimed another before it.
+    const std::optional<SimulatedJobId>& own = preferring_[static_cast<size_t>(worker)];
+    if (first || (own && Job(*own).prefers_worker)) {
+      Queue(next, now);
+      continue;
+    }
+    Job(next).queued_since = now;
+    Job(next).prefers_worker = true;
+    first = next;
   }
+  if (first) preferring_[static_cast<size_t>(worker)] = first;
   const bool is_last = position + 1 == model_.kinds[scene.kind].stages.size();
   if (is_last && !scene.has_failed) ++finished_;
+  return first;
+}
+
+void SimulatedScenes::Offer(SimulatedJobId job) {
+  if (!Job(job).prefers_worker) return;
+  Job(job).prefers_worker = false;
+  ready_.push(job);
 }
 
 int SimulatedScenes::Lose(SimulatedJobId job) {

@@ -1,5 +1,5 @@
 // The scenes of a simulation with their jobs, and the queue of jobs that may be claimed: the oldest
-// first, as in the job store. Not thread-safe.
+// first, as in the job store. A job may wait for the worker that has its blobs. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -47,11 +47,15 @@ class SimulatedScenes {
   void Submit(double now);
   // Puts a job into the queue, unless its scene has failed.
   void Queue(SimulatedJobId job, double now);
-  bool HasWork() const { return !ready_.empty(); }
-  // Takes the first job out of the queue and notes how long it waited.
-  std::optional<SimulatedJobId> Take(double now);
-  // Ends a job and queues those that waited for it alone.
-  void Finish(SimulatedJobId job, double now);
+  // Returns true if there is a job for this worker.
+  bool HasWork(int64_t worker);
+  // Takes its first job out of the queue and notes how long it waited.
+  std::optional<SimulatedJobId> Take(int64_t worker, double now);
+  // Ends a job and queues those that waited for it alone. The first of them prefers the worker and
+  // is returned: it is for this worker alone until Offer.
+  std::optional<SimulatedJobId> Finish(SimulatedJobId job, int64_t worker, double now);
+  // Gives a job that still waits for its preferred worker to all.
+  void Offer(SimulatedJobId job);
   // Counts a lost worker; the scene fails with the last one that the model allows. Returns the
   // number so far, 0 if the scene has failed.
   int Lose(SimulatedJobId job);
@@ -70,11 +74,14 @@ class SimulatedScenes {
     float saved_seconds = 0.0F;
     uint8_t open_inputs = 0;
     uint8_t losses = 0;
+    bool prefers_worker = false;
   };
   struct SceneState {
     uint8_t kind = 0;
     bool has_failed = false;
   };
+  // The first job for this worker; it stays in the queue.
+  std::optional<SimulatedJobId> First(int64_t worker);
   size_t Place(SimulatedJobId job) const { return static_cast<size_t>(job / stride_); }
   JobState& Job(SimulatedJobId job) { return jobs_[static_cast<size_t>(job)]; }
   const JobState& Job(SimulatedJobId job) const { return jobs_[static_cast<size_t>(job)]; }
@@ -85,6 +92,7 @@ class SimulatedScenes {
   std::vector<JobState> jobs_;
   std::vector<std::vector<std::vector<int>>> dependants_;  // by kind and stage
   std::priority_queue<SimulatedJobId, std::vector<SimulatedJobId>, std::greater<>> ready_;
+  std::vector<std::optional<SimulatedJobId>> preferring_;  // by worker
   std::vector<float> waits_;
   int64_t submitted_ = 0;
   int64_t finished_ = 0;
