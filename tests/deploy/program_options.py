@@ -3,7 +3,7 @@
 import re
 import subprocess
 
-_LINE = re.compile(r"^\s+(?:-\w,)?(--[a-z][\w-]*)(?:\{false\})?(?:\s+([A-Z]+)\b(?::(\S+))?)?", re.M)
+_LINE = re.compile(r"^\s+(?:-\w,)?(--[a-z][\w-]*)(?:\{false\})?(?:\s+([A-Z]+)\b(?::\{([^}]*)\})?)?", re.M)
 
 
 class Options:
@@ -14,7 +14,7 @@ class Options:
         self.command = " ".join([command[0].rsplit("/", 1)[-1], *command[1:]])
         self.known = {}
         for name, kind, values in _LINE.findall(text):
-            allowed = values[1:-1].split(",") if values.startswith("{") else None
+            allowed = values.split(",") if values else None
             self.known[name] = (bool(kind), allowed)
         assert "--log-level" in self.known, text
 
