@@ -64,14 +64,16 @@ class WorkerServiceImpl final : public wire::WorkerService::CallbackService {
           kWorkerProtocol, request->protocol(), parts_.version, request->release());
       if (parts_.draining) return;
       const std::string worker = IdOf(caller, request->worker());
+      const std::set<int64_t> declined(request->declined().begin(), request->declined().end());
       std::vector<JobRecord> shown;
       const auto choice = [&](const JobRecord& job) {
-        (void)job; (void)kMaxShown;
-        return true;
+        if (!request->show()) return request->job_id() == 0 || job.id == request->job_id();
+        if (shown.size() < kMaxShown && !declined.contains(job.id)) shown.push_back(job);
+        return false;
       };
       const auto claimed = ClaimFor(worker, *request, choice);
       if (claimed) shown.push_back(*claimed);
-      for (const JobRecord& job : shown) *response->mutable_job() = ToWire(job);
+      for (const JobRecord& job : shown) *response->add_jobs() = ToWire(job);
     });
   }
 
@@ -337,7 +339,8 @@ class WorkerServiceImpl final : public wire::WorkerService::CallbackService {
     if (!request.batch_kind().empty()) {
       return store_.ClaimForBatch(worker, lease_ms, request.batch_kind(), choice);
     }
-    return store_.Claim(worker, lease_ms);
+    if (!request.show() && request.job_id() == 0) return store_.Claim(worker, lease_ms);
+    return store_.ClaimAccepted(worker, lease_ms, choice);
   }
 
   const RpcParts& parts_;

@@ -68,13 +68,28 @@ wire::ClaimRequest RemoteStore::NewClaim(const std::string& worker, int64_t leas
 
 std::optional<JobRecord> RemoteStore::SendClaim(const wire::ClaimRequest& request) {
   const wire::ClaimResponse response = link_.Once(&Stub::Claim, request);
-  if (!response.has_job()) return std::nullopt;
-  return FromWire(response.job());
+  if (response.jobs().empty()) return std::nullopt;
+  return FromWire(response.jobs(0));
 }
 
 std::optional<JobRecord> RemoteStore::Choose(wire::ClaimRequest request, const JobChoice& accept) {
-  (void)accept; (void)kMaxRounds;
-  return SendClaim(request);
+  for (int round = 0; round < kMaxRounds; ++round) {
+    request.set_show(true);
+    request.set_job_id(0);
+    const wire::ClaimResponse shown = link_.Once(&Stub::Claim, request);
+    if (shown.jobs().empty()) return std::nullopt;
+    for (const wire::Job& job : shown.jobs()) {
+      if (!accept(FromWire(job))) {
+        request.add_declined(job.id());
+        continue;
+      }
+      request.set_show(false);
+      request.set_job_id(job.id());
+      if (auto claimed = SendClaim(request)) return claimed;
+      break;  // another worker was faster
+    }
+  }
+  return std::nullopt;
 }
 
 std::optional<JobRecord> RemoteStore::Claim(const std::string& worker, int64_t lease_ms) {
