@@ -10,8 +10,8 @@ namespace color3d {
 namespace {
 
 using testing::HttpReceiver;
-using testing::Named;
 using testing::ReceivedSpan;
+using testing::SpansNamed;
 
 constexpr int64_t kNsInMs = 1'000'000;
 
@@ -63,18 +63,18 @@ TEST_F(JobSpansTest, RecordsJobsBelowTheirCallAndWaitsBelowThem) {
   const std::vector<ReceivedSpan> spans = Finish();
   ASSERT_EQ(spans.size(), 4u);
   const std::string root_id = DerivedSpanId(call_.trace_id, root.name);
-  const ReceivedSpan root_span = Named(spans, "job root").at(0);
+  const ReceivedSpan root_span = SpansNamed(spans, "job root").at(0);
   EXPECT_EQ(root_span.id, root_id);
   EXPECT_EQ(root_span.parent, call_.span_id);
   EXPECT_EQ(root_span.start_ns, 1'000'000 * kNsInMs);
   EXPECT_EQ(root_span.end_ns, 1'001'123 * kNsInMs);
   EXPECT_EQ(root_span.attributes.at("color3d.state"), "SUCCEEDED");
   EXPECT_EQ(root_span.attributes.at("color3d.scene"), "scenes/test");
-  const ReceivedSpan first_span = Named(spans, "job first").at(0);
+  const ReceivedSpan first_span = SpansNamed(spans, "job first").at(0);
   EXPECT_EQ(first_span.parent, root_id);
   EXPECT_EQ(first_span.end_ns, 1'001'100 * kNsInMs);
   EXPECT_EQ(first_span.attributes.at("color3d.queue_seconds"), "0.1");
-  const std::vector<ReceivedSpan> waits = Named(spans, "queue");
+  const std::vector<ReceivedSpan> waits = SpansNamed(spans, "queue");
   ASSERT_EQ(waits.size(), 2u);
   EXPECT_EQ(waits[0].parent, first_span.id);
   EXPECT_EQ(waits[0].end_ns - waits[0].start_ns, 100 * kNsInMs);
@@ -91,15 +91,15 @@ TEST_F(JobSpansTest, RecordsEachWaitAndFailures) {
   wall_ += 1000;
   FailWith(ClaimOne(), ErrorCode::kInvalidArgument);
   const std::vector<ReceivedSpan> spans = Finish();
-  const std::vector<ReceivedSpan> waits = Named(spans, "queue");
+  const std::vector<ReceivedSpan> waits = SpansNamed(spans, "queue");
   ASSERT_EQ(waits.size(), 2u);
   EXPECT_EQ(waits[1].attributes.at("color3d.attempt"), "2");
   EXPECT_EQ(waits[1].end_ns - waits[1].start_ns, 1000 * kNsInMs);
-  const ReceivedSpan first = Named(spans, "job first").at(0);
+  const ReceivedSpan first = SpansNamed(spans, "job first").at(0);
   EXPECT_EQ(first.error, "it broke");
   EXPECT_EQ(first.attributes.at("error.type"), "TEST");
   EXPECT_EQ(first.attributes.at("color3d.attempts"), "2");
-  EXPECT_THAT(Named(spans, "job root").at(0).error, ::testing::HasSubstr("it broke"))
+  EXPECT_THAT(SpansNamed(spans, "job root").at(0).error, ::testing::HasSubstr("it broke"))
       << "ended without a worker";
 }
 

@@ -171,7 +171,9 @@ TEST_F(TracedCallsTest, FailuresHaveTheirCodeAndHealthChecksNoSpan) {
   EXPECT_THROW(caller_->Get("jobs/none"), std::runtime_error);
   grpc::ClientContext context;
   context.AddMetadata("traceparent", sampled_);
-  grpc::ByteBuffer empty, answer;
+  const grpc::Slice nothing;
+  const grpc::ByteBuffer empty(&nothing, 1);
+  grpc::ByteBuffer answer;
   const grpc::internal::RpcMethod health("/grpc.health.v1.Health/Check",
                                          grpc::internal::RpcMethod::NORMAL_RPC);
   EXPECT_TRUE(

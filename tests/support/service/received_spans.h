@@ -51,8 +51,8 @@ inline std::vector<ReceivedSpan> SpansOf(HttpReceiver& collector) {
 }
 
 // Spans of this name.
-inline std::vector<ReceivedSpan> Named(const std::vector<ReceivedSpan>& spans,
-                                       const std::string& name) {
+inline std::vector<ReceivedSpan> SpansNamed(const std::vector<ReceivedSpan>& spans,
+                                            const std::string& name) {
   std::vector<ReceivedSpan> found;
   for (const ReceivedSpan& span : spans) {
     if (span.name == name) found.push_back(span);
