@@ -9,7 +9,8 @@
 
 namespace color3d {
 
-// Of "sqlite" or "postgresql" on the machine of deploy/SCALING.md. Throws Error{kInvalidArgument}
+// Of "sqlite" or "postgresql" on the machine of deploy/SCALING.md, with the database in memory: the
+// time in which a disk syncs a write comes on top. Throws Error{kInvalidArgument}
 // for another name.
 ServiceTimes MeasuredTimes(const std::string& database);
 
