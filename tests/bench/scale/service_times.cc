@@ -33,7 +33,7 @@ constexpr double kByteCpu = 1e-9;
 ServiceTimes MeasuredTimes(const std::string& database) {
   ServiceTimes times;
   times.byte_cpu = kByteCpu;
-  times.call_cpu = 0.25e-3;
+  times.call_cpu = 1.2e-3;
   if (database == "sqlite") {
     times.claim_read = 0.19e-3;
     times.prepare_read = 0.48e-3;
