@@ -40,7 +40,7 @@ QueueModel ModelOf(const SimulateArguments& args) {
     model.kinds.push_back(
         PlannedScene({photos, args.photo_mb * 1e6, /*has_poses=*/!args.estimates_poses}));
   }
-  model.times = MeasuredTimes(args.database);
+  model.times = TimesOfDatabase(args.database);
   if (!args.times_file.empty()) model.times = ReadTimes(args.times_file, model.times);
   ServiceTimes& times = model.times;
   for (double* write :
@@ -188,12 +188,10 @@ void AddSimulateCommand(CLI::App& app) {
   command->add_flag("--estimate-poses", args->estimates_poses, "The photos come without poses");
   add("--spread", model.spread, "Standard deviation of a stage's seconds over their mean")
       ->check(CLI::Range(0.0, 10.0));
-  add("--database", args->database, "Measured times of the job store")
+  add("--database", args->database, "Times of the job store: sqlite measured, postgresql assumed")
       ->check(CLI::IsMember({"sqlite", "postgresql"}));
   command
-      ->add_option("--times",
-                   args->times_file,
-                   "Result of color3d-bench store, in place of the measured times")
+      ->add_option("--times", args->times_file, "Result of color3d-bench store, in place of them")
       ->check(CLI::ExistingFile);
   add("--sync-ms",
       args->sync_ms,

@@ -30,7 +30,7 @@ constexpr double kByteCpu = 1e-9;
 
 }  // namespace
 
-ServiceTimes MeasuredTimes(const std::string& database) {
+ServiceTimes TimesOfDatabase(const std::string& database) {
   ServiceTimes times;
   times.byte_cpu = kByteCpu;
   times.call_cpu = 1.2e-3;
