@@ -23,6 +23,7 @@ struct SimulateArguments {
   bool estimates_poses = false;
   std::string database = "sqlite";
   std::string times_file;
+  double sync_ms = 1.0;
   int servers = 1;
   int cores = 2;
   double link_mbit = 1000.0;
@@ -39,8 +40,13 @@ QueueModel ModelOf(const SimulateArguments& args) {
     model.kinds.push_back(
         PlannedScene({photos, args.photo_mb * 1e6, /*has_poses=*/!args.estimates_poses}));
   }
-  model.times = MeasuredTimes(args.database);
+  model.times = TimesOfDatabase(args.database);
   if (!args.times_file.empty()) model.times = ReadTimes(args.times_file, model.times);
+  ServiceTimes& times = model.times;
+  for (double* write :
+       {&times.claim_write, &times.join_write, &times.publish_write, &times.checkpoint_write}) {
+    *write += 1e-3 * args.sync_ms;
+  }
   model.readers *= args.servers;
   model.cores = args.cores * args.servers;
   model.link_bytes_per_second = args.link_mbit * 1e6 / 8.0 * args.servers;
@@ -182,13 +188,15 @@ void AddSimulateCommand(CLI::App& app) {
   command->add_flag("--estimate-poses", args->estimates_poses, "The photos come without poses");
   add("--spread", model.spread, "Standard deviation of a stage's seconds over their mean")
       ->check(CLI::Range(0.0, 10.0));
-  add("--database", args->database, "Measured times of the job store")
+  add("--database", args->database, "Times of the job store: sqlite measured, postgresql assumed")
       ->check(CLI::IsMember({"sqlite", "postgresql"}));
   command
-      ->add_option("--times",
-                   args->times_file,
-                   "Result of color3d-bench store, in place of the measured times")
+      ->add_option("--times", args->times_file, "Result of color3d-bench store, in place of them")
       ->check(CLI::ExistingFile);
+  add("--sync-ms",
+      args->sync_ms,
+      "Time of the database's disk to sync a write, added to the times, ms; 0 if they have it")
+      ->check(CLI::Range(0.0, 1e4));
   add("--servers", args->servers, "Number of servers")->check(CLI::Range(1, 1000));
   add("--cores", args->cores, "Cores of each server")->check(CLI::Range(1, 1024));
   add("--link-mbit", args->link_mbit, "Network of each server, Mbit/s")

@@ -22,10 +22,11 @@ nlohmann::ordered_json CallsToJson(const StoreTimes& times) {
   nlohmann::ordered_json calls;
   for (const CallTimes& call : times.calls) {
     calls[call.call] = {{"calls", call.calls},
-                        {"mean_ms", call.mean},
                         {"p50_ms", call.p50},
                         {"p99_ms", call.p99},
-                        {"max_ms", call.most}};
+                        {"max_ms", call.most},
+                        {"cpu_p50_ms", call.cpu_p50},
+                        {"cpu_p99_ms", call.cpu_p99}};
   }
   return calls;
 }

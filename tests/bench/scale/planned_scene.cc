@@ -15,7 +15,7 @@ namespace color3d {
 namespace {
 
 // Results of a stage: bytes and files of a scene and of each of its photos, and bytes of a
-// checkpoint.
+// checkpoint. Assumed for photos of 500 px and 100,000 to 300,000 Gaussians.
 struct StageBytes {
   const char* kind;
   double fixed = 0.0;

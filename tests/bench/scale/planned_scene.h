@@ -1,5 +1,5 @@
 // The jobs of a colorize_scene submission, as the server plans them, for the simulation: their
-// graph and seconds by the planner and the cost model, their bytes as measured.
+// graph and seconds by the planner and the cost model. Their bytes are assumed, not measured.
 #pragma once
 
 #include "tests/bench/scale/queue_model.h"

@@ -6,8 +6,8 @@
 namespace color3d {
 
 struct QueueRunOptions {
-  int jobs_per_worker = 30;
-  int stage_ms = 1'000;
+  int jobs_per_worker = 8;
+  int stage_ms = 5'000;
   std::string database = "sqlite";  // or "postgresql": a private server
   // Workers with a folder of their own that reach the server by its port, as on other machines;
   // else those that the server starts itself.

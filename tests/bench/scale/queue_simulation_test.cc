@@ -35,6 +35,7 @@ QueueModel IdealModel(SimulatedScene scene, int workers, int64_t scenes) {
   model.poll = 0.01;
   model.progress = 0.0;
   model.retry_pause = 0.0;
+  model.preference = 0.0;
   model.restart = 0.0;
   return model;
 }
@@ -126,6 +127,14 @@ TEST(QueueSimulationTest, CacheReadsASceneOnce) {
   EXPECT_EQ(SimulateQueue(model).fetched_bytes, 5 * (3 * 1'000 + 10));
 }
 
+TEST(QueueSimulationTest, JobsWaitForTheWorkerThatHasTheirBlobs) {
+  SimulatedScene scene{{Timed(1.0), Timed(1.0, {0}), Timed(1.0, {1})}};
+  scene.bytes = 1'000;
+  QueueModel model = IdealModel(scene, 4, 40);
+  model.preference = 3.0;
+  EXPECT_EQ(SimulateQueue(model).fetched_bytes, 40 * 1'000) << "each scene is read by one worker";
+}
+
 TEST(QueueSimulationTest, LostWorkerDelaysItsJobByTheLease) {
   QueueModel model = IdealModel({{Timed(300.0)}}, 1, 1);
   model.losses_per_hour = 15.0;
@@ -173,10 +182,11 @@ TEST(QueueSimulationTest, JobThatAlwaysLosesItsWorkerFails) {
 }
 
 TEST(QueueSimulationTest, LoadLeavesRoom) {
-  QueueModel model = IdealModel(Diamond(), 20, 5'000);
+  QueueModel model = IdealModel(Diamond(), 20, 1'000);
   model.load = 0.5;
+  model.poll = 0.1;
   const QueueResult result = SimulateQueue(model);
-  EXPECT_NEAR(ShareOf(result, "workers"), 0.5, 0.03);
+  EXPECT_NEAR(ShareOf(result, "workers"), 0.5, 0.06);
   EXPECT_LT(result.wait_p99, 1.0);
 }
 

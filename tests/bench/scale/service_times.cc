@@ -30,20 +30,20 @@ constexpr double kByteCpu = 1e-9;
 
 }  // namespace
 
-ServiceTimes MeasuredTimes(const std::string& database) {
+ServiceTimes TimesOfDatabase(const std::string& database) {
   ServiceTimes times;
   times.byte_cpu = kByteCpu;
-  times.call_cpu = 0.25e-3;
+  times.call_cpu = 1.2e-3;
   if (database == "sqlite") {
-    times.claim_read = 10e-3;
-    times.prepare_read = 0.5e-3;
-    times.claim_write = 1e-3;
-    times.join_write = 0.5e-3;
-    times.publish_write = 1e-3;
-    times.artifact_write = 0.05e-3;
-    times.heartbeat_write = 0.3e-3;
-    times.worker_write = 0.2e-3;
-    times.checkpoint_write = 0.5e-3;
+    times.claim_read = 0.19e-3;
+    times.prepare_read = 0.48e-3;
+    times.claim_write = 0.77e-3;
+    times.join_write = 0.14e-3;
+    times.publish_write = 0.66e-3;
+    times.artifact_write = 0.026e-3;
+    times.heartbeat_write = 0.21e-3;
+    times.worker_write = 0.09e-3;
+    times.checkpoint_write = 0.12e-3;
   } else if (database == "postgresql") {
     times.claim_read = 10e-3;
     times.prepare_read = 2e-3;

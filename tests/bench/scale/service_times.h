@@ -1,4 +1,4 @@
-// Measured times of the job stores, for the simulation.
+// Times of the job stores, for the simulation.
 #pragma once
 
 #include <filesystem>
@@ -9,9 +9,10 @@
 
 namespace color3d {
 
-// Of "sqlite" or "postgresql" on the machine of deploy/SCALING.md. Throws Error{kInvalidArgument}
-// for another name.
-ServiceTimes MeasuredTimes(const std::string& database);
+// Of "sqlite", measured on the machine of deploy/SCALING.md with the database in memory: the time
+// in which a disk syncs a write comes on top. Of "postgresql" they are assumed. Throws
+// Error{kInvalidArgument} for another name.
+ServiceTimes TimesOfDatabase(const std::string& database);
 
 // Milliseconds of each time.
 nlohmann::ordered_json TimesToJson(const ServiceTimes& times);

@@ -11,10 +11,10 @@ namespace {
 TEST(ServiceTimesTest, ReadsWhatItWrites) {
   const ScratchFolder scratch;
   const std::filesystem::path file = scratch.path() / "store.json";
-  ServiceTimes times = MeasuredTimes("postgresql");
+  ServiceTimes times = TimesOfDatabase("postgresql");
   times.claim_read = 0.0125;
   WriteFileAtomic(file, nlohmann::json{{"service_ms", TimesToJson(times)}}.dump());
-  const ServiceTimes read = ReadTimes(file, MeasuredTimes("sqlite"));
+  const ServiceTimes read = ReadTimes(file, TimesOfDatabase("sqlite"));
   EXPECT_DOUBLE_EQ(read.claim_read, 0.0125);
   EXPECT_DOUBLE_EQ(read.publish_write, times.publish_write);
 }
@@ -23,7 +23,7 @@ TEST(ServiceTimesTest, KeepsTimesThatTheFileLacks) {
   const ScratchFolder scratch;
   const std::filesystem::path file = scratch.path() / "store.json";
   WriteFileAtomic(file, R"({"service_ms": {"claim_read": 7}})");
-  const ServiceTimes base = MeasuredTimes("sqlite"), read = ReadTimes(file, base);
+  const ServiceTimes base = TimesOfDatabase("sqlite"), read = ReadTimes(file, base);
   EXPECT_DOUBLE_EQ(read.claim_read, 0.007);
   EXPECT_DOUBLE_EQ(read.claim_write, base.claim_write);
 }
@@ -41,7 +41,7 @@ TEST(ServiceTimesTest, RefusesOtherFilesAndNames) {
     WriteFileAtomic(file, text);
     EXPECT_THROW(ReadTimes(file, {}), Error) << text;
   }
-  EXPECT_THROW(MeasuredTimes("mysql"), Error);
+  EXPECT_THROW(TimesOfDatabase("mysql"), Error);
 }
 
 }  // namespace

@@ -106,7 +106,10 @@ void StoreWithHistory::Fill(int64_t finished, int64_t queued, int projects) {
                 .c_str());
   db_->Exec("commit");
   // As autovacuum does after some minutes.
-  if (in_postgresql) db_->Exec("set session_replication_role=origin; vacuum analyze");
+  if (in_postgresql) {
+    db_->Exec("set session_replication_role=origin");
+    db_->Exec("vacuum analyze");
+  }
 }
 
 void StoreWithHistory::ShortenQueue(int64_t left) {

@@ -22,16 +22,18 @@ struct StoreLoad {
 struct CallTimes {
   std::string call;
   int64_t calls = 0;
-  double mean = 0.0;
   double p50 = 0.0;
   double p99 = 0.0;
   double most = 0.0;
+  // Of a core in this process: all of the work for SQLite, but for waiting for the disk.
+  double cpu_p50 = 0.0;
+  double cpu_p99 = 0.0;
 };
 
 struct StoreTimes {
   double filling_seconds = 0.0;
   std::vector<CallTimes> calls;
-  ServiceTimes service;  // without CPU of the server
+  ServiceTimes service;  // medians, which other programs on the machine change least; no CPU
 };
 
 // Throws Error{kInvalidArgument} for an unknown database or too few queued jobs,
