@@ -41,7 +41,7 @@ using testing::TestNetwork;
 constexpr int kServers = 2, kWorkers = 3;
 constexpr char kScript[] = "steps=8,ms=150";  // longer than a lease
 constexpr char kPort[] = ":50551";
-constexpr int kFrozenMs = 1300;
+constexpr int kFrozenMs = 2500;  // past the lease, its reaping and the next claim
 
 // Calls until it succeeds, at the servers in turn; throws the last error after five minutes.
 class AnyServer {
