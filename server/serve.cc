@@ -36,7 +36,6 @@
 #include "server/rpc/rpc_server.h"
 #include "server/storage/ballast.h"
 #include "server/storage/data_folder.h"
-#include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/open_store.h"
 #include "server/worker/supervision/supervisor.h"
@@ -74,6 +73,7 @@ void CheckOptions(const ServeOptions& options) {
   }
   CheckAddressForm("--listen", options.listen);
   if (!options.metrics_listen.empty()) CheckAddressForm("--metrics-listen", options.metrics_listen);
+  CheckBlobPlace(options.blobs);
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   for (const std::string& target : options.notify_allow) CheckNotifyTarget(target);
   if (options.notify_allow.empty() == !options.notify_secret.empty()) {
@@ -130,6 +130,7 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   settings.data_folder = options.data_folder;
   settings.threads = threads;
   settings.memory_mib = memory_mib;
+  settings.blob_cache_mib = WorkerCacheMib(options.blobs, options.workers + 1);
   settings.drain_grace_seconds = options.drain_seconds * 0.75;
   setup.arguments = ToFlags(settings);
   const std::vector<std::string> model_flags = ToFlags(models);
@@ -174,6 +175,7 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   settings.data_folder = options.data_folder;
   settings.threads = options.live_threads > 0 ? options.live_threads : machine;
   settings.memory_mib = WorkerMemoryMib(options, 0.5);
+  settings.blob_cache_mib = WorkerCacheMib(options.blobs, options.workers + 1);
   settings.drain_grace_seconds = options.drain_seconds * 0.5;
   std::vector<std::string>& arguments = setup->inference_arguments;
   arguments = ToFlags(settings);
@@ -264,9 +266,10 @@ void Serve(const ServeOptions& options) {
   const OpenedStore opened = OpenStore(options.store, paths.Store(), store_options);
   JobStore& store = *opened.store;
   notify.sends = opened.has_chores;
-  BlobStoreOptions blob_options;
-  blob_options.reserve_bytes = options.worker.reserve_mib << 20;
-  FileBlobStore blobs(paths.Blobs(), blob_options);
+  BlobPlaceOptions place = options.blobs;
+  place.reserve_mib = options.worker.reserve_mib;
+  const OpenedBlobs kept = OpenBlobs(place, paths, options.store.empty() ? "" : opened.name);
+  BlobStore& blobs = *kept.blobs;
   Ballast ballast(paths.BallastFile(), BallastBytes(paths.root));
   RpcServerOptions rpc;
   rpc.listen = options.listen;
@@ -345,7 +348,7 @@ void Serve(const ServeOptions& options) {
     });
     spdlog::info("metrics on port {}", port);
   }
-  spdlog::info("listening on {}{}{}, data in {}, jobs in {}, {} workers",
+  spdlog::info("listening on {}{}{}, data in {}, jobs in {}, blobs in {}, {} workers",
                server.address(),
                tls.empty() ? "" : " with TLS",
                options.tokens.empty() && options.certificate_roles.empty()
@@ -353,6 +356,7 @@ void Serve(const ServeOptions& options) {
                    : ", for those with a token or a role",
                paths.root.string(),
                opened.name,
+               kept.name,
                options.workers);
 
   NotifyServiceManager("READY=1");
@@ -370,6 +374,7 @@ void Serve(const ServeOptions& options) {
   server.StartDraining();
   supervisor.Drain(Milliseconds(options.drain_seconds * 0.9));
   supervisor.Wait();
+  kept.stop();
   server.Shutdown(Milliseconds(std::min(2.0, options.drain_seconds * 0.1)));
   spdlog::info("ended");
   if (!deaf.empty()) {

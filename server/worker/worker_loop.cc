@@ -294,7 +294,8 @@ void RunWorker(const WorkerOptions& options,
   ServerAccess server(DataPaths(options.data_folder),
                       LinkTiming::For(options.timing.lease),
                       options.release,
-                      options.reserve_mib << 20);
+                      options.reserve_mib << 20,
+                      {options.name, options.cache_bytes});
   WorkerLoop(options, server, runner, draining).Run();
 }
 

@@ -1,6 +1,5 @@
 #include "server/storage/s3/s3_blob_store.h"
 
-#include <curl/curl.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -8,15 +7,17 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
+#include <exception>
+#include <map>
 #include <random>
 #include <set>
 #include <thread>
 #include <utility>
 
 #include "core/base/files.h"
-#include "core/base/parallel.h"
 #include "server/base/service_error.h"
 
 namespace color3d {
@@ -29,8 +30,6 @@ constexpr char kRemoving[] = "removing/";
 // A remover sends its deletion within this time, so that one that was frozen does none later.
 constexpr auto kRemovalTime = std::chrono::seconds(60);
 constexpr auto kRemovalPoll = std::chrono::milliseconds(200);
-// Time for which the mark of another process protects a blob in any case.
-constexpr int64_t kYoungMarkSeconds = 3600;
 constexpr int kTouchThreads = 16;
 
 void RequireDigest(const std::string& sha256) {
@@ -147,17 +146,15 @@ S3BlobStore::S3BlobStore(S3BlobOptions options)
       cache_(options_.folder, options_.cache_bytes),
       touches_(options_.touch_memory) {}
 
-int64_t S3BlobStore::TouchedNs(const std::string& sha256, const std::string& mark) const {
-  const int64_t repeats = touches_.Repeats(sha256);
+int64_t S3BlobStore::TouchedNs(const std::string& mark, int64_t repeats) {
   if (mark.empty()) return repeats;
   constexpr int kDigits = 15;  // of four bits
   return std::stoll(Sha256Hex(mark).substr(0, kDigits), nullptr, 16) + repeats;
 }
 
 int64_t S3BlobStore::AgeOf(const std::string& modified) const {
-  const auto written = static_cast<int64_t>(curl_getdate(modified.c_str(), nullptr));
-  const int64_t now = client_.StoreTime();
-  return written <= 0 || now <= 0 ? INT64_MAX : now - written;
+  const int64_t written = ParseS3Time(modified), now = client_.StoreTime();
+  return written <= 0 || now <= 0 ? 0 : now - written;
 }
 
 void S3BlobStore::WaitForRemoval(const std::string& sha256) const {
@@ -222,7 +219,7 @@ std::optional<StoredBlob> S3BlobStore::Look(const std::string& sha256) const {
     if (!object) return std::nullopt;
     const std::optional<S3Object> mark = client_.Head(KeyOf(kTouched, sha256));
     return StoredBlob{{sha256, object->size_bytes},
-                      TouchedNs(sha256, mark ? mark->etag : std::string())};
+                      TouchedNs(mark ? mark->etag : std::string(), touches_.Repeats(sha256))};
   });
 }
 
@@ -307,6 +304,17 @@ S3BlobStore::There S3BlobStore::CheckStored(const FileDigest& digest) {
 }
 
 void S3BlobStore::Store(const FileDigest& digest, const S3Source& source) {
+  try {
+    Write(digest, source);
+  } catch (const S3Error& e) {
+    constexpr std::array<std::string_view, 3> kFull{
+        "QuotaExceeded", "XMinioStorageFull", "InsufficientStorage"};
+    if (std::ranges::find(kFull, e.s3_code()) == kFull.end()) throw;
+    throw ServiceError(ErrorReason::kStorageFull, "the object store is full: {}", e.what());
+  }
+}
+
+void S3BlobStore::Write(const FileDigest& digest, const S3Source& source) {
   const There there = CheckStored(digest);
   if (there == There::kYes) return;
   const std::string key = KeyOf(kBlobs, digest.sha256);
@@ -386,7 +394,8 @@ std::vector<std::string> S3BlobStore::ForEach(
     if (sha256.empty()) return true;
     const auto mark = marks.find(sha256);
     return visit({{sha256, object.size_bytes},
-                  TouchedNs(sha256, mark == marks.end() ? std::string() : mark->second)});
+                  TouchedNs(mark == marks.end() ? std::string() : mark->second,
+                            touches_.Repeats(sha256))});
   });
   return {};
 }
@@ -399,21 +408,43 @@ bool S3BlobStore::RemoveIfUntouched(const StoredBlob& blob) {
   if (!client_.PutBytes(removing, nonce, S3Replace::kNo) && client_.GetBytes(removing) != nonce) {
     return false;  // another server removes it
   }
-  const std::optional<S3Object> mark = client_.Head(KeyOf(kTouched, sha256));
-  const std::string etag = mark ? mark->etag : std::string();
-  // Another process may have counted touches that it did not write.
-  const bool is_promised =
-      mark && !touches_.IsOwn(sha256, etag) && AgeOf(mark->modified) < kYoungMarkSeconds;
-  const bool is_due = !is_promised && TouchedNs(sha256, etag) == blob.touched_ns &&
-                      client_.Head(KeyOf(kBlobs, sha256)) &&
-                      std::chrono::steady_clock::now() - begin < kRemovalTime;
+  bool is_due = false;
+  try {
+    is_due = IsDue(blob) && std::chrono::steady_clock::now() - begin < kRemovalTime;
+  } catch (const Error&) {
+    EndRemoval(removing);
+    throw;
+  }
   if (is_due) {
-    touches_.Forget(sha256);
     client_.Delete(KeyOf(kBlobs, sha256));
     client_.Delete(KeyOf(kTouched, sha256));
   }
-  client_.Delete(removing);
+  EndRemoval(removing);
   return is_due;
+}
+
+bool S3BlobStore::IsDue(const StoredBlob& blob) {
+  const std::string& sha256 = blob.digest.sha256;
+  const std::optional<S3Object> mark = client_.Head(KeyOf(kTouched, sha256));
+  const std::string etag = mark ? mark->etag : std::string();
+  // Another process may have counted touches that it did not write.
+  if (mark && !touches_.IsOwn(sha256, etag) &&
+      AgeOf(mark->modified) < options_.young_mark.count()) {
+    return false;
+  }
+  if (!client_.Head(KeyOf(kBlobs, sha256))) return false;
+  const int64_t repeats = touches_.Repeats(sha256);
+  // From here on, a touch in this process sees the removal.
+  return TouchedNs(etag, repeats) == blob.touched_ns && touches_.Retire(sha256, repeats);
+}
+
+// One that is left over delays touches of this blob until it is old.
+void S3BlobStore::EndRemoval(const std::string& key) {
+  try {
+    client_.Delete(key);
+  } catch (const Error& e) {
+    spdlog::warn("the mark of a removal is left in the store: {}", e.what());
+  }
 }
 
 int S3BlobStore::RemoveLeftovers(std::chrono::seconds age) {

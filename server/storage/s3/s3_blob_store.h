@@ -34,6 +34,9 @@ struct S3BlobOptions {
   // A blob that this process has touched within this time is not marked again. Well below the
   // smallest grace period of the collection, an hour.
   std::chrono::milliseconds touch_memory{600'000};
+  // A mark that another process has written within this time protects the blob in any case, because
+  // that process may have counted further touches. More than touch_memory.
+  std::chrono::seconds young_mark{3600};
   // A removal that began before this time is that of a server that has ended.
   std::chrono::seconds removal_limit{600};
 };
@@ -70,7 +73,7 @@ class S3BlobStore : public BlobStore {
   // Throws if the store cannot be reached; returns no unreadable paths.
   std::vector<std::string> ForEach(
       const std::function<bool(const StoredBlob&)>& visit) const override;
-  // Also returns false for a blob that another process has touched within an hour.
+  // Also returns false for a blob that another process has touched within `young_mark`.
   bool RemoveIfUntouched(const StoredBlob& blob) override;
   // Removes parts of unfinished uploads, marks of blobs that are gone, and removals of servers that
   // have ended, all older than `age` by the clock of the store.
@@ -80,16 +83,21 @@ class S3BlobStore : public BlobStore {
   enum class There { kNo, kYes, kDamaged };
   // Touches the blob, and rereads it if it is stored. Counts damaged blobs.
   There CheckStored(const FileDigest& digest);
+  // Writes the blob unless it is stored. Throws STORAGE_FULL if the store says so.
   void Store(const FileDigest& digest, const S3Source& source);
+  void Write(const FileDigest& digest, const S3Source& source);
   // Waits for a removal that is under way.
   void WaitForRemoval(const std::string& sha256) const;
-  // The mark that each touch writes; nullopt: none.
-  int64_t TouchedNs(const std::string& sha256, const std::string& mark) const;
+  // Of the ETag of the touch mark (empty: none) and the touches that were only counted.
+  static int64_t TouchedNs(const std::string& mark, int64_t repeats);
+  // Returns true if nobody has touched the blob since, or can do so before the end of its removal.
+  bool IsDue(const StoredBlob& blob);
+  void EndRemoval(const std::string& key);
   void Fill(const std::string& sha256, const std::filesystem::path& part) const;
   void Download(const StoredBlob& blob, const std::filesystem::path& part) const;
   // Reads the object; returns its digest, or nothing if there is none.
   std::optional<std::string> DigestOfObject(const FileDigest& digest) const;
-  // Seconds since the object was written, by the clock of the store; a large number if unknown.
+  // Seconds since a time of the store, by its clock; 0 if unknown.
   int64_t AgeOf(const std::string& modified) const;
 
   const S3BlobOptions options_;

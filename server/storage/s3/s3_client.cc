@@ -1,6 +1,5 @@
 #include "server/storage/s3/s3_client.h"
 
-#include <curl/curl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -89,8 +88,7 @@ HttpAnswer S3Client::Once(const Ask& ask) {
     };
   }
   HttpAnswer answer = http_.Call(call);
-  const auto told = static_cast<int64_t>(curl_getdate(answer.Header("date").c_str(), nullptr));
-  if (told > 0) store_time_ = told;
+  if (const int64_t told = ParseS3Time(answer.Header("date")); told > 0) store_time_ = told;
   if (ask.may_fail_within && answer.status == 200 && answer.failure.empty() &&
       !XmlElements(answer.text, "Error").empty()) {
     answer.failure = S3CodeOf(answer) + " (" + XmlText(answer.text, "Message") + ")";
@@ -205,7 +203,7 @@ void S3Client::List(const std::string& folder,
 }
 
 std::vector<S3Client::Upload> S3Client::ListUploads(const std::string& folder) {
-  Ask ask{RequestFor("GET", ""), folder};
+  Ask ask{RequestFor("GET", ""), folder, nullptr, {}, {}, {501}};  // unknown to small stores
   ask.request.query = {{"uploads", ""}, {"prefix", options_.target.prefix + folder}};
   const HttpAnswer answer = Send(ask);
   std::vector<Upload> uploads;

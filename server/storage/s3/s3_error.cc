@@ -3,6 +3,7 @@
 #include <curl/curl.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <ctime>
 #include <string_view>
@@ -16,7 +17,6 @@ struct Remedy {
   std::string_view code, text;
 };
 
-// By code of S3; {} of the text: see RemedyFor.
 constexpr std::array<Remedy, 16> kRemedies{{
     {"NoSuchBucket", "create the bucket, or correct --blobs and --s3-endpoint"},
     {"AccessDenied",
@@ -42,9 +42,9 @@ constexpr std::array<Remedy, 16> kRemedies{{
 
 // How far this machine's clock is ahead of the store's, by the header Date; empty if unknown.
 std::string ClockDifference(const HttpAnswer& answer) {
-  const std::time_t theirs = curl_getdate(answer.Header("date").c_str(), nullptr);
-  if (theirs == -1) return "";
-  const auto ahead = static_cast<long long>(std::time(nullptr) - theirs);
+  const int64_t theirs = ParseS3Time(answer.Header("date"));
+  if (theirs == 0) return "";
+  const int64_t ahead = static_cast<int64_t>(std::time(nullptr)) - theirs;
   return fmt::format(" (it is {} s {} the store's)", ahead < 0 ? -ahead : ahead,
                      ahead < 0 ? "behind" : "ahead of");
 }
@@ -71,6 +71,13 @@ std::string RemedyFor(const S3Target& target, const HttpAnswer& answer, const st
 }
 
 }  // namespace
+
+int64_t ParseS3Time(const std::string& text) {
+  std::tm utc{};
+  const char* end = ::strptime(text.c_str(), "%Y-%m-%dT%H:%M:%S", &utc);
+  if (end != nullptr) return static_cast<int64_t>(::timegm(&utc));
+  return std::max<int64_t>(0, curl_getdate(text.c_str(), nullptr));
+}
 
 std::string S3CodeOf(const HttpAnswer& answer) {
   const std::string code = XmlText(answer.text, "Code");

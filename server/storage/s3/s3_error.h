@@ -1,7 +1,9 @@
 // What an object store refused or failed to do, with the remedy. Immutable; thrown by value.
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <utility>
 
 #include "core/base/error.h"
 #include "server/storage/s3/http_pool.h"
@@ -24,6 +26,9 @@ class S3Error : public Error {
 
 // The code in an error's XML, or that of its status where the answer has no body (HEAD).
 std::string S3CodeOf(const HttpAnswer& answer);
+// Parses the times of headers ("Sat, 28 Nov 2026 01:00:00 GMT") and of XML
+// ("2026-11-28T01:00:00.000Z"); returns s since 1970, or 0 if it is neither.
+int64_t ParseS3Time(const std::string& text);
 // Returns true if the same request may succeed later.
 bool IsWorthRetry(const HttpAnswer& answer);
 // `what`: the request, e.g. "PUT s3://bucket/key".

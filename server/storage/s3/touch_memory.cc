@@ -38,6 +38,15 @@ void TouchMemory::Forget(const std::string& sha256) {
   touches_.erase(sha256);
 }
 
+bool TouchMemory::Retire(const std::string& sha256, int64_t repeats) {
+  const MutexLock lock(mutex_);
+  const auto touch = touches_.find(sha256);
+  if (touch == touches_.end()) return repeats == 0;
+  if (touch->second.repeats != repeats) return false;
+  touches_.erase(touch);
+  return true;
+}
+
 // Entries are kept for longer than they are used, so that the owner of a young mark stays known.
 void TouchMemory::Prune(Time now) {
   if (now < next_prune_) return;

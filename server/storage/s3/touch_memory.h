@@ -27,6 +27,8 @@ class TouchMemory {
   // Returns true if this mark was written by this process lately.
   bool IsOwn(const std::string& sha256, const std::string& mark) const;
   void Forget(const std::string& sha256);
+  // Forgets the blob if it had this number of repeated touches; returns false otherwise.
+  bool Retire(const std::string& sha256, int64_t repeats);
 
  private:
   using Time = std::chrono::steady_clock::time_point;

@@ -17,6 +17,8 @@ struct WorkerSettings {
   std::string log_level = "info";
   std::string log_format = "text";  // or "json"
   int64_t reserve_mib = 256;        // disk space to keep free
+  // Cache of blobs of each worker, MiB; 0: they share the folder of blobs of their server.
+  int64_t blob_cache_mib = 0;
   double drain_grace_seconds = 15.0;
   // Hidden flags of both programs, for tests (VisitTimings).
   double lease_seconds = 60.0;
