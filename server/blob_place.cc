@@ -1,10 +1,10 @@
 #include "server/blob_place.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <random>
 #include <system_error>
-
-#include <fmt/format.h>
 
 #include "core/base/error.h"
 #include "core/base/files.h"
@@ -114,10 +114,10 @@ OpenedBlobs OpenBlobs(const BlobPlaceOptions& options,
                       const std::string& store) {
   if (!options.IsElsewhere()) {
     RequirePlace(paths, "");
-    return {std::make_unique<FileBlobStore>(paths.Blobs(),
-                                            BlobStoreOptions{options.reserve_mib << 20}),
-            paths.Blobs().string(),
-            [] {}};
+    return {
+        std::make_unique<FileBlobStore>(paths.Blobs(), BlobStoreOptions{options.reserve_mib << 20}),
+        paths.Blobs().string(),
+        [] {}};
   }
   const S3BlobOptions blobs = BlobOptionsOf(options, paths.BlobCache());
   const std::string place = blobs.s3.target.Name();

@@ -300,8 +300,8 @@ int RunFsck(const KeepingArguments& arguments) {
   };
   const std::unique_ptr<BlobStore> elsewhere =
       OpenBlobsAsTool(arguments.blobs, DataPaths(arguments.data_folder));
-  const FsckResult result = Fsck(
-      arguments.data_folder, arguments.address, elsewhere.get(), arguments.repair, progress);
+  const FsckResult result =
+      Fsck(arguments.data_folder, arguments.address, elsewhere.get(), arguments.repair, progress);
   if (is_terminal) std::cerr << "\r";
   for (const std::string& problem : result.store_problems)
     std::cout << "jobs.db: " << problem << "\n";

@@ -24,7 +24,7 @@ struct ServeOptions {
   std::filesystem::path data_folder;
   // postgresql://..., shared with other servers; empty: jobs.db in the data folder.
   std::string store;
-  BlobPlaceOptions blobs;  // reserve_mib: that of the workers
+  BlobPlaceOptions blobs;           // reserve_mib: that of the workers
   std::filesystem::path port_file;  // empty: none
   int workers = 1;
   // Passed to the workers, except for folder, threads, memory and grace, which `serve` sets.

@@ -15,8 +15,7 @@ namespace {
 std::string Trimmed(const std::string& text) {
   constexpr char kSpace[] = " \t\r";
   const size_t begin = text.find_first_not_of(kSpace);
-  return begin == text.npos ? ""
-                            : text.substr(begin, text.find_last_not_of(kSpace) - begin + 1);
+  return begin == text.npos ? "" : text.substr(begin, text.find_last_not_of(kSpace) - begin + 1);
 }
 
 bool IsPrintable(const std::string& text) {
@@ -38,8 +37,8 @@ AccessKey ParseAccessKey(std::string_view text, const std::string& file) {
     if (line.empty() || line.starts_with('#')) continue;
     if (line.starts_with('[')) {
       if (++sections == 1) continue;
-      throw InvalidArgument("{}, line {}: a second section; leave the one that is meant", file,
-                            number);
+      throw InvalidArgument(
+          "{}, line {}: a second section; leave the one that is meant", file, number);
     }
     const size_t equals = line.find('=');
     std::string name = equals == line.npos ? "" : Trimmed(line.substr(0, equals));
@@ -54,14 +53,13 @@ AccessKey ParseAccessKey(std::string_view text, const std::string& file) {
     }
     *field->second = Trimmed(line.substr(equals + 1));
     if (field->second->empty() || !IsPrintable(*field->second)) {
-      throw InvalidArgument("{}, line {}: the value of {} is empty or has spaces", file, number,
-                            name);
+      throw InvalidArgument(
+          "{}, line {}: the value of {} is empty or has spaces", file, number, name);
     }
   }
   if (key.id.empty() || key.secret.empty()) {
-    throw InvalidArgument("{} has no line {} = ...",
-                          file,
-                          key.id.empty() ? "access_key_id" : "secret_access_key");
+    throw InvalidArgument(
+        "{} has no line {} = ...", file, key.id.empty() ? "access_key_id" : "secret_access_key");
   }
   return key;
 }

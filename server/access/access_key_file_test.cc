@@ -39,8 +39,10 @@ TEST(AccessKeyFileTest, NamesLineOfFaultAndNotTheSecret) {
   EXPECT_THAT(ProblemOf("access_key_id = A1\n"), HasSubstr("no line secret_access_key"));
   EXPECT_THAT(ProblemOf("access_key_id = A1\nhunter2\n"), HasSubstr("the file, line 2: expected"));
   EXPECT_THAT(ProblemOf("[a]\n[b]\n"), HasSubstr("line 2: a second section"));
-  for (const char* text : {"access_key_id = A1\nhunter2\n", "hunter2 = x\n",
-                           "secret_access_key = hunter2 x\n", "secret_access_key = hunter2\n"}) {
+  for (const char* text : {"access_key_id = A1\nhunter2\n",
+                           "hunter2 = x\n",
+                           "secret_access_key = hunter2 x\n",
+                           "secret_access_key = hunter2\n"}) {
     EXPECT_THAT(ProblemOf(text), Not(HasSubstr("hunter2"))) << text;
     EXPECT_NE(ProblemOf(text), "") << text;
   }

@@ -27,10 +27,10 @@ struct FsckResult {
   }
 };
 
-// Verifies the whole folder, or the blobs in `elsewhere` in place of those in the folder, with the references of the PostgreSQL store at `address`, or of
-// jobs.db if that is empty. Throws kFailedPrecondition if a server uses the folder. `repair`: sets
-// damaged blobs aside, so that an upload or another run replaces them. Calls `progress` with the
-// number of blobs read so far.
+// Verifies the whole folder, or the blobs in `elsewhere` in place of those in the folder, with the
+// references of the PostgreSQL store at `address`, or of jobs.db if that is empty. Throws
+// kFailedPrecondition if a server uses the folder. `repair`: sets damaged blobs aside, so that an
+// upload or another run replaces them. Calls `progress` with the number of blobs read so far.
 FsckResult Fsck(const std::filesystem::path& data_folder,
                 const std::string& address,
                 BlobStore* elsewhere,

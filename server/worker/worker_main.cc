@@ -326,8 +326,10 @@ void ServeInference(const WorkerArguments& arguments, const WorkerProgram& progr
                       COLOR3D_VERSION,
                       arguments.settings.reserve_mib << 20,
                       {arguments.options.name, arguments.options.cache_bytes});
-  const std::unique_ptr<LiveEngine> engine = program.make_engine(
-      {server.blobs(), ParseUserModels(arguments.models, arguments.backends), arguments.settings.threads});
+  const std::unique_ptr<LiveEngine> engine =
+      program.make_engine({server.blobs(),
+                           ParseUserModels(arguments.models, arguments.backends),
+                           arguments.settings.threads});
   InferenceOptions options;
   options.data_folder = arguments.settings.data_folder;
   options.socket = arguments.inference;

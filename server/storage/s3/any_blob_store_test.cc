@@ -59,7 +59,8 @@ class AnyBlobStoreTest : public ::testing::TestWithParam<const char*> {
 
   void Damage(const FileDigest& digest) {
     const std::string& sha256 = digest.sha256;
-    const std::string key = "blobs/" + sha256.substr(0, 2) + "/" + sha256.substr(2, 2) + "/" + sha256;
+    const std::string key =
+        "blobs/" + sha256.substr(0, 2) + "/" + sha256.substr(2, 2) + "/" + sha256;
     if (scripted_) return scripted_->Set(R"({"damage": ["some/prefix/)" + key + R"("]})");
     if (s3rver_) {
       return FlipByte(scratch_.path() / "s3rver" / "blobs" / (key + "._S3rver_object"));

@@ -55,8 +55,7 @@ std::string Nonce() {
 }
 
 Error Missing(const std::string& sha256) {
-  return ServiceError(
-      ErrorReason::kBlobMissing, "the blob {} is not stored; upload it", sha256);
+  return ServiceError(ErrorReason::kBlobMissing, "the blob {} is not stored; upload it", sha256);
 }
 
 // Calls `body` and gives failures of the store the reason of unreadable blobs.
@@ -65,7 +64,8 @@ auto Reading(const std::string& sha256, const Body& body) {
   try {
     return body();
   } catch (const S3Error& e) {
-    throw ServiceError(ErrorReason::kBlobUnreadable, "cannot read the blob {}: {}", sha256, e.what());
+    throw ServiceError(
+        ErrorReason::kBlobUnreadable, "cannot read the blob {}: {}", sha256, e.what());
   }
 }
 
@@ -269,10 +269,10 @@ void S3BlobStore::Download(const StoredBlob& blob, const fs::path& part) const {
 
 std::optional<std::string> S3BlobStore::DigestOfObject(const FileDigest& digest) const {
   Sha256 hash;
-  const bool is_there = client_.Get(KeyOf(kBlobs, digest.sha256),
-                                    0,
-                                    digest.size_bytes,
-                                    [&](std::string_view bytes) { hash.Update(bytes); });
+  const bool is_there =
+      client_.Get(KeyOf(kBlobs, digest.sha256), 0, digest.size_bytes, [&](std::string_view bytes) {
+        hash.Update(bytes);
+      });
   if (!is_there) return std::nullopt;
   return hash.FinishHex();
 }
@@ -393,9 +393,9 @@ std::vector<std::string> S3BlobStore::ForEach(
     const std::string sha256 = DigestOfKey(kBlobs, object.key);
     if (sha256.empty()) return true;
     const auto mark = marks.find(sha256);
-    return visit({{sha256, object.size_bytes},
-                  TouchedNs(mark == marks.end() ? std::string() : mark->second,
-                            touches_.Repeats(sha256))});
+    return visit(
+        {{sha256, object.size_bytes},
+         TouchedNs(mark == marks.end() ? std::string() : mark->second, touches_.Repeats(sha256))});
   });
   return {};
 }

@@ -6,9 +6,10 @@
 //   removing/ab/cd/SHA-256  mark: a server is removing the blob
 //
 // An object store has no lock over two objects. Whoever needs a blob writes its touch mark and then
-// looks for a removal; whoever removes one writes the removal mark and then looks at the touch mark.
-// Reads see all earlier writes, so at least one of the two sees the other: the remover gives up, or
-// the other waits until the removal has ended. See server/README.md, "Blobs in an object store".
+// looks for a removal; whoever removes one writes the removal mark and then looks at the touch
+// mark. Reads see all earlier writes, so at least one of the two sees the other: the remover gives
+// up, or the other waits until the removal has ended. See server/README.md, "Blobs in an object
+// store".
 #pragma once
 
 #include <atomic>

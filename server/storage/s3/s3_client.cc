@@ -39,8 +39,7 @@ S3Source BytesSource(std::string_view bytes) {
 }
 
 S3Client::S3Client(S3Options options)
-    : options_(std::move(options)),
-      http_(options_.target.authorities, options_.timing.connect) {}
+    : options_(std::move(options)), http_(options_.target.authorities, options_.timing.connect) {}
 
 S3Request S3Client::RequestFor(const std::string& method, const std::string& key) const {
   const S3Target& target = options_.target;
@@ -146,8 +145,8 @@ bool S3Client::Get(const std::string& key,
     if (answer.status == 404 && S3CodeOf(answer) != "NoSuchBucket") return false;
     if (received == size_bytes) return true;
     if (answer.failure.empty() && answer.status / 100 == 2) {
-      answer.failure = fmt::format("the object ended after {} of {} bytes", offset + received,
-                                   offset + size_bytes);
+      answer.failure = fmt::format(
+          "the object ended after {} of {} bytes", offset + received, offset + size_bytes);
       answer.is_worth_retry = true;
     }
     if (received > before) done = 1;
@@ -175,8 +174,7 @@ bool S3Client::Delete(const std::string& key, const std::string& only_with_etag)
   return answer.status != 412;
 }
 
-void S3Client::List(const std::string& folder,
-                    const std::function<bool(const S3Object&)>& visit) {
+void S3Client::List(const std::string& folder, const std::function<bool(const S3Object&)>& visit) {
   const size_t prefix = options_.target.prefix.size();
   std::string next;
   do {

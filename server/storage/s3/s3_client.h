@@ -39,8 +39,8 @@ struct S3Options {
 struct S3Object {
   std::string key;
   int64_t size_bytes = 0;
-  std::string etag;         // changes with each write of other bytes
-  std::string modified;     // as the store writes it
+  std::string etag;      // changes with each write of other bytes
+  std::string modified;  // as the store writes it
 };
 
 // Bytes that are sent, possibly several times. Copies at most `size` bytes from `offset`; returns
@@ -109,9 +109,9 @@ class S3Client {
     std::string key;
     const Body* body = nullptr;
     std::function<void(std::string_view)> sink = {};
-    std::chrono::seconds stall{0};        // 0: as usual
-    std::vector<int> expected = {};       // statuses besides 2xx that are answers, not errors
-    bool may_fail_within = false;         // a 200 may have an error as its body
+    std::chrono::seconds stall{0};   // 0: as usual
+    std::vector<int> expected = {};  // statuses besides 2xx that are answers, not errors
+    bool may_fail_within = false;    // a 200 may have an error as its body
   };
   HttpAnswer Once(const Ask& ask);
   // With retries; throws MakeS3Error.

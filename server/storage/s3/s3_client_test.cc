@@ -128,14 +128,13 @@ TEST_F(S3ClientTest, ListsInPages) {
 }
 
 TEST_F(S3ClientTest, RepeatsWhatMayPass) {
-  for (const char* fault :
-       {kUnavailable,
-        R"("kind": "status", "status": 500, "code": "InternalError")",
-        R"("kind": "status", "status": 429)",
-        R"("kind": "status", "status": 504)",
-        R"("kind": "status", "status": 400, "code": "RequestTimeout")",
-        R"("kind": "drop")",
-        R"("kind": "lose")"}) {
+  for (const char* fault : {kUnavailable,
+                            R"("kind": "status", "status": 500, "code": "InternalError")",
+                            R"("kind": "status", "status": 429)",
+                            R"("kind": "status", "status": 504)",
+                            R"("kind": "status", "status": 400, "code": "RequestTimeout")",
+                            R"("kind": "drop")",
+                            R"("kind": "lose")"}) {
     for (const auto& [begin, call] : std::vector<std::pair<std::string, std::function<bool()>>>{
              {"PUT ", [&] { return client_->PutBytes("k", "v", S3Replace::kYes).has_value(); }},
              {"GET k", [&] { return client_->GetBytes("k") == "v"; }},
@@ -162,7 +161,8 @@ TEST_F(S3ClientTest, RepeatedWriteHasOneEffect) {
 
 TEST_F(S3ClientTest, DoesNotRepeatRefusals) {
   for (const char* code : {"AccessDenied", "InvalidAccessKeyId", "SignatureDoesNotMatch"}) {
-    server_->Fail("", 1, R"("kind": "status", "status": 403, "code": ")" + std::string(code) + "\"");
+    server_->Fail(
+        "", 1, R"("kind": "status", "status": 403, "code": ")" + std::string(code) + "\"");
     server_->Requests();
     EXPECT_THAT(ProblemOf([&] { client_->GetBytes("k"); }), HasSubstr(code));
     EXPECT_EQ(Count("GET "), 1) << code;

@@ -45,7 +45,8 @@ std::string ClockDifference(const HttpAnswer& answer) {
   const int64_t theirs = ParseS3Time(answer.Header("date"));
   if (theirs == 0) return "";
   const int64_t ahead = static_cast<int64_t>(std::time(nullptr)) - theirs;
-  return fmt::format(" (it is {} s {} the store's)", ahead < 0 ? -ahead : ahead,
+  return fmt::format(" (it is {} s {} the store's)",
+                     ahead < 0 ? -ahead : ahead,
                      ahead < 0 ? "behind" : "ahead of");
 }
 
@@ -129,8 +130,9 @@ S3Error MakeS3Error(const S3Target& target, const std::string& what, const HttpA
   const std::string code = S3CodeOf(answer);
   const std::string told = XmlText(answer.text, "Message");
   const bool has_status = answer.status >= 300 || (answer.failure.empty() && answer.status > 0);
-  std::string problem = has_status ? fmt::format("{}{}{}", answer.status, code.empty() ? "" : " ", code)
-                                   : answer.failure;
+  std::string problem = has_status
+                            ? fmt::format("{}{}{}", answer.status, code.empty() ? "" : " ", code)
+                            : answer.failure;
   if (has_status && !told.empty()) problem += " (" + told.substr(0, 300) + ")";
   return S3Error(fmt::format("{}: {}; {}", what, problem, RemedyFor(target, answer, code)),
                  answer.status,

@@ -16,7 +16,7 @@ class S3Error : public Error {
   // kUnavailable if it may pass by itself or if the operator can mend it without a restart.
   S3Error(const std::string& message, int status, std::string code)
       : Error(ErrorCode::kUnavailable, message), status_(status), s3_code_(std::move(code)) {}
-  int status() const { return status_; }                  // of HTTP; 0: no answer
+  int status() const { return status_; }                   // of HTTP; 0: no answer
   const std::string& s3_code() const { return s3_code_; }  // e.g. "NoSuchBucket"; may be empty
 
  private:

@@ -134,9 +134,8 @@ bool S3Client::Complete(const Upload& upload,
                         S3Replace replace) {
   std::string list = "<CompleteMultipartUpload xmlns=\"http://s3.amazonaws.com/doc/2006-03-01/\">";
   for (size_t i = 0; i < etags.size(); ++i) {
-    list += fmt::format("<Part><PartNumber>{}</PartNumber><ETag>{}</ETag></Part>",
-                        i + 1,
-                        XmlEscape(etags[i]));
+    list += fmt::format(
+        "<Part><PartNumber>{}</PartNumber><ETag>{}</ETag></Part>", i + 1, XmlEscape(etags[i]));
   }
   list += "</CompleteMultipartUpload>";
   const Body body{BytesSource(list), 0, static_cast<int64_t>(list.size()), Sha256Hex(list)};

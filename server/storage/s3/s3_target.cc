@@ -32,12 +32,13 @@ void ParseBucket(const std::string& blobs, S3Target* target) {
   if (slash == std::string::npos) return;
   std::string prefix = rest.substr(slash + 1);
   while (prefix.ends_with('/')) prefix.pop_back();
-  const bool is_good = HasOnly(prefix, std::string(kUpperCase) + "-._=/") && prefix.size() <= 500 &&
-                       !prefix.starts_with('/') && ("/" + prefix + "/").find("/./") == prefix.npos &&
-                       ("/" + prefix + "/").find("/../") == prefix.npos &&
-                       prefix.find("//") == prefix.npos;
+  const bool is_good =
+      HasOnly(prefix, std::string(kUpperCase) + "-._=/") && prefix.size() <= 500 &&
+      !prefix.starts_with('/') && ("/" + prefix + "/").find("/./") == prefix.npos &&
+      ("/" + prefix + "/").find("/../") == prefix.npos && prefix.find("//") == prefix.npos;
   if (!is_good) {
-    throw bad("the prefix must have at most 500 letters, digits, '-', '.', '_', '=', and single '/'");
+    throw bad(
+        "the prefix must have at most 500 letters, digits, '-', '.', '_', '=', and single '/'");
   }
   target->prefix = prefix.empty() ? "" : prefix + "/";
 }
@@ -45,7 +46,8 @@ void ParseBucket(const std::string& blobs, S3Target* target) {
 void ParseEndpoint(const std::string& endpoint, S3Target* target) {
   const auto bad = [&](const std::string& why) {
     return InvalidArgument(
-        "--s3-endpoint {}: {}; give https://HOST[:PORT], or http://HOST[:PORT] in a trusted network",
+        "--s3-endpoint {}: {}; give https://HOST[:PORT], or http://HOST[:PORT] in a trusted "
+        "network",
         endpoint,
         why);
   };

@@ -7,7 +7,8 @@ namespace {
 
 TEST(S3XmlTest, FindsElementsAndReplacesEntities) {
   constexpr char kList[] =
-      "<?xml version=\"1.0\"?>\n<ListBucketResult xmlns=\"http://s3.amazonaws.com/doc/2006-03-01/\">"
+      "<?xml version=\"1.0\"?>\n<ListBucketResult "
+      "xmlns=\"http://s3.amazonaws.com/doc/2006-03-01/\">"
       "<Name>b</Name><KeyCount>2</KeyCount><Key/>"
       "<Contents><Key>a&amp;b&#x26;&#39;</Key><ETag>&quot;x&quot;</ETag></Contents>"
       "<Contents><Key>c &lt; d</Key></Contents></ListBucketResult>";
@@ -22,7 +23,8 @@ TEST(S3XmlTest, FindsElementsAndReplacesEntities) {
 }
 
 TEST(S3XmlTest, BrokenAnswersHaveNoElements) {
-  for (const char* text : {"", "<", "<Key", "<Key>", "<Key>a", "<Key>a</Ke", "</Key>", "&<Key", "<<>>"}) {
+  for (const char* text :
+       {"", "<", "<Key", "<Key>", "<Key>a", "<Key>a</Ke", "</Key>", "&<Key", "<<>>"}) {
     EXPECT_EQ(XmlText(text, "Key"), "") << text;
     EXPECT_TRUE(XmlElements(text, "Key").empty()) << text;
   }

@@ -19,7 +19,7 @@ struct S3Key {
 // The parts of a request that its signature covers.
 struct S3Request {
   std::string method = "GET";
-  std::string path = "/";  // not encoded, e.g. "/bucket/key"
+  std::string path = "/";                                       // not encoded, e.g. "/bucket/key"
   std::vector<std::pair<std::string, std::string>> query = {};  // not encoded
   std::map<std::string, std::string> headers = {};              // by lower-case name
   std::string payload_sha256 = {};

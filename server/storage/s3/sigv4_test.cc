@@ -7,8 +7,8 @@
 namespace color3d {
 namespace {
 
-// The examples of "Authenticating Requests: Using the Authorization Header" in Amazon's reference of
-// the API of S3, with the signatures that it documents.
+// The examples of "Authenticating Requests: Using the Authorization Header" in Amazon's reference
+// of the API of S3, with the signatures that it documents.
 const S3Key kExampleKey{"AKIAIOSFODNN7EXAMPLE", "wJalrXUtnFEMI/K7MDENG/bPxRfiCYEXAMPLEKEY"};
 constexpr char kExampleTime[] = "20130524T000000Z";
 

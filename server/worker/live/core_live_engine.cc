@@ -58,9 +58,8 @@ class CoreLiveEngine : public LiveEngine {
   LoadedColorizer FromExample(const Request& request);
   std::string ReadBlob(const std::string& sha256) {
     std::string bytes;
-    setup_.blobs.Borrow(sha256, [&](const std::filesystem::path& file) {
-      bytes = ReadFile(file, kMaxFileBytes);
-    });
+    setup_.blobs.Borrow(
+        sha256, [&](const std::filesystem::path& file) { bytes = ReadFile(file, kMaxFileBytes); });
     return bytes;
   }
 

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "server/ops/socket_folder.h"
-#include "server/storage/data_folder.h"
 #include "server/storage/blob_cache.h"
+#include "server/storage/data_folder.h"
 #include "server/worker/remote/log_sender.h"
 #include "server/worker/remote/remote_store.h"
 #include "server/worker/remote/worker_link.h"

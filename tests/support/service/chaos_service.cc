@@ -159,8 +159,9 @@ std::vector<std::string> ChaosService::EndAndAudit() {
   require_none(Count("select count(*) - count(distinct job_id) from job_attempt where "
                      "outcome='SUCCEEDED'"),
                "jobs that succeeded twice");
-  const FsckResult whole =
-      Fsck(folder_ / "data", TestStoreAddress(folder_ / "data"), nullptr, /*repair=*/false, [](int64_t) {});
+  const FsckResult whole = Fsck(
+      folder_ / "data", TestStoreAddress(folder_ / "data"), nullptr, /*repair=*/false, [](int64_t) {
+      });
   require_none(static_cast<int64_t>(whole.store_problems.size()), "problems of jobs.db");
   require_none(static_cast<int64_t>(whole.missing.size()), "blobs that are missing");
   require_none(static_cast<int64_t>(whole.damaged.size()), "blobs that are damaged");

@@ -58,8 +58,8 @@ S3Options S3Process::Options(const std::string& prefix) const {
 
 fs::path S3Process::KeyFile(const fs::path& folder) const {
   const fs::path file = folder / "s3-key";
-  WriteFileAtomic(
-      file, fmt::format("access_key_id = {}\nsecret_access_key = {}\n", kKeyId, kSecret));
+  WriteFileAtomic(file,
+                  fmt::format("access_key_id = {}\nsecret_access_key = {}\n", kKeyId, kSecret));
   ::chmod(file.c_str(), 0600);
   return file;
 }
@@ -78,8 +78,7 @@ std::string S3Process::Control(const std::string& path, const std::string& json)
 void S3Process::Set(const std::string& json) { Control("", json); }
 
 void S3Process::Fail(const std::string& match, int count, const std::string& fault) {
-  Set(fmt::format(
-      R"({{"faults": [{{"match": "{}", "count": {}, {}}}]}})", match, count, fault));
+  Set(fmt::format(R"({{"faults": [{{"match": "{}", "count": {}, {}}}]}})", match, count, fault));
 }
 
 std::vector<std::string> S3Process::Requests() { return Lines(Control("/log", "")); }
@@ -94,18 +93,17 @@ fs::path S3rverProcess::Program() {
 
 S3rverProcess::S3rverProcess(const fs::path& folder) {
   fs::create_directories(folder / "s3rver");
-  process_ = std::make_unique<Process>(
-      std::vector<std::string>{"node",
-                               Program(),
-                               "--directory",
-                               folder / "s3rver",
-                               "--address",
-                               "127.0.0.1",
-                               "--port",
-                               "0",
-                               "--configure-bucket",
-                               "blobs"},
-      folder / "s3rver-logs");
+  process_ = std::make_unique<Process>(std::vector<std::string>{"node",
+                                                                Program(),
+                                                                "--directory",
+                                                                folder / "s3rver",
+                                                                "--address",
+                                                                "127.0.0.1",
+                                                                "--port",
+                                                                "0",
+                                                                "--configure-bucket",
+                                                                "blobs"},
+                                       folder / "s3rver-logs");
   const auto port = [&] {
     const std::string out = process_->Out();
     const size_t at = out.find("127.0.0.1:");
