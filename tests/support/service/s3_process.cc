@@ -15,6 +15,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr char kKeyId[] = "TESTKEY";
+const S3Key kS3rverKey{"S3RVER", "S3RVER"};  // the only one that it knows
 constexpr char kSecret[] = "test/secret+of=the/store";
 
 std::vector<std::string> Lines(const std::string& text) {
@@ -34,6 +35,14 @@ S3Options OptionsOf(const std::string& endpoint, const S3Key& key, const std::st
   options.timing.stall = std::chrono::seconds(2);
   options.part_bytes = int64_t{5} << 20;
   return options;
+}
+
+fs::path WriteKey(const fs::path& folder, const S3Key& key) {
+  const fs::path file = folder / "s3-key";
+  WriteFileAtomic(file,
+                  fmt::format("access_key_id = {}\nsecret_access_key = {}\n", key.id, key.secret));
+  ::chmod(file.c_str(), 0600);
+  return file;
 }
 
 }  // namespace
@@ -115,6 +124,10 @@ S3rverProcess::S3rverProcess(const fs::path& folder) {
   endpoint_ = fmt::format("http://127.0.0.1:{}", port());
 }
 
-S3Options S3rverProcess::Options() const { return OptionsOf(endpoint_, {"S3RVER", "S3RVER"}, ""); }
+S3Options S3rverProcess::Options() const { return OptionsOf(endpoint_, kS3rverKey, ""); }
+
+fs::path S3rverProcess::KeyFile(const fs::path& folder) const {
+  return WriteKey(folder, kS3rverKey);
+}
 
 }  // namespace color3d::testing

@@ -50,6 +50,7 @@ class S3rverProcess {
   static std::filesystem::path Program();
   explicit S3rverProcess(const std::filesystem::path& folder);
   S3Options Options() const;
+  std::filesystem::path KeyFile(const std::filesystem::path& folder) const;
 
  private:
   std::unique_ptr<Process> process_;
