@@ -14,6 +14,7 @@
 namespace color3d {
 namespace {
 
+constexpr int64_t kLargeBytes = 1 << 20;
 constexpr size_t kMaxErrorBytes = 64 << 10;
 constexpr size_t kMaxTextBytes = 16 << 20;
 
@@ -173,6 +174,10 @@ HttpAnswer HttpPool::Call(const HttpCall& call) {
   for (const std::string& header : call.headers) {
     headers.reset(curl_slist_append(headers.release(), header.c_str()));
   }
+  // The store may refuse a large body before it is sent; for a small one that is a way more.
+  if (call.body_bytes >= 0 && call.body_bytes < kLargeBytes) {
+    headers.reset(curl_slist_append(headers.release(), "Expect:"));
+  }
   const auto set = [curl](CURLoption option, auto value) { curl_easy_setopt(curl, option, value); };
   set(CURLOPT_URL, call.url.c_str());
   set(CURLOPT_CUSTOMREQUEST, call.method.c_str());
@@ -210,7 +215,7 @@ HttpAnswer HttpPool::Call(const HttpCall& call) {
   curl_easy_getinfo(curl, CURLINFO_RESPONSE_CODE, &status);
   if (transfer.exception) std::rethrow_exception(transfer.exception);
   HttpAnswer& answer = transfer.answer;
-  answer.status = static_cast<int>(status);
+  answer.status = status < 200 ? 0 : static_cast<int>(status);  // 100: "Continue" was no answer
   if (code != CURLE_OK) {
     answer.failure = code == CURLE_ABORTED_BY_CALLBACK ? "the server is shutting down"
                      : why[0] != '\0'                  ? why.data()

@@ -54,7 +54,7 @@ std::string Nonce() {
   return fmt::format("{:08x}{:08x}{:08x}{:08x}", random(), random(), random(), random());
 }
 
-Error Missing(const std::string& sha256) {
+ServiceError Missing(const std::string& sha256) {
   return ServiceError(ErrorReason::kBlobMissing, "the blob {} is not stored; upload it", sha256);
 }
 

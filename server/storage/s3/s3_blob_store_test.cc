@@ -101,7 +101,7 @@ TEST_F(S3BlobStoreTest, FillGoesOnAfterBreaksAndFailures) {
   server_->Fail("GET blobs/", 3, R"("kind": "truncate")");
   EXPECT_EQ(Read(digest), bytes);
   fs::remove(options_.folder / digest.sha256);
-  server_->Fail("blobs/", 100, R"("kind": "status", "status": 503, "code": "SlowDown")");
+  server_->Fail("", 1000, R"("kind": "status", "status": 503, "code": "SlowDown")");
   EXPECT_EQ(ReasonThrown([&] { Read(digest); }), "BLOB_UNREADABLE");
   EXPECT_EQ(ReasonThrown([&] { blobs_->Look(digest.sha256); }), "BLOB_UNREADABLE");
   EXPECT_EQ(ReasonThrown([&] { blobs_->IsIntact(digest); }), "BLOB_UNREADABLE");

@@ -146,6 +146,8 @@ TEST_F(S3ClientTest, RepeatsWhatMayPass) {
                 return count == 1;
               }},
              {"DELETE ", [&] { return client_->Delete("k"); }}}) {
+      // Without its body, the answer to HEAD does not tell what was wrong.
+      if (begin == "HEAD " && std::string(fault).find("400") != std::string::npos) continue;
       server_->Fail(begin, 3, fault);
       EXPECT_TRUE(call()) << begin << " with " << fault;
     }
@@ -242,7 +244,7 @@ TEST_F(S3ClientTest, PartsSurviveFailures) {
     server_->Fail(match, 2, fault);
     EXPECT_TRUE(Put("k", bytes, S3Replace::kYes)) << match << fault;
     EXPECT_TRUE(Get("k", 0, static_cast<int64_t>(bytes.size())) == bytes) << match << fault;
-    EXPECT_EQ(server_->UnfinishedUploads(), match.ends_with("uploads") ? 0 : 0);
+    EXPECT_EQ(server_->UnfinishedUploads(), 0);
     client_->Delete("k");
   }
 }
