@@ -1,15 +1,10 @@
 #include "server/storage/s3/s3_blob_store.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <exception>
 #include <map>
 #include <random>
@@ -19,6 +14,7 @@
 
 #include "core/base/files.h"
 #include "server/base/service_error.h"
+#include "server/storage/s3/local_files.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -68,74 +64,6 @@ auto Reading(const std::string& sha256, const Body& body) {
         ErrorReason::kBlobUnreadable, "cannot read the blob {}: {}", sha256, e.what());
   }
 }
-
-// A file that is read at any place; closed by the destructor.
-class OpenBlob {
- public:
-  explicit OpenBlob(const fs::path& file) : file_(file) {
-    fd_ = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-    if (fd_ < 0) Throw();
-  }
-  ~OpenBlob() { ::close(fd_); }
-  OpenBlob(const OpenBlob&) = delete;
-  OpenBlob& operator=(const OpenBlob&) = delete;
-  size_t Read(int64_t offset, char* buffer, size_t size) const {
-    while (true) {
-      const ssize_t got = ::pread(fd_, buffer, size, offset);
-      if (got > 0) return static_cast<size_t>(got);
-      if (got == 0) {
-        throw Error(ErrorCode::kDataLoss, "{} became shorter while it was stored", file_.string());
-      }
-      if (errno != EINTR) Throw();
-    }
-  }
-
- private:
-  [[noreturn]] void Throw() const {
-    throw Error(ErrorCode::kDataLoss, "cannot read {}: {}", file_.string(), std::strerror(errno));
-  }
-  const fs::path file_;
-  int fd_ = -1;
-};
-
-// A file that grows; closed by the destructor.
-class GrowingFile {
- public:
-  explicit GrowingFile(const fs::path& file) : file_(file) {
-    fd_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
-    struct stat status {};
-    if (fd_ < 0 || ::fstat(fd_, &status) != 0) Throw();
-    size_ = status.st_size;
-  }
-  ~GrowingFile() { ::close(fd_); }
-  GrowingFile(const GrowingFile&) = delete;
-  GrowingFile& operator=(const GrowingFile&) = delete;
-  int64_t size() const { return size_; }
-  void Append(std::string_view data) {
-    while (!data.empty()) {
-      const ssize_t put = ::write(fd_, data.data(), data.size());
-      if (put < 0 && errno == EINTR) continue;
-      if (put < 0) Throw();
-      data.remove_prefix(static_cast<size_t>(put));
-      size_ += put;
-    }
-  }
-
- private:
-  [[noreturn]] void Throw() const {
-    if (errno == ENOSPC || errno == EDQUOT) {
-      throw ServiceError(ErrorReason::kStorageFull,
-                         "cannot write {}: the server's disk is full; free some space, or give a "
-                         "smaller --blob-cache-gib",
-                         file_.string());
-    }
-    throw Error(
-        ErrorCode::kUnavailable, "cannot write {}: {}", file_.string(), std::strerror(errno));
-  }
-  const fs::path file_;
-  int fd_ = -1;
-  int64_t size_ = 0;
-};
 
 }  // namespace
 

@@ -29,7 +29,7 @@ class S3Process {
   void Set(const std::string& json);
   // One fault: JSON without the braces, e.g. "kind": "drop".
   void Fail(const std::string& match, int count, const std::string& fault);
-  // Requests since the last call, as "METHOD KEY?QUERY".
+  // Requests since the last call, as "VERB KEY?QUERY".
   std::vector<std::string> Requests();
   std::vector<std::string> Keys();
   int UnfinishedUploads();

@@ -4,7 +4,7 @@
 It verifies Signature Version 4 by itself, and fails on demand. Usage: s3_server.py PORT_FILE [KEY=VALUE...]
 A test sends JSON to /_control to change the settings below, and reads /_control/log, one line a request.
 
-A fault is {"match": REGEX of "METHOD KEY?QUERY", "count": N, "kind": ...} and holds for the next N requests that
+A fault is {"match": REGEX of "VERB KEY?QUERY", "count": N, "kind": ...} and holds for the next N requests that
 match: status (with "status", "code", "message", "headers"), drop (closes the connection), lose (does the request, then
 closes the connection), truncate (sends half of the body), stall (sends half of the body, then waits "seconds"), slow
 (sends the body over "seconds"), late (waits "seconds" before the request), other_bytes (changes a byte of the body).
@@ -32,7 +32,7 @@ SETTINGS = {
     "region": "us-east-1",
     "page": 1000,
     "skew_seconds": 0,  # added to the clock of the store
-    "denied": "",       # REGEX of "METHOD KEY?QUERY" that is answered with AccessDenied
+    "denied": "",       # REGEX of "VERB KEY?QUERY" that is answered with AccessDenied
     "conditions": True,  # knows If-None-Match and If-Match of writes
     "stale": False,     # lists nothing, as a store that is not consistent
     "faults": [],
