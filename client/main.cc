@@ -7,6 +7,7 @@
 
 #include "client/commands/command.h"
 #include "client/commands/console.h"
+#include "client/lib/command_trace.h"
 #include "core/base/files.h"
 
 namespace color3d::client {
@@ -44,6 +45,24 @@ std::string TokenFrom(const std::filesystem::path& file) {
     throw InvalidArgument("{} holds more than one token", file.string());
   }
   return token;
+}
+
+// "color3d job show", without arguments.
+std::string NameOfCommand(const CLI::App& app) {
+  std::string name = app.get_name();
+  for (const CLI::App* command : app.get_subcommands()) name += " " + NameOfCommand(*command);
+  return name;
+}
+
+// Runs the requested command; its errors are reported.
+ExitCode RunCommand(const std::filesystem::path& token_file, Context* context) {
+  try {
+    context->server.token = TokenFrom(token_file);
+    context->server.on_wait = [context](const std::string& line) { PrintNote(*context, line); };
+    return context->action();
+  } catch (const std::exception& e) {
+    return ReportException(*context, e);
+  }
 }
 
 int Main(int argc, char** argv) {
@@ -98,13 +117,12 @@ int Main(int argc, char** argv) {
     return static_cast<int>(ExitCode::kBadInput);
   }
   HandleInterrupt();
-  try {
-    context.server.token = TokenFrom(token_file);
-    context.server.on_wait = [&context](const std::string& line) { PrintNote(context, line); };
-    return static_cast<int>(context.action());
-  } catch (const std::exception& e) {
-    return static_cast<int>(ReportException(context, e));
-  }
+  CommandTrace trace(COLOR3D_VERSION,
+                     [&context](const std::string& line) { PrintNote(context, line); });
+  context.server.traceparent = trace.traceparent();
+  const int code = static_cast<int>(RunCommand(token_file, &context));
+  trace.End(NameOfCommand(app), code);
+  return code;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #   deploy/install-deps.sh           packages of deploy/demo.sh
 #   deploy/install-deps.sh --tests   and those of tests/run.sh
 #   deploy/install-deps.sh --fuzz    and those of tests/run.sh -L fuzz
+#   deploy/install-deps.sh --engines and those of the tests of deploy/slurm and deploy/kubernetes
 set -euo pipefail
 
 packages=(
@@ -18,11 +19,12 @@ packages=(
 )
 case "${1:-}" in
   "") ;;
-  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime prometheus postgresql-15 systemd
+  --tests) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang-format clang-tidy faketime iproute2 prometheus postgresql-15 systemd
     python3-grpcio python3-protobuf python3-numpy python3-pil
     python3-venv python3-setuptools python3-wheel mypy python3-yaml) ;;
   --fuzz) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang libclang-rt-dev) ;;
-  *) echo "install-deps: unknown option $1; use --tests or --fuzz" >&2; exit 2 ;;
+  --engines) packages+=(slurmctld slurmd slurm-client munge kubernetes-client python3-kubernetes python3-yaml) ;;
+  *) echo "install-deps: unknown option $1; use --tests, --fuzz or --engines" >&2; exit 2 ;;
 esac
 
 if ! command -v apt-get >/dev/null 2>&1; then

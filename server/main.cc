@@ -105,6 +105,10 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--metrics-listen",
                     options->metrics_listen,
                     "HOST:PORT of the metrics for Prometheus (/metrics)");
+  serve->add_option("--otlp-endpoint",
+                    options->worker.otlp_endpoint,
+                    "http[s]://HOST:PORT of a collector of OpenTelemetry that receives traces "
+                    "(OTLP over HTTP). Default: OTEL_EXPORTER_OTLP_ENDPOINT");
   serve->add_flag("!--no-sandbox",
                   options->worker.sandbox,
                   "Run workers, COLMAP and scripts without a sandbox");
@@ -213,6 +217,25 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
   serve->add_option("--notify-secret",
                     options->notify_secret,
                     "File with the key that signs notifications: base64 of 24 to 64 bytes");
+  CLI::Option* scale =
+      serve->add_option("--scale-command",
+                        options->scale_command,
+                        "Absolute path of a program that asks an engine (Slurm, Kubernetes, ...) "
+                        "for workers; run with their number, without a shell");
+  serve
+      ->add_option("--scale-max",
+                   options->scale_max,
+                   "Maximum number of workers that --scale-command is told")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str()
+      ->needs(scale);
+  serve
+      ->add_option("--scale-seconds",
+                   options->scale_seconds,
+                   "Time from the end of --scale-command to its next run, at least")
+      ->check(CLI::Range(1.0, 86'400.0))
+      ->capture_default_str()
+      ->needs(scale);
   serve->add_option("--drain-seconds", options->drain_seconds, "Maximum time to stop after SIGTERM")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();

@@ -16,6 +16,7 @@
 #include "core/base/files.h"
 #include "core/base/memory.h"
 #include "core/base/text/address.h"
+#include "core/trace/tracer.h"
 #include "server/access/certificate_roles.h"
 #include "server/access/notify_targets.h"
 #include "server/access/tls.h"
@@ -31,6 +32,7 @@
 #include "server/notify/webhook.h"
 #include "server/ops/notify.h"
 #include "server/ops/process.h"
+#include "server/ops/scale_command.h"
 #include "server/ops/socket_folder.h"
 #include "server/ops/stop_signals.h"
 #include "server/rpc/rpc_server.h"
@@ -38,6 +40,7 @@
 #include "server/storage/data_folder.h"
 #include "server/storage/upload_store.h"
 #include "server/store/open_store.h"
+#include "server/tracing/job_spans.h"
 #include "server/worker/supervision/supervisor.h"
 #include "server/worker/supervision/worker_settings.h"
 
@@ -86,6 +89,7 @@ void CheckOptions(const ServeOptions& options) {
                 "127.0.0.1:PORT, or --insecure-any-address in a trusted network",
                 options.metrics_listen);
   }
+  if (!options.scale_command.empty()) CheckScaleCommand(options.scale_command);
   if (!options.certificate_roles.empty() && options.tls_client_ca.empty()) {
     throw InvalidArgument(
         "--certificate-roles requires --tls-client-ca: clients present no certificates without it");
@@ -132,6 +136,7 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   settings.memory_mib = memory_mib;
   settings.blob_cache_mib = WorkerCacheMib(options.blobs, options.workers + 1);
   settings.drain_grace_seconds = options.drain_seconds * 0.75;
+  settings.sends_logs = !options.store.empty();
   setup.arguments = ToFlags(settings);
   const std::vector<std::string> model_flags = ToFlags(models);
   setup.arguments.insert(setup.arguments.end(), model_flags.begin(), model_flags.end());
@@ -224,6 +229,42 @@ ServerSample SampleOf(const ServeOptions& options,
   return sample;
 }
 
+// Null without --scale-command.
+std::unique_ptr<ScaleCommand> StartScaling(const ServeOptions& options,
+                                           const DataPaths& paths,
+                                           JobStore& store,
+                                           const std::function<bool()>& has_chores) {
+  if (options.scale_command.empty()) return nullptr;
+  ScaleCommandOptions scale;
+  scale.program = options.scale_command;
+  scale.max_workers = options.scale_max;
+  scale.output = paths.root / "scale-command.log";
+  scale.pause = Milliseconds(options.scale_seconds);
+  // Of all servers on the store one asks. Its own workers need no engine.
+  return std::make_unique<ScaleCommand>(
+      scale, [&store, has_chores, own = options.workers]() -> std::optional<int64_t> {
+        if (!has_chores()) return std::nullopt;
+        const JobCounts counts = store.CountJobs();
+        const int64_t waiting = store.Holds().empty() ? counts.queued - counts.blocked : 0;
+        return waiting + counts.running - own;
+      });
+}
+
+// Null if traces are not exported.
+std::shared_ptr<Tracer> MakeTracer(const ServeOptions& options) {
+  const TraceSettings settings = ReadTraceSettings("color3d-server", options.worker.otlp_endpoint);
+  for (const std::string& warning : settings.warnings) spdlog::warn("{}", warning);
+  if (settings.target.url.empty()) return nullptr;
+  spdlog::info("traces are sent to {}", settings.target.url);
+  if (options.workers > 0 && !settings.target.headers.empty()) {
+    spdlog::warn(
+        "workers of this machine do not get OTEL_EXPORTER_OTLP_HEADERS, because they decode "
+        "uploads: if the collector requires them, run one without on this machine");
+  }
+  return Tracer::Make(
+      settings, COLOR3D_VERSION, [](const std::string& problem) { spdlog::warn("{}", problem); });
+}
+
 // Probes like a client. While the gate has no room, it has reported that itself.
 std::string ProbeOwnServer(const RpcServer& server,
                            const TlsFiles& tls,
@@ -247,6 +288,7 @@ void Serve(const ServeOptions& options) {
   RequireReadable(models);
   for (const auto& [name, address] : models.backends) ParseBackendAddress(name, address);
   SupervisorOptions worker_setup = WorkerSetup(options, models);
+  const std::shared_ptr<Tracer> tracer = MakeTracer(options);
   NotifierOptions notify;
   notify.allowed = options.notify_allow;
   if (!options.notify_secret.empty()) notify.secret = ReadWebhookSecret(options.notify_secret);
@@ -280,13 +322,15 @@ void Serve(const ServeOptions& options) {
   rpc.limits.project_max_stored_bytes = static_cast<int64_t>(options.project_gib * (1 << 30));
   rpc.limits.project_max_scenes = options.project_scenes;
   rpc.limits.low_space_bytes = options.low_space_mib << 20;
-  rpc.job_logs = paths.JobLogs();
+  rpc.job_logs = opened.job_logs == nullptr ? MakeFileJobLogs(paths.JobLogs())
+                                            : MakeSharedJobLogs(*opened.job_logs, paths.JobLogs());
   rpc.make_room = [&ballast] { return ballast.Release(); };
   rpc.notify_allowed = options.notify_allow;
   rpc.drain = [] { ::kill(::getpid(), SIGTERM); };
   rpc.models = models;
   rpc.worker_socket = sockets.Address(kWorkerSocket);
   rpc.worker_times = TimesOfWorkers(options.worker);
+  rpc.tracer = tracer;
   rpc.inference = InferenceSetup(options, models, sockets, &worker_setup);
   const auto prober = std::make_shared<BackendProber>(models.backends);
   rpc.probe_backends = [prober] { return ProbeForInfo(*prober); };
@@ -299,6 +343,12 @@ void Serve(const ServeOptions& options) {
   rpc.max_connections = options.max_connections;
   UploadStore uploads(paths.Uploads(), blobs, rpc.limits.max_blob_bytes);
   ExpireDeadWorkers(store);
+  std::optional<JobSpans> job_spans;
+  if (tracer) {
+    JobSpansOptions spans;
+    spans.records = opened.has_chores;
+    job_spans.emplace(store, tracer, spans);
+  }
 
   ServerMetrics metrics(COLOR3D_VERSION);
   rpc.on_call = [&metrics](const std::string& method, grpc::StatusCode code, double seconds) {
@@ -341,6 +391,7 @@ void Serve(const ServeOptions& options) {
   std::optional<Notifier> notifier;
   if (!options.notify_allow.empty()) notifier.emplace(store, clock, notify);
   Supervisor supervisor(worker_setup, store);
+  std::unique_ptr<ScaleCommand> scaling = StartScaling(options, paths, store, opened.has_chores);
   const std::shared_ptr<void> stop_metrics(nullptr, [&](void*) { metrics.StopListening(); });
   if (!options.metrics_listen.empty()) {
     const int port = metrics.Listen(options.metrics_listen, store, blobs, [&] {
@@ -371,11 +422,14 @@ void Serve(const ServeOptions& options) {
   NotifyServiceManager("STOPPING=1");
   spdlog::info("draining: no new jobs, running ones are saved and released");
   signals.ExitOnNext();
+  scaling.reset();
   server.StartDraining();
   supervisor.Drain(Milliseconds(options.drain_seconds * 0.9));
   supervisor.Wait();
   kept.stop();
   server.Shutdown(Milliseconds(std::min(2.0, options.drain_seconds * 0.1)));
+  job_spans.reset();
+  if (tracer && !tracer->Flush()) spdlog::warn("the last traces were not sent");
   spdlog::info("ended");
   if (!deaf.empty()) {
     throw Error(ErrorCode::kUnavailable,

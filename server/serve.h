@@ -49,6 +49,10 @@ struct ServeOptions {
   std::vector<std::string> notify_allow;  // allowed addresses of notifications
   std::vector<std::string> models;        // "NAME=FILE"
   std::vector<std::string> backends;      // "NAME=ADDRESS"
+  // Program that asks an engine for workers; empty: none. See scale_command.h.
+  std::filesystem::path scale_command;
+  int scale_max = 8;
+  double scale_seconds = 30.0;
   // For tests.
   std::filesystem::path worker_program;  // empty: color3d-worker beside this program
   int max_attempts = 3;

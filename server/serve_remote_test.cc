@@ -217,6 +217,56 @@ TEST_F(RemoteWorkerTest, EndsWhenTheServerRefusesIt) {
   EXPECT_THAT(second->Err(), HasSubstr("another worker uses it; choose another --cache-dir"));
 }
 
+// A command in place of an engine: it starts one worker if it is told of any.
+TEST_F(RemoteWorkerTest, AreStartedByTheScaleCommand) {
+  const fs::path program = scratch_.path() / "scale", told = scratch_.path() / "told",
+                 log = scratch_.path() / "engine.log";
+  WriteFileAtomic(program,
+                  "#!/bin/sh\ncd '" + scratch_.path().string() + "'\necho $1 >> told\n" +
+                      "[ $1 -gt 0 ] && mkdir engine || exit 0\nsetsid " + COLOR3D_TEST_WORKER +
+                      " --server https://$(cat port) --tls-ca " +
+                      authority_.certificate().string() +
+                      " --token-file token --cache-dir engine --name engine --idle-exit 1s"
+                      " > engine.log 2>&1 &\n");
+  fs::permissions(program, fs::perms::owner_all);
+  const auto lines = [&] { return fs::exists(told) ? ReadFile(told) : ""; };
+  StartServer({"--scale-command", program, "--scale-max", "2", "--scale-seconds", "1"});
+  ASSERT_TRUE(WaitUntil([&] { return lines() == "0\n"; }, seconds(10))) << lines();
+  std::vector<std::string> jobs;
+  for (int i = 0; i < 5; ++i) jobs.push_back(Submit("steps=30,ms=50"));
+  for (const std::string& job : jobs) {
+    const v1::Job done = client_->WaitFinished(job);
+    EXPECT_EQ(done.state(), v1::Job::STATE_SUCCEEDED) << done.DebugString();
+    EXPECT_EQ(done.attempt(), 1);
+  }
+  EXPECT_TRUE(WaitUntil([&] { return lines().ends_with("\n0\n"); }, seconds(20))) << lines();
+  EXPECT_THAT(lines(), ::testing::MatchesRegex("0\n(1\n)?2\n(1\n)?0\n"));
+  EXPECT_TRUE(
+      WaitUntil([&] { return ReadFile(log).find("there was no job for 1 s") != std::string::npos; },
+                seconds(20)))
+      << ReadFile(log);
+}
+
+TEST_F(RemoteWorkerTest, HangingScaleCommandDelaysNothingAndEndsWithTheServer) {
+  const fs::path program = scratch_.path() / "scale", child = scratch_.path() / "child";
+  WriteFileAtomic(
+      program,
+      "#!/bin/sh\ntrap '' TERM\nsleep 1000 &\necho $! > '" + child.string() + "'\nwait\nwait\n");
+  fs::permissions(program, fs::perms::owner_all);
+  StartServer({"--scale-command", program});
+  ASSERT_TRUE(
+      WaitUntil([&] { return fs::exists(child) && !ReadFile(child).empty(); }, seconds(10)));
+  const pid_t pid = std::stoi(ReadFile(child));
+  EXPECT_TRUE(IsAlive(pid));
+  const auto worker = StartWorker();
+  EXPECT_EQ(client_->WaitFinished(Submit("steps=3")).state(), v1::Job::STATE_SUCCEEDED);
+  const auto start = std::chrono::steady_clock::now();
+  server_->Signal(SIGTERM);
+  EXPECT_EQ(server_->Wait(), 0);
+  EXPECT_LT(std::chrono::steady_clock::now() - start, seconds(10));
+  EXPECT_TRUE(WaitUntil([&] { return !IsAlive(pid); }, seconds(5)));
+}
+
 TEST_F(RemoteWorkerTest, RefusesOtherWeightsOfTheSameName) {
   WriteFileAtomic(scratch_.path() / "weights", "of the server");
   fs::create_directories(scratch_.path() / "elsewhere");

@@ -44,7 +44,8 @@ class ServeStoreTest : public ::testing::Test {
     std::error_code error;
     fs::create_directories(folder / "data");
     fs::create_directory_symlink(Blobs(), folder / "data" / "blobs", error);
-    return std::make_unique<ServerProcess>(folder, std::vector<std::string>{"--store", address_});
+    return std::make_unique<ServerProcess>(
+        folder, std::vector<std::string>{"--store", address_, "--log-level", "info"});
   }
   // Returns the process id of the worker that runs this step of a job.
   static int WorkerAtStep(TestClient& client, const std::string& name, int64_t step) {
@@ -114,6 +115,15 @@ TEST_F(ServeStoreTest, TwoServersShareJobsAndBlobs) {
   } else {
     context.TryCancel();
   }
+  v1::ReadJobLogRequest log;
+  log.set_name(job.name());
+  log.set_follow(true);
+  grpc::ClientContext reading;
+  const auto chunks = other.client().jobs->ReadJobLog(&reading, log);
+  std::string lines;
+  for (v1::JobLogChunk chunk; chunks->Read(&chunk);) lines += chunk.data();
+  EXPECT_THAT(lines, HasSubstr("succeeded"));
+  EXPECT_NE(lines.find("begins"), lines.rfind("begins")) << "one attempt at each server: " << lines;
   killed = Serve(runs_at_a ? "a" : "b");
   EXPECT_EQ(killed->client().Get(job.name()).state(), v1::Job::STATE_SUCCEEDED);
 }

@@ -10,7 +10,7 @@
 
 #include "core/base/digest.h"
 #include "core/base/files.h"
-#include "server/store/sqlite_db.h"
+#include "server/store/sql_database.h"
 #include "tests/support/service/rpc_support.h"
 #include "tests/support/service/scripted_trace.h"
 #include "tests/support/service/server_process.h"
@@ -19,6 +19,7 @@ namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
+using testing::OpenTestDatabase;
 using testing::ParseTrace;
 using testing::Range;
 using testing::RepeatedEffects;
@@ -194,8 +195,8 @@ TEST_F(ProcessTest, TerminatedServerReleasesJobToNextOne) {
     EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(10));
   }
   {
-    SqliteDatabase db(scratch_.path() / "data" / "jobs.db", SqliteAccess::kWrite);
-    SqliteStatement job(db, "select state, attempt from job where name=?", name);
+    const auto db = OpenTestDatabase(scratch_.path() / "data");
+    SqlStatement job(*db, "select state, attempt from job where name=?", name);
     ASSERT_TRUE(job.Step());
     EXPECT_EQ(job.Text(0), "QUEUED");
     EXPECT_EQ(job.Int(1), 0) << "a drain does not count";

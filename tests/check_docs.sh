@@ -12,8 +12,9 @@ cd "$(dirname "$0")/.."
 
 other_flags='--build --install --prefix --preset --target --test-dir --output-on-failure --gtest_filter
   --plugin --python_out --grpc_python_out --ignore-scripts --pwprompt --owner --encoding --template
-  --format --file --dbname'
-other_names='add_secure_port transport_socket per_connection_buffer_limit_bytes pg_dump target_session_attrs'
+  --format --file --dbname --rm --entrypoint --scale --type --from-file --requeue'
+other_names='add_secure_port transport_socket per_connection_buffer_limit_bytes pg_dump target_session_attrs
+  condor_submit job_max_vacate_time'
 
 lists=$(mktemp -d)
 trap 'rm -rf "$lists"' EXIT

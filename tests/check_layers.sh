@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
 # Which folder may include which, from bottom to top:
-#   core:   base <- {catalogue, simd, grid, color, image, zip <- weights} <- {scene, encoder}
+#   core:   base <- {trace, catalogue, simd, grid, color, image, zip <- weights} <- {scene, encoder}
 #           <- {keyview, augment, carry <- film, splat, metrics, report, video, view, matching <- {keycolor, colorizer}}
 #           <- stage: {context, options} <- formats <- sources <- movie <- film_import <- film <- coloring <- {recolor, report} <- stages
 #   colorizer: colorizer <- model <- neighbors <- training <- personal
 #   scene:  scene <- {masks, formats} <- sfm <- import
-#   server: base <- store <- {planning, storage, net} <- rpc; backends and worker beside it; client apart from all.
+#   server: base <- store <- {planning, storage, net, tracing} <- rpc; backends and worker beside it; client apart from all.
 # LibTorch is included only by folders with networks, protocol buffers only by the server and above. Below
 # the server SQL is used only for COLMAP's database (core/scene/sfm/sfm_database.cc). Tests (*_test.cc) are
 # exempt; the product never includes tests/.
@@ -44,6 +44,7 @@ forbid() {
   [ -z "$bad" ] || complain "not allowed here:" "$bad"
 }
 allow core/base 'core/base'
+allow core/trace 'core/(base|trace)'
 allow core/catalogue 'core/(base|catalogue|image/probe)'
 allow core/simd 'core/(base|simd)'
 allow core/grid 'core/(base|simd|grid)'
@@ -110,23 +111,24 @@ allow server/planning 'core/(base|catalogue)|server/(base|store|planning)'
 allow server/access 'core/base|server/access'
 allow server/notify 'core/base|server/(access|store|ops|notify)'
 allow server/metrics 'core/base|server/(net|store|storage|metrics)'
+allow server/tracing 'core/(base|trace)|server/(store|tracing)'
 allow server/storage 'core/base|server/(base|store|storage)'
 allow server/backends 'core/(base|keycolor/external)|server/(ops|backends)'
 allow server/net 'core/base|server/net'
-allow server/rpc 'core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc)'
+allow server/rpc 'core/(base|catalogue|image/probe|trace)|server/(base|access|net|store|planning|storage|ops|rpc)'
 # Workers' calls include the streams of blobs.
 allow server/rpc/workers \
   'core/(base|catalogue)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|blobs|workers))'
 for folder in blobs jobs live scenes; do
   allow "server/rpc/$folder" \
-    "core/(base|catalogue|image/probe)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|$folder))"
+    "core/(base|catalogue|image/probe|trace)|server/(base|access|net|store|planning|storage|ops|rpc/(calls|$folder))"
 done
-allow server/rpc/calls 'core/(base|catalogue)|server/(base|access|net|store|planning|storage|ops|rpc/calls)'
+allow server/rpc/calls 'core/(base|catalogue|trace)|server/(base|access|net|store|planning|storage|ops|rpc/calls)'
 allow server/worker/supervision 'core/base|server/(store|ops|worker/supervision)'
 allow server/worker/live \
   'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/(live|remote))'
 allow server/worker/remote 'core/base|server/(base|ops|rpc/calls|storage|store|worker/remote)'
-allow client 'core/(base|catalogue|color|image(/probe)?|video)|client(/[a-z]+)?'
+allow client 'core/(base|catalogue|color|image(/probe)?|trace|video)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/zip core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \
@@ -174,6 +176,7 @@ public core/splat model/gaussian_cap model/gaussian_model model/memory_plan moti
   export/export export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene \
   training/hexplane_training
 public core/stage idle_stages run_stages film_import/import_film formats/artifact_io options/[a-z_]+
+public core/trace span trace_context trace_settings tracer
 public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path
 public core/weights safetensors weight_file weight_map weight_reader
@@ -185,7 +188,8 @@ public server/notify notifier webhook
 public server/planning asked_formats job_plan job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key time_budget
 public server/rpc calls/error_mapping calls/worker_messages rpc_server
 public server/storage ballast blob_cache blob_store collector data_folder disk_space file_blob_store upload_store worker_blobs s3/s3_blob_store s3/s3_check
-public server/store chore_store client_store job job_store open_store project_store worker_store sqlite_job_store postgresql/copy_store store_file user_models
+public server/store chore_store client_store job job_store open_store project_store shared_job_logs worker_store sqlite_job_store postgresql/copy_store store_file user_models
+public server/tracing job_spans
 public server/worker supervision/supervisor supervision/worker_settings
 
 # Branches on the kind of a capture belong to its tables (core/catalogue/captures) and to import, which

@@ -216,7 +216,7 @@ class Colorize {
   ExitCode Submit(const v1::JobSpec& spec,
                   std::vector<std::string> earlier,
                   const std::function<void(nlohmann::ordered_json)>& print) {
-    const v1::Job submitted = SubmitJob(*connection_, spec, options_.notify);
+    const v1::Job submitted = SubmitJob(*connection_, spec, options_.submission);
     if (options_.detach) return Detached(submitted);
     earlier.push_back(submitted.name());
     const v1::Job job = FollowToSuccess(*connection_, context_, earlier, out_.string(), display_);

@@ -60,5 +60,6 @@ void AddColorizerCommands(CLI::App& app, Context& context);
 void AddJobCommands(CLI::App& app, Context& context);
 void AddArtifactCommands(CLI::App& app, Context& context);
 void AddServerCommands(CLI::App& app, Context& context);
+void AddQueueCommands(CLI::App& server, Context& context);
 
 }  // namespace color3d::client

@@ -23,11 +23,15 @@ void PrintWarnings(Connection& connection, const Context& context, const v1::Job
 
 }  // namespace
 
-v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec, const std::string& notify_url) {
+v1::Job SubmitJob(Connection& connection, const v1::JobSpec& spec, const Submission& submission) {
   v1::CreateJobRequest request;
   *request.mutable_spec() = spec;
   request.set_request_id(NewUuid());
-  request.set_notify_url(notify_url);
+  request.set_notify_url(submission.notify);
+  if (submission.priority) request.set_priority(*submission.priority);
+  if (!submission.deadline.empty()) {
+    *request.mutable_deadline() = ParseDeadline(submission.deadline);
+  }
   return connection.Call(&v1::JobService::Stub::CreateJob, connection.jobs(), request);
 }
 

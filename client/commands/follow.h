@@ -8,14 +8,14 @@
 #include "client/commands/command.h"
 #include "client/lib/connection.h"
 #include "client/lib/progress_display.h"
+#include "client/options/submission.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {
 
-// `notify_url`: address that receives a notification at the end; empty: none.
 v1::Job SubmitJob(Connection& connection,
                   const v1::JobSpec& spec,
-                  const std::string& notify_url = "");
+                  const Submission& submission = {});
 
 // Returns true when all of them have ended (after a failure, stages that still run are not waited
 // for), false when the user pressed Ctrl-C. Throws CommandFailure{kUnreachable} with the command to

@@ -39,7 +39,7 @@ ExitCode PrintJob(const Context& context, const v1::Job& job) {
       context, job, fmt::format("{}  {}  {}\n", job.name(), job.kind(), StateName(job.state())));
 }
 
-ExitCode RunSubmit(const Context& context, const std::string& file, const std::string& notify) {
+ExitCode RunSubmit(const Context& context, const std::string& file, const Submission& submission) {
   const std::string text = file == "-" ? std::string(std::istreambuf_iterator<char>(std::cin), {})
                                        : ReadFile(file, kMaxSpecBytes);
   v1::JobSpec spec;
@@ -48,14 +48,14 @@ ExitCode RunSubmit(const Context& context, const std::string& file, const std::s
     throw InvalidArgument("{} is not a JobSpec in JSON: {}", file, std::string(status.message()));
   }
   Connection connection(context.server, *context.interrupt);
-  return PrintJob(context, SubmitJob(connection, spec, notify));
+  return PrintJob(context, SubmitJob(connection, spec, submission));
 }
 
 struct AllInOneArguments {
   std::vector<std::string> scenes;  // scenes/ID, or scenes/ID=jobs/ID with the job of the key view
   std::optional<int> iterations;
   bool again = false;
-  std::string notify;  // empty: no notification
+  Submission submission;
 };
 
 ExitCode RunAllInOne(const Context& context, const AllInOneArguments& arguments) {
@@ -73,7 +73,7 @@ ExitCode RunAllInOne(const Context& context, const AllInOneArguments& arguments)
   if (arguments.iterations) scenes->mutable_options()->set_iterations(*arguments.iterations);
   spec.set_scene(scenes->routes(0).scene());
   Connection connection(context.server, *context.interrupt);
-  return PrintJob(context, SubmitJob(connection, spec, arguments.notify));
+  return PrintJob(context, SubmitJob(connection, spec, arguments.submission));
 }
 
 ExitCode RunList(const Context& context, const std::string& parent, int limit) {
@@ -265,15 +265,13 @@ void AddJobCommands(CLI::App& app, Context& context) {
       ->needs(scenes_option);
   submit->add_flag("--again", all_in_one->again, "With --all-in-one: ignore the stage cache")
       ->needs(scenes_option);
-  submit->add_option("--notify",
-                     all_in_one->notify,
-                     "Address that receives a notification when the job has ended");
+  AddSubmissionFlags(*submit, &all_in_one->submission);
   submit->callback([&context, file, all_in_one] {
     if (file->empty() && all_in_one->scenes.empty()) {
       throw CLI::RequiredError("SPEC or --all-in-one");
     }
     context.action = [&context, file, all_in_one] {
-      return all_in_one->scenes.empty() ? RunSubmit(context, *file, all_in_one->notify)
+      return all_in_one->scenes.empty() ? RunSubmit(context, *file, all_in_one->submission)
                                         : RunAllInOne(context, *all_in_one);
     };
   });

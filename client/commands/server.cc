@@ -42,7 +42,7 @@ std::string UsageOfLimit(const std::string& used, const std::string& limit, bool
 std::string DescribeUsage(const v1::ProjectUsage& usage,
                           const std::string& label,
                           const std::string& role) {
-  return fmt::format("{} {}{}, {} stored, {} jobs unfinished\n",
+  return fmt::format("{} {}{}, {} stored, {} jobs unfinished{}\n",
                      label,
                      role.empty() ? "" : role + " in ",
                      usage.project().empty() ? "no project" : "the project " + usage.project(),
@@ -51,7 +51,8 @@ std::string DescribeUsage(const v1::ProjectUsage& usage,
                                   usage.max_stored_bytes() > 0),
                      UsageOfLimit(fmt::to_string(usage.unfinished_jobs()),
                                   fmt::to_string(usage.max_unfinished_jobs()),
-                                  usage.max_unfinished_jobs() > 0));
+                                  usage.max_unfinished_jobs() > 0),
+                     usage.weight() > 1 ? fmt::format(", weight {}", usage.weight()) : "");
 }
 
 std::string Describe(const v1::ServerInfo& info) {
@@ -188,6 +189,7 @@ void AddServerCommands(CLI::App& app, Context& context) {
     return RunServerInfo(context);
   });
   AddAdminCommands(server, context);
+  AddQueueCommands(*server, context);
   const auto name = std::make_shared<std::string>();
   AddCommand(*server,
              context,

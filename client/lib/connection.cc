@@ -25,32 +25,34 @@ constexpr std::chrono::minutes kPatienceWithFullServer{10};
 constexpr std::string_view kHttps = "https://";
 constexpr int kMaxMessageBytes = 64 << 20;  // a scene of 10,000 files with long names
 
-// Adds the token to every call. Call credentials would do so over TLS only.
-class TokenBearer : public grpc::experimental::Interceptor {
+using Metadata = std::vector<std::pair<std::string, std::string>>;
+
+// Adds token and trace to every call. Call credentials would add the token over TLS only.
+class MetadataBearer : public grpc::experimental::Interceptor {
  public:
-  explicit TokenBearer(const std::string& value) : value_(value) {}
+  explicit MetadataBearer(const Metadata& metadata) : metadata_(metadata) {}
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     using grpc::experimental::InterceptionHookPoints;
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
-      methods->GetSendInitialMetadata()->insert({"authorization", value_});
+      for (const auto& entry : metadata_) methods->GetSendInitialMetadata()->insert(entry);
     }
     methods->Proceed();
   }
 
  private:
-  const std::string& value_;
+  const Metadata& metadata_;
 };
 
-class TokenBearers : public grpc::experimental::ClientInterceptorFactoryInterface {
+class MetadataBearers : public grpc::experimental::ClientInterceptorFactoryInterface {
  public:
-  explicit TokenBearers(const std::string& token) : value_("Bearer " + token) {}
+  explicit MetadataBearers(Metadata metadata) : metadata_(std::move(metadata)) {}
   grpc::experimental::Interceptor* CreateClientInterceptor(
       grpc::experimental::ClientRpcInfo*) override {
-    return new TokenBearer(value_);
+    return new MetadataBearer(metadata_);
   }
 
  private:
-  const std::string value_;
+  const Metadata metadata_;
 };
 
 std::string ReadPem(const std::filesystem::path& file) {
@@ -86,7 +88,12 @@ std::shared_ptr<grpc::Channel> MakeChannel(const ServerTarget& server) {
   // http_proxy in the environment does not apply to this machine.
   if (is_here) arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
-  if (!server.token.empty()) interceptors.push_back(std::make_unique<TokenBearers>(server.token));
+  Metadata metadata;
+  if (!server.token.empty()) metadata.emplace_back("authorization", "Bearer " + server.token);
+  if (!server.traceparent.empty()) metadata.emplace_back("traceparent", server.traceparent);
+  if (!metadata.empty()) {
+    interceptors.push_back(std::make_unique<MetadataBearers>(std::move(metadata)));
+  }
   return grpc::experimental::CreateCustomChannelWithInterceptors(
       address, CredentialsFor(server), arguments, std::move(interceptors));
 }

@@ -48,6 +48,7 @@ struct ServerTarget {
   std::filesystem::path ca;                // PEM: roots in place of the system's; TLS
   std::filesystem::path certificate, key;  // PEM, for servers that require one; TLS
   std::string token;                       // empty: none
+  std::string traceparent = {};            // W3C, sent with each call; empty: none
   // Called when a busy server makes the client wait; may be empty.
   std::function<void(const std::string&)> on_wait = {};
   // Maximum time to wait for an unreachable server.

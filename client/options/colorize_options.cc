@@ -285,9 +285,7 @@ void DeclareOptions(CLI::App& app, ColorizeOptions* o) {
       "of several cameras, reconstructed as one dynamic scene");
   DeclareImportFlags(app, o);
   app.add_flag("--detach", o->detach, "Return once the job is submitted");
-  app.add_option("--notify",
-                 o->notify,
-                 "URL to notify when the job has ended; must be allowed by the server's operator");
+  AddSubmissionFlags(app, &o->submission);
   app.add_option(
       "--seed", o->seed, "Seed; the same seed gives the same result on the same machine");
   DeclareOptionFlags(app, o);

@@ -10,6 +10,7 @@
 #include "client/lib/photos/photo_folder.h"
 #include "client/options/additional_key_view.h"
 #include "client/options/key_color_flags.h"
+#include "client/options/submission.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {
@@ -32,7 +33,7 @@ struct ColorizeOptions {
   int keys = 1;        // benchmark only: number of key views, chosen together
   bool bound = false;  // benchmark only: also score the geometry with all true colours
   bool detach = false;
-  std::string notify;  // URL to notify when the job has ended; empty: none
+  Submission submission;
   bool hold_out = false;
   uint64_t seed = 0;                  // 0: the server's default
   double time_budget_seconds = 0.0;   // 0: none

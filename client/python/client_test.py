@@ -6,6 +6,7 @@ Exits with 77 (skipped) where a package is missing.
 """
 
 import csv
+import datetime
 import json
 import os
 import re
@@ -204,7 +205,12 @@ class ClientTest(unittest.TestCase):
         preset = SCRATCH / "bad.textproto"
         preset.write_text("personalize { iteration: 3 }")
         refuse("bad.textproto: .*iteration", spec, preset=str(preset))
-        job = self.client.submit(job_pb2.JobSpec(scene=scene, import_scene={}))
+        only_import = job_pb2.JobSpec(scene=scene, import_scene={})
+        with self.assertRaisesRegex(ValueError, "time zone"):
+            self.client.submit(only_import, deadline=datetime.datetime(2030, 1, 1))
+        deadline = datetime.datetime(2030, 1, 1, tzinfo=datetime.timezone.utc)
+        job = self.client.submit(only_import, priority=7, deadline=deadline)
+        self.assertEqual(job.deadline.ToSeconds(), int(deadline.timestamp()))
         [job] = self.client.wait([job.name])
         refuse("has no result 'none.png'; it has ", self.client.download, job, empty, ["none.png"])
         with self.assertRaises(color3d.RpcError) as refused:

@@ -138,11 +138,21 @@ class Sampled : public prometheus::Collectable {
         "1 if no job is started, by reason.",
         "reason",
         {{"paused", holds.contains(Hold::kPaused)}, {"storage", holds.contains(Hold::kStorage)}});
+    AddWorkers(families, now);
+  }
+
+  void AddWorkers(std::vector<MetricFamily>* families, int64_t now) const {
     int idle = 0, busy = 0, live = 0;
     double silent = 0.0;
+    WorkerRecord sum;
     for (const WorkerRecord& worker : store_.ListWorkers()) {
       ++(IsForLivePictures(worker) ? live : worker.job.empty() ? idle : busy);
       silent = std::max(silent, static_cast<double>(now - worker.heartbeat_ms) / 1000.0);
+      sum.threads += worker.threads;
+      sum.cache_bytes += worker.cache_bytes;
+      sum.cache_limit_bytes += worker.cache_limit_bytes;
+      sum.cache_hit_bytes += worker.cache_hit_bytes;
+      sum.cache_miss_bytes += worker.cache_miss_bytes;
     }
     AddByLabel(families,
                "color3d_workers",
@@ -154,6 +164,21 @@ class Sampled : public prometheus::Collectable {
         "Longest time since the last heartbeat of a worker.",
         MetricType::Gauge,
         silent);
+    Add(families,
+        "color3d_worker_threads",
+        "Threads that all workers compute with.",
+        MetricType::Gauge,
+        sum.threads);
+    AddByLabel(families,
+               "color3d_worker_cache_bytes",
+               "Files in the caches of all workers, and their limits.",
+               "kind",
+               {{"used", sum.cache_bytes}, {"limit", sum.cache_limit_bytes}});
+    AddByLabel(families,
+               "color3d_worker_read_bytes",
+               "Bytes of files that the present workers have read since their start.",
+               "source",
+               {{"cache", sum.cache_hit_bytes}, {"server", sum.cache_miss_bytes}});
   }
 
   void AddServer(std::vector<MetricFamily>* families) const {

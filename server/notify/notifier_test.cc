@@ -1,114 +1,23 @@
 #include "server/notify/notifier.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "server/notify/webhook.h"
+#include "tests/support/service/http_receiver.h"
 #include "tests/support/service/job_store_fixture.h"
 
 namespace color3d {
 namespace {
 using std::chrono::milliseconds;
 
-// Accepts requests one after the other and answers each with the next of `answers`; the last one
-// repeats. "hang" does not answer.
-class Receiver {
+class Receiver : public testing::HttpReceiver {
  public:
-  struct Request {
-    std::string line;
-    std::map<std::string, std::string> headers;  // names in lower case
-    std::string body;
-  };
-
-  explicit Receiver(std::vector<std::string> answers) : answers_(std::move(answers)) {
-    fd_ = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    ::bind(fd_, reinterpret_cast<sockaddr*>(&address), sizeof(address));
-    ::listen(fd_, 16);
-    socklen_t size = sizeof(address);
-    ::getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size);
-    port_ = ntohs(address.sin_port);
-    thread_ = std::thread([this] { Loop(); });
-  }
-  ~Receiver() {
-    ::shutdown(fd_, SHUT_RDWR);
-    ::close(fd_);
-    thread_.join();
-    for (const int hanging : hanging_) ::close(hanging);
-  }
-  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_) + "/hook"; }
-  std::vector<Request> requests() {
-    std::lock_guard lock(mutex_);
-    return requests_;
-  }
-  bool WaitFor(size_t count) {
-    for (int i = 0; i < 2000 && requests().size() < count; ++i) {
-      std::this_thread::sleep_for(milliseconds(5));
-    }
-    return requests().size() >= count;
-  }
-
- private:
-  void Loop() {
-    for (int fd = 0; (fd = ::accept(fd_, nullptr, nullptr)) >= 0;) {
-      const Request request = ReadOne(fd);
-      std::string answer;
-      {
-        std::lock_guard lock(mutex_);
-        answer = answers_[std::min(requests_.size(), answers_.size() - 1)];
-        requests_.push_back(request);
-      }
-      if (answer == "hang") {
-        hanging_.push_back(fd);
-        continue;
-      }
-      const std::string text = "HTTP/1.1 " + answer + "\r\nContent-Length: 0\r\n\r\n";
-      [[maybe_unused]] const ssize_t written = ::write(fd, text.data(), text.size());
-      ::close(fd);
-    }
-  }
-  static Request ReadOne(int fd) {
-    std::string text;
-    char bytes[4096];
-    size_t end = 0, length = 0;
-    while ((end = text.find("\r\n\r\n")) == std::string::npos || text.size() < end + 4 + length) {
-      const ssize_t got = ::read(fd, bytes, sizeof(bytes));
-      if (got <= 0) break;
-      text.append(bytes, static_cast<size_t>(got));
-      const size_t header = text.find("Content-Length: ");
-      if (header != std::string::npos) length = std::stoul(text.substr(header + 16));
-    }
-    Request request;
-    std::istringstream lines(text.substr(0, end));
-    std::getline(lines, request.line);
-    for (std::string line; std::getline(lines, line);) {
-      line.erase(line.find_last_not_of('\r') + 1);
-      const size_t colon = line.find(": ");
-      if (colon == std::string::npos) continue;
-      std::string name = line.substr(0, colon);
-      for (char& c : name) c = static_cast<char>(std::tolower(c));
-      request.headers[name] = line.substr(colon + 2);
-    }
-    request.body = text.substr(std::min(text.size(), end + 4));
-    return request;
-  }
-
-  std::vector<std::string> answers_;
-  int fd_ = -1, port_ = 0;
-  std::mutex mutex_;
-  std::vector<Request> requests_;
-  std::vector<int> hanging_;
-  std::thread thread_;
+  using testing::HttpReceiver::HttpReceiver;
+  std::string url() const { return testing::HttpReceiver::url("/hook"); }
 };
 
 class NotifierTest : public JobStoreTest {
@@ -160,7 +69,7 @@ TEST_F(NotifierTest, RetriesUntilAcceptedAndSigns) {
   const auto requests = receiver.requests();
   EXPECT_EQ(requests.size(), 3u) << "not sent again once accepted";
   for (const Receiver::Request& request : requests) {
-    EXPECT_EQ(request.line, "POST /hook HTTP/1.1\r");
+    EXPECT_EQ(request.line, "POST /hook HTTP/1.1");
     const std::string id = request.headers.at("webhook-id");
     EXPECT_EQ(id, requests[0].headers.at("webhook-id"));
     EXPECT_EQ(request.headers.at("webhook-signature"),

@@ -9,6 +9,7 @@
 #include "server/planning/job_spec.h"
 #include "server/planning/key_view_jobs.h"
 #include "server/planning/spec_check.h"
+#include "server/planning/spec_names.h"
 #include "server/planning/time_budget.h"
 
 namespace color3d {
@@ -192,6 +193,27 @@ v1::JobPlan DescribeGraph(const NewGraph& graph,
   plan.set_saved_seconds(saved);
   SetPeakMemory(&plan);
   return plan;
+}
+
+void SetNeeds(const SceneFacts& facts, const v1::ImportSceneSpec& import, NewGraph* graph) {
+  std::vector<v1::JobSpec> specs;
+  for (const NewJob& job : graph->jobs) specs.push_back(ParseSpec(job.spec, job.kind));
+  const v1::JobSpec* geometry = FindGeometry(specs, *graph);
+  for (size_t i = 0; i < specs.size(); ++i) {
+    if (IsComposite(specs[i])) continue;
+    JobNeeds needs;
+    const SpecNames names = NamesIn(specs[i]);
+    for (const NameUse& use : names.models) needs.models.push_back("model " + use.name);
+    for (const NameUse& use : names.backends) needs.models.push_back("backend " + use.name);
+    needs.batch_group = specs[i].personalize().encoder();
+    needs.memory_bytes = EstimatePeakBytes(
+        graph->jobs[i].kind,
+        WorkWithGeometry(specs[i],
+                         geometry == nullptr ? nullptr : &geometry->reconstruct_geometry(),
+                         facts,
+                         import));
+    graph->jobs[i].needs = std::move(needs);
+  }
 }
 
 }  // namespace color3d

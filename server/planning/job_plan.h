@@ -38,4 +38,8 @@ v1::JobPlan DescribeGraph(const NewGraph& graph,
                           const v1::ImportSceneSpec& import,
                           const MachineFactor& machine);
 
+// Sets what each job of the graph needs of a worker: memory, weights, model servers, and the
+// encoder that it can share in a batch. Composite jobs need nothing. `facts`: of the graph's scene.
+void SetNeeds(const SceneFacts& facts, const v1::ImportSceneSpec& import, NewGraph* graph);
+
 }  // namespace color3d

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -123,6 +124,32 @@ TEST(JobPlanTest, LeftOutStageSavesItsSeconds) {
   EXPECT_NEAR(
       StageIn(plan, kind::kCarryColor).expected_seconds(), carried.expected_seconds(), 1e-9);
   EXPECT_GT(plan.saved_seconds(), 1.0);
+}
+
+TEST(JobPlanTest, JobsNeedTheMemoryOfThePlanAndTheirModels) {
+  v1::JobSpec spec;
+  spec.set_scene("scenes/a");
+  spec.set_seed(1);
+  v1::KeyColorSource* source = spec.mutable_colorize_scene()->mutable_key_color();
+  source->set_automatic(true);
+  source->set_model("ddcolor");
+  spec.mutable_colorize_scene()->mutable_personalize()->set_encoder("convnext");
+  const SceneFacts facts{.pictures = 20};
+  NewGraph graph = PlanJob(spec, {}, facts);
+  SetNeeds(facts, {}, &graph);
+  const v1::JobPlan plan = DescribeGraph(graph, facts, {}, {});
+  std::map<std::string, JobNeeds> needs;
+  for (const NewJob& job : graph.jobs) needs[job.kind] = job.needs;
+  for (const v1::PlannedStage& stage : plan.stages()) {
+    if (!stage.runs()) continue;
+    EXPECT_EQ(needs.at(stage.kind()).memory_bytes, stage.expected_peak_memory_bytes())
+        << stage.kind();
+  }
+  EXPECT_EQ(needs.at(kind::kColorizeKeyView).models, std::vector<std::string>{"model ddcolor"});
+  EXPECT_EQ(needs.at(kind::kPersonalize).models, std::vector<std::string>{"model convnext"});
+  EXPECT_EQ(needs.at(kind::kPersonalize).batch_group, "convnext");
+  EXPECT_TRUE(needs.at(kind::kColorizeScene).models.empty()) << "it only reports";
+  EXPECT_EQ(needs.at(kind::kColorizeScene).memory_bytes, 0);
 }
 
 TEST(JobPlanTest, PeakMemoryIsMaximumOfStagesThatRun) {

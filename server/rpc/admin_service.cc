@@ -67,6 +67,48 @@ void CollectNow(const RpcParts& parts,
   response->set_bytes(bytes);
 }
 
+// `now_ms`: by the server's clock.
+v1::QueuedJob ToQueuedProto(const JobRecord& job, int64_t now_ms) {
+  const int64_t since_ms = job.state == JobState::kRunning ? job.start_ms : job.queued_since_ms;
+  v1::QueuedJob entry;
+  entry.set_name(job.name);
+  entry.set_parent(job.parent);
+  entry.set_kind(job.kind);
+  entry.set_project(job.project);
+  entry.set_priority(job.priority);
+  entry.set_state(StateToProto(job.state));
+  entry.set_worker(job.state == JobState::kRunning ? job.worker : job.preferred_worker);
+  entry.set_seconds(since_ms == 0 ? 0.0 : static_cast<double>(now_ms - since_ms) / 1000.0);
+  entry.set_memory_bytes(job.needs.memory_bytes);
+  if (job.deadline_ms != kNoDeadline) *entry.mutable_deadline() = ToTimestamp(job.deadline_ms);
+  return entry;
+}
+
+void DescribeQueue(const RpcParts& parts,
+                   const v1::ListQueueRequest& request,
+                   v1::ListQueueResponse* response) {
+  constexpr int kWaiting = 50;
+  const int asked = request.max_waiting_jobs();
+  if (asked < 0 || asked > kMaxListed) {
+    throw InvalidArgument("max_waiting_jobs is {}; the range is 1 to {}", asked, kMaxListed);
+  }
+  const int64_t now = parts.clock();
+  for (const JobRecord& job : parts.store.ListQueue(asked == 0 ? kWaiting : asked)) {
+    v1::QueuedJob* entry = response->add_jobs();
+    *entry = ToQueuedProto(job, now);
+    if (job.state == JobState::kQueued) {
+      entry->set_waits_for(parts.store.PlaceInQueue(job).waits_for);
+    }
+  }
+  const JobCounts counts = parts.store.CountJobs();
+  response->set_waiting_jobs(counts.queued - counts.blocked);
+  response->set_blocked_jobs(counts.blocked);
+  if (counts.oldest_queued_ms != 0) {
+    response->set_longest_wait_seconds(static_cast<double>(now - counts.oldest_queued_ms) / 1000.0);
+  }
+  response->set_waits_for(HoldReason(parts));
+}
+
 class AdminServiceImpl final : public v1::AdminService::CallbackService {
  public:
   explicit AdminServiceImpl(const RpcParts& parts) : parts_(parts) {}
@@ -123,6 +165,32 @@ class AdminServiceImpl final : public v1::AdminService::CallbackService {
       for (const ProjectRecord& project : parts_.store.ListProjects()) {
         *response->add_projects() = ToProto(project, parts_.limits);
       }
+    });
+  }
+
+  ServerUnaryReactor* SetProjectWeight(CallbackServerContext* context,
+                                       const v1::SetProjectWeightRequest* request,
+                                       v1::ProjectUsage* response) override {
+    return AnswerAdmin(parts_, context, request, response, [=, this](const Call& call) {
+      if (!request->project().empty()) CheckProject(request->project());
+      if (request->weight() < 1 || request->weight() > kMaxProjectWeight) {
+        throw InvalidArgument(
+            "weight is {}; the range is 1 to {}", request->weight(), kMaxProjectWeight);
+      }
+      *response = ToProto(parts_.store.SetProjectWeight(request->project(), request->weight()),
+                          parts_.limits);
+      spdlog::warn("{} has set the weight of the project '{}' to {}",
+                   CallerName(call.caller),
+                   request->project(),
+                   request->weight());
+    });
+  }
+
+  ServerUnaryReactor* ListQueue(CallbackServerContext* context,
+                                const v1::ListQueueRequest* request,
+                                v1::ListQueueResponse* response) override {
+    return AnswerAdmin(parts_, context, request, response, [=, this](const Call&) {
+      DescribeQueue(parts_, *request, response);
     });
   }
 

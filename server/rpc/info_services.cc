@@ -69,6 +69,27 @@ bool IsVisibleTo(const Call& call, const std::string& job) {
   }
 }
 
+void ListWorkers(const RpcParts& parts, const Call& call, v1::ServerInfo* info) {
+  for (const WorkerRecord& worker : parts.store.ListWorkers()) {
+    v1::WorkerInfo* entry = info->add_workers();
+    entry->set_worker_id(worker.worker_id);
+    entry->set_pid(worker.pid);
+    if (IsVisibleTo(call, worker.job)) entry->set_job(worker.job);
+    entry->set_memory_bytes(worker.memory_bytes);
+    entry->set_heartbeat_age_seconds((parts.clock() - worker.heartbeat_ms) / 1000.0);
+    entry->set_machine(worker.machine);
+    entry->set_release(worker.release);
+    entry->set_threads(worker.threads);
+    entry->set_memory_limit_bytes(worker.memory_limit_bytes);
+    entry->set_simd(worker.simd);
+    entry->set_cache_bytes(worker.cache_bytes);
+    entry->set_cache_limit_bytes(worker.cache_limit_bytes);
+    entry->set_cache_hit_bytes(worker.cache_hit_bytes);
+    entry->set_cache_miss_bytes(worker.cache_miss_bytes);
+    entry->set_finished_jobs(worker.finished_jobs);
+  }
+}
+
 class ColorizerServiceImpl final : public v1::ColorizerService::CallbackService {
  public:
   ColorizerServiceImpl(const RpcParts& parts, ColorizeHub& hub) : parts_(parts), hub_(hub) {}
@@ -129,14 +150,7 @@ class ServerServiceImpl final : public v1::ServerService::CallbackService {
           limits->set_max_image_side_px(parts_.limits.max_image_side_px);
           limits->set_max_unfinished_jobs(parts_.limits.max_unfinished_jobs);
           limits->set_max_chunk_bytes(parts_.limits.max_chunk_bytes);
-          for (const WorkerRecord& worker : parts_.store.ListWorkers()) {
-            v1::WorkerInfo* entry = response->add_workers();
-            entry->set_worker_id(worker.worker_id);
-            entry->set_pid(worker.pid);
-            if (IsVisibleTo(call, worker.job)) entry->set_job(worker.job);
-            entry->set_memory_bytes(worker.memory_bytes);
-            entry->set_heartbeat_age_seconds((parts_.clock() - worker.heartbeat_ms) / 1000.0);
-          }
+          ListWorkers(parts_, call, response);
           ListPresets(response);
           ListModels(parts_, response);
           ListBackends(parts_, response);

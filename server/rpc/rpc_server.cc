@@ -111,10 +111,10 @@ RpcServer::RpcServer(const RpcServerOptions& options,
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.limits.max_connection_calls);
   for (const auto& service : services_) builder.RegisterService(service.get());
   std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
-  interceptors.push_back(
-      MakeCallWatch(options.on_call,
-                    {[this](const std::string& peer) { gate_->BeginCall(peer); },
-                     [this](const std::string& peer) { gate_->EndCall(peer); }}));
+  interceptors.push_back(MakeCallWatch(options.on_call,
+                                       {[this](const std::string& peer) { gate_->BeginCall(peer); },
+                                        [this](const std::string& peer) { gate_->EndCall(peer); }},
+                                       options.tracer));
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
   server_ = builder.BuildAndStart();
   if (!server_) {

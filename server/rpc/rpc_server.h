@@ -42,7 +42,7 @@ struct RpcServerOptions {
   std::string version = "0";
   UserModels models;
   BackendProbe probe_backends;              // empty: backends are listed without probing
-  std::filesystem::path job_logs;           // folder of DataPaths::JobLogs; empty: no logs
+  std::shared_ptr<JobLogs> job_logs;        // null: no logs
   std::vector<std::string> notify_allowed;  // see CheckNotifyUrl
   std::function<void()> drain = [] {};      // called by AdminService.Drain
   std::function<bool()> make_room;          // frees disk space for a deletion; may be empty
@@ -51,6 +51,7 @@ struct RpcServerOptions {
   ColorizeLimits live;
   std::string worker_socket;  // gRPC address for workers on this machine; empty: none
   WorkerTimes worker_times;
+  std::shared_ptr<Tracer> tracer;  // records calls; null: does not
 };
 
 class RpcServer {

@@ -66,6 +66,11 @@ int64_t BlobCache::bytes() const {
   return bytes_;
 }
 
+CacheUse BlobCache::use() const {
+  const MutexLock lock(mutex_);
+  return {bytes_, budget_bytes_, hit_bytes_, miss_bytes_};
+}
+
 void BlobCache::Pin(const std::string& sha256) {
   const MutexLock lock(mutex_);
   Entry& entry = entries_[sha256];
@@ -89,12 +94,16 @@ void BlobCache::Use(const std::string& sha256,
   }
   Pin(sha256);
   const std::shared_ptr<void> unpin(nullptr, [&](void*) { Unpin(sha256); });
-  MakeReady(sha256, fill);
+  const bool was_filled = MakeReady(sha256, fill);
+  {
+    const MutexLock lock(mutex_);
+    (was_filled ? miss_bytes_ : hit_bytes_) += entries_.at(sha256).bytes;
+  }
   NoteUse(PathOf(sha256));
   use(PathOf(sha256));
 }
 
-void BlobCache::MakeReady(const std::string& sha256,
+bool BlobCache::MakeReady(const std::string& sha256,
                           const std::function<void(const fs::path&)>& fill) {
   bool present = false;
   {
@@ -102,7 +111,7 @@ void BlobCache::MakeReady(const std::string& sha256,
     Entry& entry = entries_.at(sha256);
     while (entry.filling) filled_.Wait(mutex_);
     std::error_code none;
-    if (entry.present && entry.verified && fs::exists(PathOf(sha256), none)) return;
+    if (entry.present && entry.verified && fs::exists(PathOf(sha256), none)) return false;
     entry.filling = true;
     present = entry.present;
   }
@@ -114,7 +123,10 @@ void BlobCache::MakeReady(const std::string& sha256,
   const fs::path file = PathOf(sha256);
   if (present) {
     std::error_code none;
-    if (fs::exists(file, none) && DigestFile(file).sha256 == sha256) return Accept(sha256, file);
+    if (fs::exists(file, none) && DigestFile(file).sha256 == sha256) {
+      Accept(sha256, file);
+      return false;
+    }
     spdlog::warn("the cached file {} is damaged; it is fetched again", file.string());
     fs::remove(file, none);
   }
@@ -123,6 +135,7 @@ void BlobCache::MakeReady(const std::string& sha256,
   ::chmod(part.c_str(), 0444);
   PublishFile(part, file);
   Accept(sha256, file);
+  return true;
 }
 
 void BlobCache::Accept(const std::string& sha256, const fs::path& file) {
@@ -137,8 +150,10 @@ void BlobCache::Accept(const std::string& sha256, const fs::path& file) {
 }
 
 void BlobCache::Put(const fs::path& file, const FileDigest& digest) {
-  Use(
-      digest.sha256, [&](const fs::path& part) { fs::rename(file, part); }, [](const fs::path&) {});
+  Pin(digest.sha256);
+  const std::shared_ptr<void> unpin(nullptr, [&](void*) { Unpin(digest.sha256); });
+  MakeReady(digest.sha256, [&](const fs::path& part) { fs::rename(file, part); });
+  NoteUse(PathOf(digest.sha256));
   std::error_code none;
   fs::remove(file, none);  // if the cache had the blob already
 }

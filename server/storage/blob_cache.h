@@ -15,6 +15,14 @@
 
 namespace color3d {
 
+// Use of a cache, bytes.
+struct CacheUse {
+  int64_t bytes = 0;
+  int64_t limit_bytes = 0;
+  int64_t hit_bytes = 0;   // used, and present before
+  int64_t miss_bytes = 0;  // used, and filled for it
+};
+
 class BlobCache {
  public:
   using Path = std::filesystem::path;
@@ -32,6 +40,7 @@ class BlobCache {
   // filesystem.
   void Put(const Path& file, const FileDigest& digest);
   int64_t bytes() const;
+  CacheUse use() const;
 
  private:
   struct Entry {
@@ -46,8 +55,9 @@ class BlobCache {
   Path PathOf(const std::string& sha256) const { return folder_ / sha256; }
   void Pin(const std::string& sha256);
   void Unpin(const std::string& sha256);
-  // Fills or verifies the blob unless that is done. Requires: it is pinned.
-  void MakeReady(const std::string& sha256, const std::function<void(const Path&)>& fill);
+  // Fills or verifies the blob unless that is done; returns whether it was filled. Requires: it is
+  // pinned.
+  bool MakeReady(const std::string& sha256, const std::function<void(const Path&)>& fill);
   void Accept(const std::string& sha256, const Path& file);
   // Removes files beyond the budget.
   void Trim() COLOR3D_REQUIRES(mutex_);
@@ -59,6 +69,8 @@ class BlobCache {
   std::map<std::string, Entry> entries_ COLOR3D_GUARDED_BY(mutex_);
   int64_t bytes_ COLOR3D_GUARDED_BY(mutex_) = 0;
   int64_t uses_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  int64_t hit_bytes_ COLOR3D_GUARDED_BY(mutex_) = 0;
+  int64_t miss_bytes_ COLOR3D_GUARDED_BY(mutex_) = 0;
 };
 
 }  // namespace color3d

@@ -28,6 +28,7 @@ struct NewJob {
   std::vector<std::string> input_jobs;  // names of existing jobs
   std::vector<std::string> blobs;       // digests in the spec; kept as long as the job
   std::string skip_reason;              // not empty: skipped by the plan
+  JobNeeds needs;
 };
 
 // The last job is the submitted one; all others become its children.
@@ -35,8 +36,9 @@ struct NewGraph {
   std::string project;
   std::string scene;  // stored
   std::string notify_url;
-  std::string trace;  // trace id of the call, for logs; may be empty
+  std::string trace;  // W3C traceparent of the call; may be empty
   int priority = 100;
+  int64_t deadline_ms = kNoDeadline;
   std::vector<NewJob> jobs;
 };
 
@@ -119,6 +121,9 @@ struct JobCounts {
   int64_t notifications = 0;  // not delivered yet
 };
 
+// Range of the weight of a project.
+constexpr int kMaxProjectWeight = 100;
+
 class ClientStore : public virtual CommonStore {
  public:
   // Creates a scene. Requires: `record.name` is set; id and times are ignored. Throws
@@ -168,6 +173,9 @@ class ClientStore : public virtual CommonStore {
   // Throws kInvalidArgument for a child of a submitted job.
   virtual JobRecord Pin(const std::string& name, bool pinned) = 0;
   virtual QueuePlace PlaceInQueue(const JobRecord& job) = 0;
+  // Returns the running jobs, oldest start first, then at most `max_waiting` jobs that wait for a
+  // worker, in the order of their turns. Without spec and artifacts; at most 1,000 of each.
+  virtual std::vector<JobRecord> ListQueue(int max_waiting) = 0;
 
   // Events.
   virtual int64_t NewestRevision() = 0;
@@ -189,6 +197,8 @@ class ClientStore : public virtual CommonStore {
   // Sorted by name. A project exists once it has had a job or a blob.
   virtual std::vector<ProjectRecord> ListProjects() = 0;
   virtual ProjectRecord GetProject(const std::string& name) = 0;
+  // Requires: 1 <= weight <= kMaxProjectWeight. Creates the project if there is none.
+  virtual ProjectRecord SetProjectWeight(const std::string& name, int weight) = 0;
   // Lets the project read the blob, which counts towards its quota.
   virtual void HoldBlob(const std::string& project, const FileDigest& blob) = 0;
   // Returns those of these blobs that the project may read.

@@ -70,6 +70,15 @@ struct JobError {
 };
 JobError MakeJobError(ErrorReason reason, std::string message);
 
+constexpr int64_t kNoDeadline = INT64_MAX;
+
+// What a worker must have to run a job.
+struct JobNeeds {
+  int64_t memory_bytes = 0;         // expected peak memory; 0: unknown
+  std::vector<std::string> models;  // weights and model servers: "model NAME", "backend NAME"
+  std::string batch_group;          // jobs of a kind with equal groups may share a batch
+};
+
 struct JobRecord {
   int64_t id = 0;      // ascending in order of creation
   std::string name;    // "jobs/..."
@@ -81,6 +90,9 @@ struct JobRecord {
   JobState state = JobState::kBlocked;
   bool cancel_requested = false;
   int priority = 100;
+  int64_t deadline_ms = kNoDeadline;
+  JobNeeds needs;
+  std::string preferred_worker;  // as it is stored; empty: any
   int attempt = 0;
   int max_attempts = 3;
   int64_t lease_epoch = 0;
@@ -93,7 +105,7 @@ struct JobRecord {
   bool cached = false;
   bool pinned = false;
   std::string notify_url;  // notified when the job ends; empty: none
-  std::string trace;       // W3C trace id of the call, 32 hexadecimal digits, or empty
+  std::string trace;       // W3C traceparent of the call, in old jobs its trace id; or empty
   std::optional<FileDigest> checkpoint;
   int64_t queued_ms = 0;        // time spent waiting for a worker before the present wait
   int64_t queued_since_ms = 0;  // begin of the present wait; 0: not waiting
@@ -148,6 +160,16 @@ struct WorkerRecord {
   std::string job;  // empty: idle
   int64_t memory_bytes = 0;
   int64_t heartbeat_ms = 0;
+  std::string machine;
+  std::string release;
+  int threads = 0;
+  int64_t memory_limit_bytes = 0;  // that its jobs may take; 0: unknown
+  std::string simd;                // of core/simd/instruction_set.h
+  int64_t cache_bytes = 0;
+  int64_t cache_limit_bytes = 0;  // 0: it has no cache
+  int64_t cache_hit_bytes = 0;    // since its start
+  int64_t cache_miss_bytes = 0;
+  int64_t finished_jobs = 0;
 };
 
 // Scenes of different projects may have the same name: a scene of a project is stored as
@@ -164,6 +186,7 @@ struct ProjectRecord {
   int64_t row_bytes = 0;
   int64_t scenes = 0;
   int64_t uncommitted_scenes = 0;
+  int weight = 1;  // share of the workers, 1 to 100
 };
 
 // Returns 16 random lower-case hexadecimal digits from the system's random source.

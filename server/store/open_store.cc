@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <thread>
 #include <utility>
 
 #include "core/base/error.h"
@@ -20,27 +19,12 @@ std::string HostName() {
   return name.data();
 }
 
-// Events of a file are not announced.
-bool PollForEvent(JobStore& store, int64_t revision, std::chrono::milliseconds limit) {
-  constexpr std::chrono::milliseconds kPause{100};
-  const auto end = std::chrono::steady_clock::now() + limit;
-  while (store.NewestRevision() <= revision) {
-    if (std::chrono::steady_clock::now() >= end) return false;
-    std::this_thread::sleep_for(kPause);
-  }
-  return true;
-}
-
 OpenedStore OpenSqlite(const std::filesystem::path& file, StoreOptions options) {
   RequireLocalFolder(file.parent_path());
   OpenedStore opened;
-  auto store = std::make_unique<SqliteJobStore>(
+  opened.store = std::make_unique<SqliteJobStore>(
       file, StoreRole::kServer, SystemClocks(), std::move(options));
   opened.has_chores = [] { return true; };
-  opened.wait_for_event = [store = store.get()](int64_t revision, std::chrono::milliseconds limit) {
-    return PollForEvent(*store, revision, limit);
-  };
-  opened.store = std::move(store);
   opened.name = file.string();
   return opened;
 }
@@ -51,9 +35,7 @@ OpenedStore OpenPostgresql(const std::string& address, StoreOptions options) {
   auto store = std::make_unique<PostgresqlJobStore>(
       address, StoreRole::kServer, std::nullopt, std::move(options));
   opened.has_chores = [store = store.get()] { return store->HasChores(); };
-  opened.wait_for_event = [store = store.get()](int64_t revision, std::chrono::milliseconds limit) {
-    return store->WaitForEvent(revision, limit);
-  };
+  opened.job_logs = store.get();
   opened.store = std::move(store);
   opened.name = WithoutPassword(address);
   return opened;

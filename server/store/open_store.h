@@ -1,13 +1,13 @@
 // The store that `serve --store` names.
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
 
 #include "server/store/job_store.h"
+#include "server/store/shared_job_logs.h"
 #include "server/store/sql_job_store.h"
 
 namespace color3d {
@@ -17,9 +17,8 @@ struct OpenedStore {
   std::string name;  // without password, for logs
   // Returns true if this server runs the chores that one of all servers runs. Outlived by `store`.
   std::function<bool()> has_chores;
-  // Waits until there is an event after this revision, at most `limit`; returns true if there is
-  // one. Outlived by `store`.
-  std::function<bool(int64_t revision, std::chrono::milliseconds limit)> wait_for_event;
+  // Part of `store`; null: job logs are files of this server.
+  SharedJobLogs* job_logs = nullptr;
 };
 
 // Opens the PostgreSQL database of `address`, or the SQLite file if it is empty, as a server, by

@@ -14,7 +14,9 @@ TEST_P(QueueTest, HeldQueueGivesNoJobAndReason) {
   for (const Hold hold : {Hold::kPaused, Hold::kStorage}) {
     store_->SetHold(hold, true);
     EXPECT_FALSE(store_->Claim("w", kLease).has_value());
-    EXPECT_FALSE(store_->ClaimForBatch("w", kLease, "single", [](const auto&) { return true; }));
+    ClaimTerms for_batch{.worker = "w", .lease_ms = kLease};
+    for_batch.batch_kind = "single";
+    EXPECT_FALSE(store_->Claim(for_batch));
     EXPECT_NE(store_->PlaceInQueue(job).waits_for, "");
     Open();
     EXPECT_EQ(store_->Holds().count(hold), 1u) << "over a restart, too";

@@ -4,7 +4,7 @@
 
 namespace color3d {
 
-constexpr int kSchemaVersion = 6;
+constexpr int kSchemaVersion = 7;
 
 // Since version 4. A project holds the blobs that it uploaded and the results of its jobs.
 #define COLOR3D_PROJECT_TABLES                                                                  \
@@ -68,6 +68,27 @@ constexpr int kSchemaVersion = 6;
   "create index scene_file_scene on scene_file(scene_id);"                             \
   "create index scene_file_blob on scene_file(sha256);"
 
+// Since version 7: needs, deadlines and preferred workers of jobs, weights of projects.
+#define COLOR3D_PLACEMENT                                                                      \
+  "alter table job add column deadline_ms integer not null default 9223372036854775807;"       \
+  "alter table job add column needs_memory_bytes integer not null default 0;"                  \
+  "alter table job add column needs_models text not null default '';"                          \
+  "alter table job add column batch_group text not null default '';"                           \
+  "alter table job add column preferred_worker text not null default '';"                      \
+  "alter table job add column preferred_until_ms integer not null default 0;"                  \
+  "create index job_next on job(project, priority, deadline_ms, job_id) where state='QUEUED';" \
+  "create index job_models on job(needs_models) where state='QUEUED' and needs_models<>'';"    \
+  "alter table project add column weight integer not null default 1;"                          \
+  "drop table worker;"                                                                         \
+  "create table worker(worker_id text primary key, pid integer not null, job text not null, "  \
+  "memory_bytes integer not null, heartbeat_ms integer not null, "                             \
+  "machine text not null default '', release text not null default '', "                       \
+  "threads integer not null default 0, memory_limit_bytes integer not null default 0, "        \
+  "simd text not null default '', cache_bytes integer not null default 0, "                    \
+  "cache_limit_bytes integer not null default 0, cache_hit_bytes integer not null default 0, " \
+  "cache_miss_bytes integer not null default 0, "                                              \
+  "finished_jobs integer not null default 0) without rowid;"
+
 // From version 1 to 2, from 2 to 3 and so on.
 constexpr const char* kMigrations[kSchemaVersion - 1] = {
     "alter table scene add column key_color_job text not null default ''",
@@ -124,7 +145,8 @@ constexpr const char* kMigrations[kSchemaVersion - 1] = {
     "scene.project=project.name)+(select coalesce(sum(row_bytes), 0) from job where "
     "job.project=project.name)+4096*(select count(*) from blob_holding h where "
     "h.project=project.name)+300*(select count(*) from request_id r where "  //
-    COLOR3D_REQUEST_PROJECT("r.id") "=project.name)"};
+    COLOR3D_REQUEST_PROJECT("r.id") "=project.name)",
+    COLOR3D_PLACEMENT};
 
 constexpr char kSchema[] = R"sql(
 create table scene(
@@ -223,6 +245,6 @@ create table meta(name text primary key, value integer not null) without rowid;
 insert into meta values('compacted_revision', 0), ('collected_steady_ms', 0),
   ('requests_steady_ms', 0), ('requests_age_ms', 0), ('requests_noted_ms', 0),
   ('scenes_steady_ms', 0);
-)sql" COLOR3D_SCENE_FILES COLOR3D_PROJECT_TABLES COLOR3D_ACCOUNTS;
+)sql" COLOR3D_SCENE_FILES COLOR3D_PROJECT_TABLES COLOR3D_ACCOUNTS COLOR3D_PLACEMENT;
 
 }  // namespace color3d

@@ -2,6 +2,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <compare>
 
 #include "core/base/text/utf8.h"
 #include "server/base/service_error.h"
@@ -38,66 +39,125 @@ const std::string kClaimable =
 // Other workers may claim the first ones meanwhile.
 constexpr size_t kMaxCandidates = 16;
 
+// Workers that were silent for longer are not counted on.
+constexpr int64_t kWorkerSilenceMs = 60'000;
+
+// Sets of models (needs_models) of waiting jobs that the worker has; none if it has all.
+std::vector<std::string> RunnableModelSets(SqlDatabase& db, const ClaimTerms& terms) {
+  if (!terms.models) return {};
+  std::vector<std::string> sets = {""};
+  SqlStatement waiting(
+      db, "select distinct needs_models from job where state='QUEUED' and needs_models<>''");
+  while (waiting.Step()) {
+    const std::string set = waiting.Text(0);
+    const bool has_all = std::ranges::all_of(
+        SplitLines(set), [&](const std::string& model) { return terms.models->contains(model); });
+    if (has_all) sets.push_back(set);
+  }
+  return sets;
+}
+
+// "?5,?6,?7"
+std::string Parameters(size_t first, size_t count) {
+  std::string text;
+  for (size_t i = 0; i < count; ++i) text += fmt::format("{}?{}", i == 0 ? "" : ",", first + i);
+  return text;
+}
+
+// Neither a project nor a submitted job keeps out the jobs of another. ?4: kind.
+std::string BesideOthers(size_t group_parameter) {
+  return fmt::format(
+      "and kind=?4 and batch_group=?{} and lost_attempts=0 and joins_key='' and not exists("
+      "select 1 from job o where o.state='QUEUED' and o.kind<>?4 and o.run_after_ms<=?1 and "
+      "o.joins_key='' and (o.priority, o.job_id)<(job.priority, job.job_id)) "
+      "order by priority, (select count(*) from job r where r.state='RUNNING' and "
+      "r.project=job.project)*100/coalesce((select weight from project where name=job.project), "
+      "1), (select count(*) from job r where r.state='RUNNING' and "
+      "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
+      "limit {}",
+      group_parameter,
+      kMaxCandidates);
+}
+
+std::vector<int64_t> FirstForBatch(SqlStatement waiting) {
+  return waiting.All([](const SqlStatement& row) { return row.Int(0); });
+}
+
+// `select(rest, project)` starts a statement for waiting jobs of a project. Asking for each project
+// finds its first jobs by an index, where sorting all waiting jobs would take long.
+template <typename Select>
+std::vector<int64_t> FirstInTurn(SqlDatabase& db, const Select& select) {
+  struct Candidate {
+    int64_t priority, turn, deadline_ms, id;
+    auto operator<=>(const Candidate&) const = default;
+  };
+  const std::string first =
+      fmt::format("and project=?4 order by priority, deadline_ms, job_id limit {}", kMaxCandidates);
+  std::vector<Candidate> found;
+  SqlStatement projects(db,
+                        "select name, turn from project where exists(select 1 from job where "
+                        "state='QUEUED' and project=project.name)");
+  const auto waiting =
+      projects.All([](const SqlStatement& row) { return std::pair(row.Text(0), row.Int(1)); });
+  for (const auto& [project, turn] : waiting) {
+    SqlStatement jobs = select(first, project);
+    while (jobs.Step()) found.push_back({jobs.Int(1), turn, jobs.Int(2), jobs.Int(0)});
+  }
+  std::ranges::sort(found);
+  std::vector<int64_t> ids;
+  for (const Candidate& candidate : found) {
+    if (ids.size() == kMaxCandidates) break;
+    ids.push_back(candidate.id);
+  }
+  return ids;
+}
+
 bool IsRetryable(ErrorCode code) {
   return code == ErrorCode::kUnavailable || code == ErrorCode::kAborted;
 }
 
 }  // namespace
 
-std::optional<JobRecord> SqlJobStore::Claim(const std::string& worker, int64_t lease_ms) {
-  return ClaimAccepted(worker, lease_ms, [](const JobRecord&) { return true; });
-}
-
-std::optional<JobRecord> SqlJobStore::ClaimAccepted(const std::string& worker,
-                                                    int64_t lease_ms,
-                                                    const JobChoice& accept) {
-  // The project whose turn was last comes after all others of the same priority.
-  constexpr char kOrder[] =
-      "order by priority, coalesce((select turn from project where name=job.project), 0), job_id";
-  return ClaimFirst(worker, lease_ms, Waiting(kOrder, "", accept));
-}
-
-std::optional<JobRecord> SqlJobStore::ClaimForBatch(const std::string& worker,
-                                                    int64_t lease_ms,
-                                                    const std::string& kind,
-                                                    const JobChoice& accept) {
-  // Neither a project nor a submitted job keeps out the jobs of another.
-  constexpr char kBatch[] =
-      "and kind=?2 and lost_attempts=0 and joins_key='' and not exists("
-      "select 1 from job o where o.state='QUEUED' and o.kind<>?2 and o.run_after_ms<=?1 and "
-      "o.joins_key='' and (o.priority, o.job_id)<(job.priority, job.job_id)) "
-      "order by priority, (select count(*) from job r where r.state='RUNNING' and "
-      "r.project=job.project), (select count(*) from job r where r.state='RUNNING' and "
-      "coalesce(nullif(r.parent,''), r.name)=coalesce(nullif(job.parent,''), job.name)), job_id "
-      "limit 16";
-  return ClaimFirst(worker, lease_ms, Waiting(kBatch, kind, accept));
-}
-
-std::vector<int64_t> SqlJobStore::Waiting(const std::string& rest,
-                                          const std::string& kind,
-                                          const JobChoice& accept) {
+std::vector<int64_t> SqlJobStore::FindSuitable(const ClaimTerms& terms) {
   return connections_->Read([&](SqlDatabase& db) {
-    std::vector<int64_t> ids;
-    SqlStatement select(db, SelectJob(kClaimable + rest), SteadyNow(db));
-    if (!kind.empty()) select.Bind(kind);
-    while (ids.size() < kMaxCandidates && select.Step()) {
-      const JobRecord job = JobFromRow(select);
-      if (accept(job)) ids.push_back(job.id);
-    }
-    return ids;
+    const bool has_most_memory = !SqlStatement(db,
+                                               "select 1 from worker where memory_limit_bytes>? "
+                                               "and heartbeat_ms>? limit 1",
+                                               terms.memory_limit_bytes,
+                                               Now(db) - kWorkerSilenceMs)
+                                      .Step();
+    // ?2: worker; ?3: memory limit, 0: none; ?4: of the rest; then sets of models.
+    std::string suits = kClaimable +
+                        "and (preferred_until_ms<=?1 or preferred_worker=?2) and (?3=0 or "
+                        "needs_memory_bytes<=?3) ";
+    const std::vector<std::string> sets = RunnableModelSets(db, terms);
+    if (terms.models) suits += fmt::format("and needs_models in({}) ", Parameters(5, sets.size()));
+    const auto select = [&](const std::string& rest, const std::string& parameter) {
+      SqlStatement statement(db,
+                             "select job_id, priority, deadline_ms from job " + suits + rest,
+                             SteadyNow(db),
+                             Qualified(terms.worker),
+                             has_most_memory ? int64_t{0} : terms.memory_limit_bytes,
+                             parameter);
+      for (const std::string& set : sets) statement.Bind(set);
+      if (!terms.batch_kind.empty()) statement.Bind(terms.batch_group);
+      return statement;
+    };
+    return terms.batch_kind.empty()
+               ? FirstInTurn(db, select)
+               : FirstForBatch(select(BesideOthers(5 + sets.size()), terms.batch_kind));
   });
 }
 
-std::optional<JobRecord> SqlJobStore::ClaimFirst(const std::string& worker,
-                                                 int64_t lease_ms,
-                                                 const std::vector<int64_t>& candidates) {
+std::optional<JobRecord> SqlJobStore::Claim(const ClaimTerms& terms) {
+  const std::vector<int64_t> candidates = FindSuitable(terms);
   if (candidates.empty()) return std::nullopt;  // an idle worker only reads
   return connections_->Write([&](SqlDatabase& db) -> std::optional<JobRecord> {
-    const std::string claim =
+    const std::string still_waits =
         "select job_id from job " + kClaimable + "and job_id=?2" + db.dialect().claim_lock;
     for (const int64_t id : candidates) {
-      if (!SqlStatement(db, claim, SteadyNow(db), id).Step()) continue;
-      return BeginAttempt(db, id, worker, lease_ms);
+      if (!SqlStatement(db, still_waits, SteadyNow(db), id).Step()) continue;
+      return BeginAttempt(db, id, terms.worker, terms.lease_ms);
     }
     return std::nullopt;
   });
@@ -117,9 +177,12 @@ JobRecord SqlJobStore::BeginAttempt(SqlDatabase& db,
       SteadyNow(db) + lease_ms,
       Now(db),
       id);
+  // An idle project keeps the claim to one turn.
   db.Run(
-      "update project set turn=(select max(turn)+1 from project) where name="
-      "(select project from job where job_id=?)",
+      "update project set turn=?1/weight+(select case when m.newest-?1>project.turn then "
+      "m.newest-?1 else project.turn end from (select max(turn) as newest from project) m) where "
+      "name=(select project from job where job_id=?2)",
+      kProjectTurn,
       id);
   db.Run(
       "insert into job_attempt(job_id, epoch, worker, start_ms) "
@@ -128,6 +191,20 @@ JobRecord SqlJobStore::BeginAttempt(SqlDatabase& db,
       id);
   AddEvent(db, id, /*progress=*/false);
   return JobById(db, id);
+}
+
+void SqlJobStore::PreferWorker(SqlDatabase& db, int64_t job_id, int64_t earlier) {
+  SqlStatement worker(db,
+                      "select worker_id from worker join job e on e.job_id=? and "
+                      "worker_id=e.lease_owner and (worker.job='' or (worker.job=e.name and "
+                      "e.state='SUCCEEDED')) where cache_limit_bytes>0 and heartbeat_ms>?",
+                      earlier,
+                      Now(db) - kWorkerSilenceMs);
+  if (!worker.Step()) return;
+  db.Run("update job set preferred_worker=?, preferred_until_ms=? where job_id=?",
+         worker.Text(0),
+         SteadyNow(db) + options_.preference_ms,
+         job_id);
 }
 
 std::vector<JobRecord> SqlJobStore::GetInputs(int64_t job_id) {

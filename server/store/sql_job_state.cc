@@ -85,8 +85,13 @@ void SqlJobStore::QueueReadyDependants(SqlDatabase& db, int64_t job_id) {
                    "where d.input_id=? and j.state='BLOCKED' order by d.job_id",
                    job_id)
           .All([](const SqlStatement& row) { return row.Int(0); });
+  // The worker that has the results can run one job: the others are for all workers at once.
+  bool is_first = true;
   for (const int64_t dependant : dependants) {
-    if (InputsAreReady(db, dependant)) SetState(db, dependant, JobState::kQueued);
+    if (!InputsAreReady(db, dependant)) continue;
+    SetState(db, dependant, JobState::kQueued);
+    if (is_first) PreferWorker(db, dependant, job_id);
+    is_first = false;
   }
 }
 
@@ -174,6 +179,8 @@ void SqlJobStore::InsertJob(SqlDatabase& db,
   record.spec = job.spec;
   record.state = skipped ? JobState::kSkipped : JobState::kBlocked;
   record.priority = graph.priority;
+  record.deadline_ms = graph.deadline_ms;
+  record.needs = job.needs;
   record.max_attempts = options_.max_attempts;
   record.skip_reason = job.skip_reason;
   record.skipped_by_plan = skipped;
@@ -194,6 +201,13 @@ void SqlJobStore::InsertJob(SqlDatabase& db,
   for (const std::string& blob : blobs) db.Run("insert into job_blob values(?,?)", id, blob);
   if (!skipped && InputsAreReady(db, id)) {
     SetState(db, id, JobState::kQueued);
+    PreferWorker(db,
+                 id,
+                 SqlStatement(db,
+                              "select job_id from job where scene=? and lease_owner<>'' order by "
+                              "job_id desc limit 1",
+                              record.scene)
+                     .NextInt());
   } else {
     AddEvent(db, id, /*progress=*/false);
   }

@@ -291,15 +291,10 @@ WorkerRecord SqlJobStore::AsTold(WorkerRecord worker) const {
 
 void SqlJobStore::UpdateWorker(const WorkerRecord& worker) {
   connections_->WriteUnsynced([&](SqlDatabase& db) {
-    db.Run(
-        "insert into worker values(?,?,?,?,?) on conflict(worker_id) do update set "
-        "pid=excluded.pid, job=excluded.job, memory_bytes=excluded.memory_bytes, "
-        "heartbeat_ms=excluded.heartbeat_ms",
-        Qualified(worker.worker_id),
-        worker.pid,
-        worker.job,
-        worker.memory_bytes,
-        Now(db));
+    WorkerRecord stored = worker;
+    stored.worker_id = Qualified(worker.worker_id);
+    stored.heartbeat_ms = Now(db);
+    StoreWorkerRow(db, std::move(stored));
   });
 }
 
@@ -311,12 +306,9 @@ void SqlJobStore::RemoveWorker(const std::string& worker_id) {
 
 std::vector<WorkerRecord> SqlJobStore::ListWorkers() {
   return connections_->Read([&](SqlDatabase& db) -> std::vector<WorkerRecord> {
-    return SqlStatement(db,
-                        "select worker_id, pid, job, memory_bytes, heartbeat_ms from worker order "
-                        "by worker_id")
-        .All([&](const SqlStatement& row) {
-          return AsTold({row.Text(0), row.Int(1), row.Text(2), row.Int(3), row.Int(4)});
-        });
+    std::vector<WorkerRecord> workers = SelectWorkers(db);
+    for (WorkerRecord& worker : workers) worker = AsTold(std::move(worker));
+    return workers;
   });
 }
 

@@ -17,6 +17,8 @@ struct StoreOptions {
   int max_attempts = 3;
   // Delay before the first retry of a failed or lost attempt; doubles with each attempt.
   int64_t retry_backoff_ms = 2'000;
+  // Time for which a job is left to the worker that holds its files.
+  int64_t preference_ms = 3'000;
   std::string program_version;  // recorded in the store
   // When a server opens a SQLite store, leases of other starts of the machine end.
   std::string boot_id = BootId();
@@ -64,14 +66,8 @@ class SqlJobStore : public JobStore {
   JobRecord Pin(const std::string& name, bool pinned) override;
   QueuePlace PlaceInQueue(const JobRecord& job) override;
 
-  std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override;
-  std::optional<JobRecord> ClaimAccepted(const std::string& worker,
-                                         int64_t lease_ms,
-                                         const JobChoice& accept) override;
-  std::optional<JobRecord> ClaimForBatch(const std::string& worker,
-                                         int64_t lease_ms,
-                                         const std::string& kind,
-                                         const JobChoice& accept) override;
+  using WorkerStore::Claim;
+  std::optional<JobRecord> Claim(const ClaimTerms& terms) override;
   std::vector<JobRecord> GetInputs(int64_t job_id) override;
   HeartbeatReply Heartbeat(const Lease& lease,
                            const ProgressRecord& progress,
@@ -91,6 +87,8 @@ class SqlJobStore : public JobStore {
   void UpdateWorker(const WorkerRecord& worker) override;
   void RemoveWorker(const std::string& worker_id) override;
   std::vector<WorkerRecord> ListWorkers() override;
+  std::vector<JobRecord> ListQueue(int max_waiting) override;
+  ProjectRecord SetProjectWeight(const std::string& name, int weight) override;
 
   int64_t NewestRevision() override;
   std::vector<EventRecord> EventsSince(int64_t revision, int limit) override;
@@ -175,15 +173,11 @@ class SqlJobStore : public JobStore {
   // State machine (sql_job_state.cc).
   void AddEvent(SqlDatabase& db, int64_t job_id, bool progress);
   void SetState(SqlDatabase& db, int64_t job_id, JobState state);
-  // Returns the first jobs that may be claimed and that `accept` takes. `rest` ends the statement;
-  // `kind` is its parameter ?2, if not empty.
-  std::vector<int64_t> Waiting(const std::string& rest,
-                               const std::string& kind,
-                               const JobChoice& accept);
-  // Claims the first of these jobs that still waits.
-  std::optional<JobRecord> ClaimFirst(const std::string& worker,
-                                      int64_t lease_ms,
-                                      const std::vector<int64_t>& candidates);
+  // Returns the ids of the first waiting jobs that suit the terms, the next one first.
+  std::vector<int64_t> FindSuitable(const ClaimTerms& terms);
+  // Leaves the job for some seconds to the worker that ran the job `earlier`, if that worker has a
+  // cache of blobs and runs nothing else.
+  void PreferWorker(SqlDatabase& db, int64_t job_id, int64_t earlier);
   JobRecord BeginAttempt(SqlDatabase& db,
                          int64_t job_id,
                          const std::string& worker,

@@ -1,6 +1,8 @@
 // Projects and their blobs, holds of the queue, age limits, notifications.
 #include <fmt/core.h>
 
+#include <algorithm>
+
 #include "server/store/sql_database.h"
 #include "server/store/sql_job_store.h"
 #include "server/store/sql_rows.h"
@@ -14,13 +16,30 @@ const char* NameOf(Hold hold) { return hold == Hold::kPaused ? "hold_paused" : "
 std::string SelectProject(const SqlDatabase& db, const char* tail) {
   return fmt::format(
       "select name, bytes, (select count(*) from job where end_ms=0 and {}job.project="
-      "project.name), row_bytes, scenes, uncommitted from project {}",
+      "project.name), row_bytes, scenes, uncommitted, weight from project {}",
       db.dialect().unindexed,
       tail);
 }
 
 ProjectRecord ProjectFromRow(const SqlStatement& row) {
-  return {row.Text(0), row.Int(1), row.Int(2), row.Int(3), row.Int(4), row.Int(5)};
+  return {row.Text(0),
+          row.Int(1),
+          row.Int(2),
+          row.Int(3),
+          row.Int(4),
+          row.Int(5),
+          static_cast<int>(row.Int(6))};
+}
+
+// Returns whether workers are idle and only busy ones have this much memory.
+bool NeedsBusyWorker(SqlDatabase& db, int64_t bytes) {
+  SqlStatement workers(db,
+                       "select coalesce(max(case when job='' then memory_limit_bytes end), 0), "
+                       "coalesce(max(memory_limit_bytes), 0) from worker where "
+                       "memory_limit_bytes>0");
+  if (!workers.Step()) return false;
+  const int64_t idle = workers.Int(0), any = workers.Int(1);
+  return idle > 0 && idle < bytes && any > idle;
 }
 
 }  // namespace
@@ -35,6 +54,16 @@ ProjectRecord SqlJobStore::GetProject(const std::string& name) {
   return connections_->Read([&](SqlDatabase& db) -> ProjectRecord {
     SqlStatement select(db, SelectProject(db, "where name=?"), name);
     return select.Step() ? ProjectFromRow(select) : ProjectRecord{name};
+  });
+}
+
+ProjectRecord SqlJobStore::SetProjectWeight(const std::string& name, int weight) {
+  return connections_->Write([&](SqlDatabase& db) -> ProjectRecord {
+    db.Run("insert into project(name) values(?) on conflict do nothing", name);
+    db.Run("update project set weight=? where name=?", weight, name);
+    SqlStatement select(db, SelectProject(db, "where name=?"), name);
+    select.Step();
+    return ProjectFromRow(select);
   });
 }
 
@@ -109,15 +138,41 @@ std::set<Hold> SqlJobStore::Holds() {
   });
 }
 
+std::vector<JobRecord> SqlJobStore::ListQueue(int max_waiting) {
+  constexpr int kMaxListed = 1000;
+  return connections_->Read([&](SqlDatabase& db) -> std::vector<JobRecord> {
+    std::vector<JobRecord> jobs =
+        SqlStatement(
+            db,
+            SelectJobWithoutSpec("where state='RUNNING' order by start_ms, job_id limit ?"),
+            kMaxListed)
+            .All(JobFromRow);
+    // The k-th job of a project has the project's turn after k claims.
+    SqlStatement next(db,
+                      "select job_id from (select job_id, priority, project, row_number() over("
+                      "partition by project, priority order by deadline_ms, job_id) as k from job "
+                      "where state='QUEUED') q join "
+                      "project p on p.name=q.project order by priority, turn+k*?/weight, job_id "
+                      "limit ?",
+                      kProjectTurn,
+                      std::min(max_waiting, kMaxListed));
+    for (const int64_t id : next.All([](const SqlStatement& row) { return row.Int(0); })) {
+      SqlStatement select(db, SelectJobWithoutSpec("where job_id=?"), id);
+      if (select.Step()) jobs.push_back(JobFromRow(select));
+    }
+    return jobs;
+  });
+}
+
 QueuePlace SqlJobStore::PlaceInQueue(const JobRecord& job) {
   if (job.state != JobState::kQueued && job.state != JobState::kBlocked) return {};
   return connections_->Read([&](SqlDatabase& db) -> QueuePlace {
     // For a submitted job whose stages all wait: its first stage.
     SqlStatement first(
         db,
-        "select priority, job_id, run_after_ms, joins_key from job where (name=?1 or parent=?1) "
-        "and "
-        "state='QUEUED' and not exists(select 1 from job where parent=?1 and state='RUNNING') "
+        "select priority, job_id, run_after_ms, joins_key, needs_memory_bytes from job where "
+        "(name=?1 or parent=?1) and state='QUEUED' and not exists(select 1 from job where "
+        "parent=?1 and state='RUNNING') "
         "order by priority, job_id limit 1",
         job.name);
     if (!first.Step()) return {};
@@ -143,6 +198,9 @@ QueuePlace SqlJobStore::PlaceInQueue(const JobRecord& job) {
       place.waits_for = fmt::format("its next attempt, in {} s", (pause_ms + 999) / 1000);
     } else if (!first.Text(3).empty()) {
       place.waits_for = "a running job with equal work";
+    } else if (const int64_t bytes = first.Int(4); NeedsBusyWorker(db, bytes)) {
+      place.waits_for =
+          fmt::format("a worker with {} MiB of memory; the idle ones have less", bytes >> 20);
     }
     return place;
   });

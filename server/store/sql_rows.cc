@@ -27,6 +27,11 @@ void VisitColumns(JobRecord& job, Visit&& visit) {
   visit("state", job.state);
   visit("cancel_requested", job.cancel_requested);
   visit("priority", job.priority);
+  visit("deadline_ms", job.deadline_ms);
+  visit("needs_memory_bytes", job.needs.memory_bytes);
+  visit("needs_models", job.needs.models);
+  visit("batch_group", job.needs.batch_group);
+  visit("preferred_worker", job.preferred_worker);
   visit("attempt", job.attempt);
   visit("max_attempts", job.max_attempts);
   visit("lease_epoch", job.lease_epoch);
@@ -75,6 +80,26 @@ void VisitColumns(SceneRecord& scene, Visit&& visit) {
   visit("commit_ms", scene.commit_ms);
   visit("key_color_job", scene.key_color_job);
   visit("row_bytes", scene.row_bytes);
+}
+
+// `worker_id` is the key.
+template <typename Visit>
+void VisitColumns(WorkerRecord& worker, Visit&& visit) {
+  visit("worker_id", worker.worker_id);
+  visit("pid", worker.pid);
+  visit("job", worker.job);
+  visit("memory_bytes", worker.memory_bytes);
+  visit("heartbeat_ms", worker.heartbeat_ms);
+  visit("machine", worker.machine);
+  visit("release", worker.release);
+  visit("threads", worker.threads);
+  visit("memory_limit_bytes", worker.memory_limit_bytes);
+  visit("simd", worker.simd);
+  visit("cache_bytes", worker.cache_bytes);
+  visit("cache_limit_bytes", worker.cache_limit_bytes);
+  visit("cache_hit_bytes", worker.cache_hit_bytes);
+  visit("cache_miss_bytes", worker.cache_miss_bytes);
+  visit("finished_jobs", worker.finished_jobs);
 }
 
 template <typename T>
@@ -178,6 +203,27 @@ SceneRecord SceneFromRow(const SqlStatement& row) { return RecordFromRow<SceneRe
 
 int64_t InsertSceneRow(SqlDatabase& db, const SceneRecord& scene) {
   return InsertRow(db, "scene", scene);
+}
+
+std::vector<WorkerRecord> SelectWorkers(SqlDatabase& db) {
+  static const std::string select = fmt::format("select {} from worker order by worker_id",
+                                                fmt::join(ColumnNames<WorkerRecord>(), ", "));
+  return SqlStatement(db, select).All(RecordFromRow<WorkerRecord>);
+}
+
+void StoreWorkerRow(SqlDatabase& db, WorkerRecord worker) {
+  static const std::string store = [] {
+    const std::vector<std::string> names = ColumnNames<WorkerRecord>();
+    std::vector<std::string> updates;
+    for (size_t i = 1; i < names.size(); ++i) updates.push_back(names[i] + "=excluded." + names[i]);
+    return fmt::format("insert into worker({}) values({}) on conflict(worker_id) do update set {}",
+                       fmt::join(names, ", "),
+                       fmt::join(std::vector<const char*>(names.size(), "?"), ","),
+                       fmt::join(updates, ", "));
+  }();
+  SqlStatement statement(db, store);
+  VisitColumns(worker, [&](const char*, const auto& value) { Write(statement, value); });
+  statement.Step();
 }
 
 std::string JoinLines(const std::vector<std::string>& lines) {

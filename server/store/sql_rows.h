@@ -1,4 +1,4 @@
-// Jobs and scenes as rows of the database; internal to the store.
+// Jobs, scenes and workers as rows of the database; internal to the store.
 #pragma once
 
 #include <string>
@@ -8,6 +8,9 @@
 #include "server/store/sql_database.h"
 
 namespace color3d {
+
+// Amount by which a claim moves the turn of a project with weight 1; divisible by most weights.
+constexpr int64_t kProjectTurn = 5'040'000;
 
 // Returns "select <columns> from job <tail>"; JobFromRow reads its rows, without artifacts.
 std::string SelectJob(const std::string& tail);
@@ -21,6 +24,11 @@ int64_t InsertJobRow(SqlDatabase& db, const JobRecord& job);
 std::string SelectScene(const std::string& tail);
 SceneRecord SceneFromRow(const SqlStatement& row);
 int64_t InsertSceneRow(SqlDatabase& db, const SceneRecord& scene);
+
+// Returns the workers, sorted by id.
+std::vector<WorkerRecord> SelectWorkers(SqlDatabase& db);
+// Inserts or replaces a worker.
+void StoreWorkerRow(SqlDatabase& db, WorkerRecord worker);
 
 // Warnings are stored as lines of one text; those beyond 64 KiB are dropped.
 std::string JoinLines(const std::vector<std::string>& lines);

@@ -106,7 +106,9 @@ void RecordServerIdentity(SqliteDatabase& db, const ServerIdentity& identity) {
     db.Exec(
         "update meta set value=0 where name in('collected_steady_ms', "
         "'expiry_steady_ms', 'requests_steady_ms', 'scenes_steady_ms')");
-    db.Exec("update job set run_after_ms=0 where end_ms=0 and run_after_ms<>0");
+    db.Exec(
+        "update job set run_after_ms=0, preferred_until_ms=0 where end_ms=0 and "
+        "(run_after_ms<>0 or preferred_until_ms<>0)");
   }
   db.Run(
       "insert into server values(1, ?, ?) on conflict(id) do update set "

@@ -1,8 +1,9 @@
 // Part of the job store that workers call. All writes are fenced by the lease (common_store.h).
 #pragma once
 
-#include <functional>
+#include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -21,25 +22,31 @@ struct Publication {
   JobUsage usage;
 };
 
-// Returns whether the worker takes the job.
-using JobChoice = std::function<bool(const JobRecord&)>;
+// Call of a worker for a job.
+struct ClaimTerms {
+  std::string worker;
+  int64_t lease_ms = 0;
+  // Memory that its jobs may take; 0: unknown. Jobs that need more are left to workers with more,
+  // if there are any.
+  int64_t memory_limit_bytes = 0;
+  // Weights and model servers that the worker has, as in JobNeeds; unset: all that jobs may need.
+  std::optional<std::set<std::string>> models;
+  // Not empty: a job of this kind and group, to run beside those that the worker already holds.
+  // Skips jobs that have lost a worker and jobs behind a waiting job of another kind.
+  std::string batch_kind;
+  std::string batch_group;
+};
 
 class WorkerStore : public virtual CommonStore {
  public:
-  // Claims the next job unless the queue is held: smallest priority first, then the project that
-  // has waited longest since its last turn.
-  virtual std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) = 0;
-  // The same, without the jobs that `accept` rejects. `accept` may be called twice for a job.
-  virtual std::optional<JobRecord> ClaimAccepted(const std::string& worker,
-                                                 int64_t lease_ms,
-                                                 const JobChoice& accept) = 0;
-  // Claims a job of this kind to run beside those that the worker already holds. Skips jobs that
-  // have lost a worker, jobs behind a waiting job of another kind, and jobs that `accept` rejects.
-  // Prefers the project, then the submitted job, with the fewest running jobs.
-  virtual std::optional<JobRecord> ClaimForBatch(const std::string& worker,
-                                                 int64_t lease_ms,
-                                                 const std::string& kind,
-                                                 const JobChoice& accept) = 0;
+  // Claims the next job that the worker can run, unless the queue is held: smallest priority first,
+  // then the project that has used least of its share, then the earliest deadline; for a batch the
+  // project, then the submitted job, with the fewest running jobs. A job that prefers another
+  // worker is left to it for some seconds.
+  virtual std::optional<JobRecord> Claim(const ClaimTerms& terms) = 0;
+  std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) {
+    return Claim(ClaimTerms{.worker = worker, .lease_ms = lease_ms});
+  }
   // Extends the lease and stores progress, seconds and warnings. Cheap: not synced to disk.
   virtual HeartbeatReply Heartbeat(const Lease& lease,
                                    const ProgressRecord& progress,

@@ -17,6 +17,7 @@
 #include "server/planning/job_spec.h"
 #include "server/planning/key_view_jobs.h"
 #include "server/planning/stage_key.h"
+#include "server/worker/attempt_trace.h"
 #include "server/worker/blob_checkpoints.h"
 #include "server/worker/stage_summaries.h"
 #include "server/worker/told_paths.h"
@@ -68,6 +69,7 @@ class Attempt {
       : context_(context),
         job_(job),
         tag_(AttemptTag(job)),
+        trace_(context.tracer, job),
         scratch_(context.paths.Scratch() /
                  (job.name.substr(job.name.find('/') + 1) + "-" + std::to_string(job.lease_epoch))),
         keeper_(
@@ -106,6 +108,7 @@ class Attempt {
   const AttemptContext& context_;
   const JobRecord job_;
   const std::string tag_;
+  AttemptTrace trace_;
   const fs::path scratch_;
   StageRun run_;
   std::string stage_key_;
@@ -123,7 +126,7 @@ class Attempt {
 void Attempt::Run() {
   spdlog::info("{} begins {} of {}", tag_, job_.kind, job_.scene);
   try {
-    Prepare();
+    trace_.InPart("read inputs", [&] { Prepare(); });
     if (!ServeFromCache() && !JoinEqual()) Compute();
   } catch (const Error& e) {
     // Exceptions of libraries become internal errors with their text.
@@ -142,6 +145,7 @@ void Attempt::Run() {
                     ? OutOfMemory(e)
                     : JobError{ErrorCode::kInternal, "", std::string("unexpected: ") + e.what()});
   }
+  trace_.End(keeper_.Usage());
 }
 
 JobError Attempt::OutOfMemory(const std::exception& e) const {
@@ -163,7 +167,7 @@ void Attempt::Prepare() {
   run_.project = job_.project;
   run_.spec = ParseSpec(job_.spec, job_.name);
   run_.threads = context_.threads;
-  run_.trace = job_.trace;
+  run_.traceparent = trace_.traceparent();
   run_.attempt = job_.attempt;
   run_.models = context_.models;
   run_.scene_folder = scratch_ / "scene";
@@ -274,6 +278,7 @@ bool Attempt::ServeFromCache() {
   publication.cached = true;
   publication.usage = earlier->usage;
   context_.store.Publish(keeper_.lease(), publication);
+  trace_.SetOutcome("cached");
   spdlog::info("{} served from the stage cache ({})", tag_, earlier->name);
   return true;
 }
@@ -282,16 +287,18 @@ bool Attempt::JoinEqual() {
   if (run_.spec.skip_cache() || stage_key_.empty()) return false;
   if (!context_.store.JoinEqual(keeper_.lease(), stage_key_)) return false;
   keeper_.Stop();
+  trace_.SetOutcome("waits for equal work");
   spdlog::info("{} waits for a job that does equal work", tag_);
   return true;
 }
 
 void Attempt::Compute() {
   LinkedBlobs blobs(context_.blobs, scratch_ / "blobs");
-  const StageOutput output =
-      context_.runner.Run(run_, blobs, checkpoints_, keeper_, keeper_.token());
+  const StageOutput output = trace_.InPart("run", [&] {
+    return context_.runner.Run(run_, blobs, checkpoints_, keeper_, keeper_.token());
+  });
   RequireModelsUnchanged();
-  Publish(output);
+  trace_.InPart("publish", [&] { Publish(output); });
 }
 
 void Attempt::Publish(const StageOutput& output) {
@@ -331,6 +338,7 @@ void Attempt::Publish(const StageOutput& output) {
   keeper_.Stop();  // a heartbeat after the end would look like a lost lease
   context_.store.Publish(keeper_.lease(), publication);
   checkpoints_.RemoveNewest();
+  trace_.SetOutcome("succeeded");
   LogEnd("succeeded");
 }
 
@@ -373,6 +381,7 @@ void Attempt::HandleError(const JobError& found) {
 
 void Attempt::ReportEnd(WorkerStore& store, StopReason reason, const JobError& error) {
   const JobUsage usage = keeper_.Usage();
+  trace_.SetOutcome(reason, error);
   switch (reason) {
     case StopReason::kLeaseLost:
       spdlog::warn("{} lost its lease; nothing is published", tag_);
@@ -408,6 +417,7 @@ void Attempt::GiveUp(StopReason reason) {
     spdlog::error("{} cannot report its end: {}", tag_, e.what());
   }
   spdlog::critical("{} does not stop; the worker process ends with it", tag_);
+  trace_.EndProcess(keeper_.Usage());
   spdlog::shutdown();
   ::_exit(3);
 }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <string>
 
+#include "core/trace/tracer.h"
 #include "server/storage/data_folder.h"
 #include "server/storage/worker_blobs.h"
 #include "server/store/user_models.h"
@@ -32,6 +33,7 @@ struct AttemptContext {
   const std::atomic<bool>& draining;
   // Called on the heartbeat thread while a job runs.
   std::function<void(const JobRecord&)> on_heartbeat;
+  Tracer* tracer = nullptr;  // records the attempt; null: does not
 };
 
 // Requeues the job without counting the attempt. Does not throw.

@@ -77,6 +77,7 @@ bool WaitFor(const std::function<bool()>& condition) {
 // The seed of a job selects its scenario.
 constexpr uint64_t kPlain = 1;  // two submissions: one joins the other
 constexpr uint64_t kDrained = 2, kCancelled = 3, kBatched = 4;
+constexpr char kBatchedGroup[] = "batched";
 
 // Data folder with jobs from submission to end.
 class World {
@@ -135,6 +136,7 @@ class World {
       NewJob job;
       job.kind = kind;
       job.spec = spec.SerializeAsString();
+      if (seed == kBatched) job.needs.batch_group = kBatchedGroup;
       if (!graph.jobs.empty()) job.inputs = {0};
       graph.jobs.push_back(job);
     }
@@ -213,13 +215,11 @@ class World {
     return job;
   }
   std::optional<JobRecord> ClaimConcurrently(const JobRecord& job) {
-    const auto accept = [](const JobRecord& other) {
-      return ParseSpec(other.spec, other.name).seed() == kBatched;
-    };
+    ClaimTerms terms{.worker = "worker", .lease_ms = timing_.lease.count()};
+    terms.batch_kind = job.kind;
+    terms.batch_group = kBatchedGroup;
     std::optional<JobRecord> other;
-    Try([&] {
-      other = failing_store_.ClaimForBatch("worker", timing_.lease.count(), job.kind, accept);
-    });
+    Try([&] { other = failing_store_.Claim(terms); });
     return other;
   }
   void Attempt(const JobRecord& job) {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/base/memory.h"
+#include "core/trace/trace_context.h"
 #include "server/ops/process.h"
 
 namespace color3d {
@@ -19,7 +20,7 @@ std::string AttemptTag(const JobRecord& job) {
                      job.name,
                      job.attempt,
                      job.trace.empty() ? "" : " trace=",
-                     job.trace);
+                     TraceIdOf(job.trace));
 }
 
 LeaseKeeper::LeaseKeeper(WorkerStore& store,

@@ -165,8 +165,7 @@ class CoreStageRunner : public StageRunner {
     setup.models = run.models.files;
     setup.remote_colorizers = [&run](const std::string& name) {
       GrpcColorizerOptions options;
-      // Each attempt is a span.
-      if (!run.trace.empty()) options.traceparent = "00-" + run.trace + "-" + NewId() + "-01";
+      options.traceparent = run.traceparent;
       return MakeGrpcColorizer(run.models.backends, name, options);
     };
     setup.attempt = run.job_name + "/" + std::to_string(run.attempt);

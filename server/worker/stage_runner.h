@@ -26,9 +26,9 @@ class BlobSource {
 };
 
 struct StageRun {
-  std::string job_name;  // "jobs/..."
-  std::string trace;     // W3C trace id of the call that made the job; empty: none
-  std::string project;   // project of the job; scenes of a batch take turns by project
+  std::string job_name;     // "jobs/..."
+  std::string traceparent;  // W3C traceparent for calls of the stage; empty: none
+  std::string project;      // project of the job; scenes of a batch take turns by project
   v1::JobSpec spec;
   std::filesystem::path scene_folder;  // the scene's files under their manifest paths, read-only
   // Artifacts of the input jobs by artifact name (read-only files).

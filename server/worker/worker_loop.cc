@@ -4,17 +4,17 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <set>
 #include <thread>
 
-#include "color3d/v1/job.pb.h"
 #include "core/base/memory.h"
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/ops/process.h"
-#include "server/planning/spec_names.h"
 #include "server/worker/attempt.h"
 #include "server/worker/attempt_batch.h"
 #include "server/worker/remote/server_access.h"
+#include "server/worker/remote/worker_place.h"
 
 namespace color3d {
 namespace {
@@ -22,24 +22,12 @@ namespace {
 // Free memory required for another scene: decoder, optimiser, averages and activations.
 constexpr int64_t kSceneMemoryBytes = int64_t{512} << 20;
 
-// Also empty for a damaged spec, which the attempt reports.
-std::string EncoderOf(const JobRecord& job) {
-  v1::JobSpec spec;
-  spec.ParseFromString(job.spec);
-  return spec.personalize().encoder();
-}
-
-bool HasAll(const std::vector<NameUse>& uses, const auto& entries) {
-  return std::ranges::all_of(uses, [&](const NameUse& use) { return entries.contains(use.name); });
-}
-
-// Returns whether the worker has the weights and knows the model servers that the job names; also
-// true for a damaged spec.
-bool HasModels(const JobRecord& job, const UserModels& models) {
-  v1::JobSpec spec;
-  spec.ParseFromString(job.spec);
-  const SpecNames names = NamesIn(spec);
-  return HasAll(names.models, models.files) && HasAll(names.backends, models.backends);
+// As in JobNeeds.
+std::set<std::string> NamesOfModels(const UserModels& models) {
+  std::set<std::string> names;
+  for (const auto& [name, file] : models.files) names.insert("model " + name);
+  for (const auto& [name, address] : models.backends) names.insert("backend " + name);
+  return names;
 }
 
 // The server refuses this worker, and would do so again.
@@ -59,6 +47,7 @@ class WorkerLoop {
       : options_(options),
         id_(options.name + "-" + std::to_string(::getpid())),
         paths_(options.data_folder),
+        server_(server),
         store_(server.store()),
         heartbeat_store_(server.heartbeat_store()),
         draining_(draining),
@@ -74,7 +63,17 @@ class WorkerLoop {
                  options_.models,
                  digests_,
                  draining,
-                 [this](const JobRecord& job) { ReportSelf(heartbeat_store_, job.name); }} {}
+                 [this](const JobRecord& job) { ReportSelf(heartbeat_store_, job.name); },
+                 options_.tracer.get()} {
+    const int64_t memory = std::min(MachineMemoryBytes(), OwnMemoryLimitBytes());
+    facts_.worker_id = id_;
+    facts_.pid = ::getpid();
+    facts_.machine = HostName();
+    facts_.release = options_.release;
+    facts_.threads = options_.threads;
+    facts_.memory_limit_bytes = memory == INT64_MAX ? 0 : memory;
+    facts_.simd = options_.simd;
+  }
 
   void Run();
 
@@ -89,26 +88,24 @@ class WorkerLoop {
   void RunBatch(const JobRecord& first);
   // Returns true if another scene may join the `running` ones.
   bool HasRoom(int running) const;
-  // Claims the next job of this kind and encoder; none if there is none or the queue is unreadable.
-  std::optional<JobRecord> ClaimForBatch(const std::string& kind, const std::string& encoder);
-  // A worker of this server has all models of the server.
-  bool IsElsewhere() const { return !options_.server.address.empty(); }
-  bool Takes(const JobRecord& job) const {
-    return !IsElsewhere() || HasModels(job, options_.models);
-  }
-  std::optional<JobRecord> ClaimNext();
+  ClaimTerms Terms() const;
+  // Claims a job that can run in the batch of `first`; none if there is none or the queue is
+  // unreadable.
+  std::optional<JobRecord> ClaimForBatch(const JobRecord& first);
   void LogProblem(const std::exception& e);
   bool IsIdleTooLong() const;
 
   const WorkerOptions options_;
   const std::string id_;
   const DataPaths paths_;
+  ServerAccess& server_;
   WorkerStore& store_;
   WorkerStore& heartbeat_store_;
   FileDigests digests_;
   const std::atomic<bool>& draining_;
   const AttemptContext context_;
-  int jobs_done_ = 0;
+  WorkerRecord facts_;  // that do not change
+  std::atomic<int> jobs_done_{0};
   std::chrono::steady_clock::time_point last_work_ = std::chrono::steady_clock::now();
   std::chrono::steady_clock::time_point next_complaint_;
 };
@@ -116,7 +113,16 @@ class WorkerLoop {
 // Reports the state for listings and to the supervisor. Errors are only logged.
 void WorkerLoop::ReportSelf(WorkerStore& store, const std::string& job) const {
   try {
-    store.UpdateWorker({id_, ::getpid(), job, ResidentMemoryBytes(), 0});
+    WorkerRecord self = facts_;
+    self.job = job;
+    self.memory_bytes = ResidentMemoryBytes();
+    const CacheUse cache = server_.cache_use();
+    self.cache_bytes = cache.bytes;
+    self.cache_limit_bytes = cache.limit_bytes;
+    self.cache_hit_bytes = cache.hit_bytes;
+    self.cache_miss_bytes = cache.miss_bytes;
+    self.finished_jobs = jobs_done_.load();
+    store.UpdateWorker(self);
   } catch (const Error& e) {
     spdlog::warn("{} cannot report its state: {}", id_, e.what());
   }
@@ -130,10 +136,16 @@ bool WorkerLoop::ShouldRecycle() const {
   return true;
 }
 
-std::optional<JobRecord> WorkerLoop::ClaimNext() {
-  const int64_t lease_ms = options_.timing.lease.count();
-  if (!IsElsewhere()) return store_.Claim(id_, lease_ms);
-  return store_.ClaimAccepted(id_, lease_ms, [this](const JobRecord& job) { return Takes(job); });
+ClaimTerms WorkerLoop::Terms() const {
+  ClaimTerms terms{.worker = id_,
+                   .lease_ms = options_.timing.lease.count(),
+                   .memory_limit_bytes = facts_.memory_limit_bytes,
+                   .models = {},
+                   .batch_kind = {},
+                   .batch_group = {}};
+  // A worker on the server's machine has all models of the server.
+  if (!options_.server.address.empty()) terms.models = NamesOfModels(options_.models);
+  return terms;
 }
 
 // While the server is away, the same problem occurs several times a second.
@@ -145,7 +157,7 @@ void WorkerLoop::LogProblem(const std::exception& e) {
 }
 
 bool WorkerLoop::Turn() {
-  const std::optional<JobRecord> job = ClaimNext();
+  const std::optional<JobRecord> job = store_.Claim(Terms());
   if (!job) return false;
   ReportSelf(store_, job->name);
   const Stage* stage = FindStage(job->kind);
@@ -166,11 +178,12 @@ bool WorkerLoop::HasRoom(int running) const {
          AvailableMemoryBytes() > kSceneMemoryBytes;
 }
 
-std::optional<JobRecord> WorkerLoop::ClaimForBatch(const std::string& kind,
-                                                   const std::string& encoder) {
-  const auto fits = [&](const JobRecord& job) { return EncoderOf(job) == encoder && Takes(job); };
+std::optional<JobRecord> WorkerLoop::ClaimForBatch(const JobRecord& first) {
+  ClaimTerms terms = Terms();
+  terms.batch_kind = first.kind;
+  terms.batch_group = first.needs.batch_group;
   try {
-    return store_.ClaimForBatch(id_, options_.timing.lease.count(), kind, fits);
+    return store_.Claim(terms);
   } catch (const Error& e) {
     spdlog::warn("{} cannot claim more jobs for its batch: {}", id_, e.what());
     return std::nullopt;
@@ -182,10 +195,9 @@ std::optional<JobRecord> WorkerLoop::ClaimForBatch(const std::string& kind,
 void WorkerLoop::RunBatch(const JobRecord& first) {
   AttemptBatch batch(context_);
   batch.Start(first);
-  const std::string encoder = EncoderOf(first);
   while (batch.size() > 0) {
     if (HasRoom(batch.size())) {
-      if (const auto other = ClaimForBatch(first.kind, encoder)) batch.Start(*other);
+      if (const auto other = ClaimForBatch(first)) batch.Start(*other);
     }
     jobs_done_ += batch.Reap(options_.poll);
   }
@@ -264,6 +276,13 @@ void RequireEqualModels(const UserModels& models, const Greeting& greeting) {
   }
 }
 
+// Lines after the end of the access are dropped.
+void SendLogs(const ServerAccess& server) {
+  LogJobsTo([logs = std::weak_ptr(server.logs())](const std::string& job, const std::string& line) {
+    if (const auto sender = logs.lock()) sender->Add(job, line);
+  });
+}
+
 void RunElsewhere(WorkerOptions options, StageRunner& runner, const std::atomic<bool>& draining) {
   const std::optional<Greeting> greeting = GreetServer(options, draining);
   if (!greeting) return;
@@ -278,10 +297,7 @@ void RunElsewhere(WorkerOptions options, StageRunner& runner, const std::atomic<
                       options.release,
                       options.server,
                       options.cache_bytes);
-  // Lines after the end of the access are dropped.
-  LogJobsTo([logs = std::weak_ptr(server.logs())](const std::string& job, const std::string& line) {
-    if (const auto sender = logs.lock()) sender->Add(job, line);
-  });
+  SendLogs(server);
   WorkerLoop(options, server, runner, draining).Run();
 }
 
@@ -296,6 +312,7 @@ void RunWorker(const WorkerOptions& options,
                       options.release,
                       options.reserve_mib << 20,
                       {options.name, options.cache_bytes});
+  if (options.sends_logs) SendLogs(server);
   WorkerLoop(options, server, runner, draining).Run();
 }
 

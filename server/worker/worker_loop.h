@@ -8,7 +8,9 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <string_view>
 
+#include "core/trace/tracer.h"
 #include "server/store/user_models.h"
 #include "server/worker/lease_keeper.h"
 #include "server/worker/live/live_engine.h"
@@ -30,6 +32,7 @@ struct WorkerOptions {
   std::chrono::milliseconds checkpoint_interval{20'000};
   std::chrono::milliseconds poll{250};
   int64_t reserve_mib = WorkerSettings().reserve_mib;  // disk space to keep free
+  bool sends_logs = false;  // on the server's machine; those of others always do
   // The process ends (and is restarted) if it is idle above this memory or after this number of
   // jobs: the memory of torch grows with the number of distinct picture sizes.
   int64_t recycle_memory_bytes = int64_t{2} << 30;
@@ -39,7 +42,9 @@ struct WorkerOptions {
   pid_t parent = 0;  // 0: started by hand
   std::string code_version;
   std::string release;  // for messages
+  std::string simd;     // as in WorkerRecord
   UserModels models;
+  std::shared_ptr<Tracer> tracer;  // records attempts; null: does not
 };
 
 // Returns when `draining` becomes true, the parent has ended, the process should be recycled, or
@@ -53,6 +58,7 @@ void RunWorker(const WorkerOptions& options,
 struct WorkerProgram {
   std::unique_ptr<StageRunner> (*make_runner)();
   std::unique_ptr<LiveEngine> (*make_engine)(const LiveEngineSetup&);  // --inference
+  std::string_view (*instruction_set)() = nullptr;
 };
 
 // Runs the whole program: command line, log, signals. Returns the exit status.

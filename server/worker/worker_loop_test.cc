@@ -149,6 +149,8 @@ class WorkerLoopTest : public testing::Test {
       NewJob job;
       job.kind = kind::kPersonalize;
       job.spec = spec.SerializeAsString();
+      job.needs.batch_group = encoder;
+      if (!encoder.empty()) job.needs.models = {"model " + encoder};
       root.inputs.push_back(static_cast<int>(graph.jobs.size()));
       graph.jobs.push_back(job);
     }

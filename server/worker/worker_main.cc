@@ -17,6 +17,7 @@
 #include "core/base/mutex.h"
 #include "core/base/process/process_limits.h"
 #include "core/base/process/sandbox.h"
+#include "core/trace/tracer.h"
 #include "server/ops/process.h"
 #include "server/ops/stop_signals.h"
 #include "server/storage/data_folder.h"
@@ -122,6 +123,10 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
       ->allow_extra_args(false);
   app->add_option("--backend", arguments->backends, "NAME=ADDRESS: a ColorBackend server")
       ->allow_extra_args(false);
+  app->add_option("--otlp-endpoint",
+                  settings.otlp_endpoint,
+                  "http[s]://HOST:PORT of a collector of OpenTelemetry that receives traces. "
+                  "Default: OTEL_EXPORTER_OTLP_ENDPOINT");
   app->add_option("--inference",
                   arguments->inference,
                   "Answer ColorizeImages on this socket of the server instead of running jobs");
@@ -133,6 +138,7 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
   app->add_option("--drain-grace-seconds", settings.drain_grace_seconds)->group("");
   app->add_option("--reserve-mib", settings.reserve_mib)->group("");
   app->add_option("--blob-cache-mib", settings.blob_cache_mib)->group("");
+  app->add_flag("--send-logs", settings.sends_logs)->group("");
   app->add_option("--recycle-jobs", options.recycle_jobs)->group("");
   app->add_option("--code-version", options.code_version)->group("");
 }
@@ -170,6 +176,7 @@ void Complete(WorkerArguments* arguments) {
   options.data_folder = settings.data_folder;
   options.threads = settings.threads;
   options.reserve_mib = settings.reserve_mib;
+  options.sends_logs = settings.sends_logs;
   options.release = COLOR3D_VERSION;
   options.timing.lease = Milliseconds(settings.lease_seconds);
   options.timing.heartbeat = Milliseconds(settings.heartbeat_seconds);
@@ -284,8 +291,15 @@ void LimitMemory(int64_t memory_mib) {
   spdlog::info("memory limit {} MiB, {} MiB of it reserved", memory_mib, reserved >> 20);
 }
 
+// Null if traces are not exported.
+std::shared_ptr<Tracer> MakeTracer(const TraceSettings& settings) {
+  for (const std::string& warning : settings.warnings) spdlog::warn("{}", warning);
+  return Tracer::Make(
+      settings, COLOR3D_VERSION, [](const std::string& problem) { spdlog::warn("{}", problem); });
+}
+
 // Sandboxes this process, which decodes untrusted files. Earlier threads belong to OpenBLAS.
-void EnterSandbox(const WorkerArguments& arguments) {
+void EnterSandbox(const WorkerArguments& arguments, const TraceSettings& traces) {
   SetSandboxing(arguments.settings.sandbox);
   if (!arguments.settings.sandbox) return;
   ResetPeakMemory();     // so that it can be reset in the sandbox, too
@@ -297,6 +311,7 @@ void EnterSandbox(const WorkerArguments& arguments) {
   for (const auto& [name, file] : models.files) {
     for (const std::filesystem::path& part : FilesOfModel(file)) rules.readable.push_back(part);
   }
+  if (!traces.target.certificate.empty()) rules.readable.push_back(traces.target.certificate);
   // Not the store, which only the server opens.
   const DataPaths paths(arguments.settings.data_folder);
   rules.writable = {paths.Blobs(),
@@ -366,14 +381,21 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
              arguments.settings.log_level,
              arguments.settings.log_format,
              paths.Logs() / (arguments.options.name + ".log"));
+    const TraceSettings traces =
+        ReadTraceSettings("color3d-worker", arguments.settings.otlp_endpoint);
     LimitMemory(arguments.settings.memory_mib);
-    EnterSandbox(arguments);
+    EnterSandbox(arguments, traces);
     if (arguments.inference.empty()) {
       Complete(&arguments);
-      if (!arguments.IsElsewhere()) LogJobsTo(paths.JobLogs());
+      if (!arguments.IsElsewhere() && !settings.sends_logs) LogJobsTo(paths.JobLogs());
       const std::unique_ptr<EndAhead> until = EndBefore(arguments);
+      if (program.instruction_set != nullptr) arguments.options.simd = program.instruction_set();
       const std::unique_ptr<StageRunner> runner = program.make_runner();
+      // Its thread must be in the sandbox.
+      const std::shared_ptr<Tracer> tracer = MakeTracer(traces);
+      arguments.options.tracer = tracer;
       RunWorker(arguments.options, *runner, g_draining);
+      if (tracer && !tracer->Flush()) spdlog::warn("the last traces were not sent");
     } else {
       ServeInference(arguments, program);
     }

@@ -22,13 +22,16 @@ int main(int argc, char** argv) {
   color3d::AddCorrectCommand(app);
   color3d::AddNextKeyCommand(app);
   color3d::AddPipelineCommand(app);
+  color3d::AddQueueCommand(app);
   color3d::AddRasterizeCommand(app);
   color3d::AddReconstructCommand(app);
   color3d::AddPosesCommand(app);
   color3d::AddPretrainCommand(app);
   color3d::AddScoreCommand(app);
+  color3d::AddSimulateCommand(app);
   color3d::AddSplatViewsCommand(app);
   color3d::AddStabilityCommand(app);
+  color3d::AddStoreCommand(app);
   color3d::AddSuiteCommand(app);
   color3d::AddColorizerCommand(app);
   color3d::AddKeyViewCommand(app);

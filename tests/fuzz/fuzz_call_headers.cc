@@ -1,8 +1,10 @@
 // Fuzz target: metadata of a call, and addresses of webhooks.
 #include <algorithm>
 #include <cctype>
+#include <optional>
 #include <string_view>
 
+#include "core/trace/trace_context.h"
 #include "server/access/notify_targets.h"
 #include "server/rpc/calls/access.h"
 #include "server/rpc/calls/call_watch.h"
@@ -16,8 +18,9 @@ constexpr char kAllowed[] = "https://hooks.example.org/color3d";
 bool IsLowHex(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); }
 
 void CheckHeaders(std::string_view text) {
-  const std::string trace = ParseTraceId(text);
-  const bool is_none = trace.empty();
+  const std::optional<TraceContext> context = ParseTraceparent(text);
+  const std::string trace = context ? context->trace_id : "";
+  const bool is_none = !context;
   if (!is_none && (trace.size() != 32 || !std::ranges::all_of(trace, IsLowHex) ||
                    trace.find_first_not_of('0') == std::string::npos)) {
     std::abort();

@@ -5,9 +5,11 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/catalogue/artifacts.h"
 #include "tests/integration/service_fixture.h"
 
 namespace color3d {
@@ -111,6 +113,36 @@ TEST_F(AllInOneTest, ManySmallScenesFinishUnattended) {
   }
   EXPECT_EQ(of_scenes.size(), scenes.size());
   EXPECT_LT(peak, int64_t{1500} << 20);
+}
+
+// Which worker trains a scene, and beside which others, does not change its colorizer.
+TEST_F(AllInOneTest, TwoWorkersGiveTheResultsOfSoloRuns) {
+  StartServer({"--workers", "2", "--threads", "1"});
+  const std::vector<std::string> scenes = MakeScenes(SceneCount());
+  const auto colorizers = [&](const std::string& parent) {
+    std::map<std::string, std::string> digests;
+    for (const v1::Job& job : Children(parent)) {
+      EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED) << job.name();
+      for (const v1::Artifact& artifact : job.artifacts()) {
+        if (artifact.name() != artifact::kColorizer) continue;
+        digests[job.spec().scene()] = artifact.digest().sha256();
+      }
+    }
+    return digests;
+  };
+  const std::string together = Submit(scenes, 40);
+  EXPECT_EQ(Client({"job", "watch", together}, seconds(1200)).exit_code, 0);
+  std::set<std::string> workers;
+  for (const v1::Job& job : Children(together)) workers.insert(job.worker());
+  EXPECT_EQ(workers.size(), 2u) << "one worker took all";
+  std::map<std::string, std::string> solo;
+  for (const std::string& scene : scenes) {
+    const std::string alone = Submit({scene}, 40);
+    EXPECT_EQ(Client({"job", "watch", alone}, seconds(300)).exit_code, 0);
+    solo.merge(colorizers(alone));
+  }
+  EXPECT_EQ(solo.size(), scenes.size());
+  EXPECT_EQ(colorizers(together), solo);
 }
 
 TEST_F(AllInOneTest, NamesASceneWithoutAKeyView) {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import json
 import os
@@ -282,14 +283,28 @@ class Client:
         chosen = json.loads(self.read_artifact(job, "key_view.json"))
         return [view["view"] for view in chosen.get("key_views", [chosen])]
 
-    def submit(self, spec: job_pb2.JobSpec, *, notify_url: str = "") -> job_pb2.Job:
+    def submit(
+        self,
+        spec: job_pb2.JobSpec,
+        *,
+        notify_url: str = "",
+        priority: int = 100,
+        deadline: Optional[datetime.datetime] = None,
+    ) -> job_pb2.Job:
         """Creates a job, once, however often the call is repeated underneath.
 
         notify_url: address that receives a notification at the end, if the operator allows it.
+        priority: 0 to 1000; lower values start first.
+        deadline: time by which the result is needed, with its time zone. Of the waiting jobs of a
+            project with equal priority, the earliest deadline starts first.
         """
         request = job_pb2.CreateJobRequest(
-            spec=spec, request_id=str(uuid.uuid4()), notify_url=notify_url
+            spec=spec, request_id=str(uuid.uuid4()), notify_url=notify_url, priority=priority
         )
+        if deadline is not None:
+            if deadline.tzinfo is None:
+                raise ValueError("deadline has no time zone; use datetime.now(timezone.utc) + ...")
+            request.deadline.FromSeconds(int(deadline.timestamp()))
         return self.call(self.jobs.CreateJob, request)
 
     def job(self, name: str) -> job_pb2.Job:

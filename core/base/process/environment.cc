@@ -26,6 +26,13 @@ bool IsInherited(std::string_view variable) {
                                       "GRPC_DEFAULT_SSL_ROOTS_FILE_PATH=",
                                       "GRPC_VERBOSITY=",
                                       "GRPC_TRACE=",
+                                      "OTEL_EXPORTER_OTLP_ENDPOINT=",  // but no headers
+                                      "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT=",
+                                      "OTEL_EXPORTER_OTLP_CERTIFICATE=",
+                                      "OTEL_EXPORTER_OTLP_TIMEOUT=",
+                                      "OTEL_RESOURCE_ATTRIBUTES=",
+                                      "OTEL_SDK_DISABLED=",
+                                      "OTEL_TRACES_EXPORTER=",
                                       "ASAN_OPTIONS=",
                                       "LSAN_OPTIONS=",
                                       "TSAN_OPTIONS=",

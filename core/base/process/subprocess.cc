@@ -11,10 +11,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <set>
 #include <string_view>
 #include <thread>
 
 #include "core/base/error.h"
+#include "core/base/mutex.h"
 #include "core/base/process/environment.h"
 
 namespace color3d {
@@ -63,6 +65,35 @@ std::unique_ptr<Sandbox> PrepareSandbox(const SubprocessOptions& options,
   return std::make_unique<Sandbox>(rules);
 }
 
+// Running children of RunSubprocess. Held while one is started, so that none ends unlisted.
+Mutex g_children_mutex;
+std::set<pid_t> g_children COLOR3D_GUARDED_BY(g_children_mutex);
+
+// Lists the child until it was waited for.
+class ListedChild {
+ public:
+  explicit ListedChild(pid_t child) COLOR3D_REQUIRES(g_children_mutex) : child_(child) {
+    g_children.insert(child);
+  }
+  ~ListedChild() {
+    const MutexLock lock(g_children_mutex);
+    g_children.erase(child_);
+  }
+  ListedChild(const ListedChild&) = delete;
+  ListedChild& operator=(const ListedChild&) = delete;
+
+ private:
+  const pid_t child_;
+};
+
+// A server blocks and ignores signals, which a program would inherit. Async-signal-safe.
+void RestoreSignals() {
+  for (int signal = 1; signal < NSIG; ++signal) ::signal(signal, SIG_DFL);
+  sigset_t none;
+  ::sigemptyset(&none);
+  ::sigprocmask(SIG_SETMASK, &none, nullptr);
+}
+
 // Called in the child between fork and exec; the message is prepared in advance.
 [[noreturn]] void GiveUp(std::string_view message) {
   [[maybe_unused]] const ssize_t written = ::write(2, message.data(), message.size());
@@ -70,6 +101,11 @@ std::unique_ptr<Sandbox> PrepareSandbox(const SubprocessOptions& options,
 }
 
 }  // namespace
+
+bool IsSubprocess(pid_t process) {
+  const MutexLock lock(g_children_mutex);
+  return g_children.contains(process);
+}
 
 SubprocessResult RunSubprocess(const SubprocessOptions& options, const CancellationToken& cancel) {
   const std::string program = FindProgram(options.arguments.at(0));
@@ -92,6 +128,7 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
   const int null_fd = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
   const pid_t parent = ::getpid();
   const auto start = std::chrono::steady_clock::now();
+  MutexLock starting(g_children_mutex);
   const pid_t child = ::fork();
   if (child == 0) {
     ::setpgid(0, 0);
@@ -100,9 +137,7 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
     ::dup2(null_fd, 0);
     ::dup2(log_fd, 1);
     ::dup2(log_fd, 2);
-    // Ignored ones stay so in programs; the first ends those that write without end.
-    ::signal(SIGXFSZ, SIG_DFL);
-    ::signal(SIGPIPE, SIG_DFL);
+    RestoreSignals();
     if (!LimitProcess(options.limits)) GiveUp("color3d: the kernel refuses the limits\n");
     if (sandbox && !sandbox->Enter()) GiveUp("color3d: the kernel refuses the sandbox\n");
     ::execve(program.c_str(), arguments.data(), environment.data());
@@ -111,6 +146,8 @@ SubprocessResult RunSubprocess(const SubprocessOptions& options, const Cancellat
   ::close(log_fd);
   ::close(null_fd);
   if (child < 0) throw Error(ErrorCode::kResourceExhausted, "cannot start {}", program);
+  const ListedChild listed(child);
+  starting.Unlock();
   // Also here: whichever side runs first, the group exists before it may have to be killed.
   ::setpgid(child, child);
 

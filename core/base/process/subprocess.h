@@ -2,6 +2,8 @@
 // a child behind.
 #pragma once
 
+#include <sys/types.h>
+
 #include <chrono>
 #include <filesystem>
 #include <optional>
@@ -31,8 +33,12 @@ struct SubprocessResult {
 };
 
 // Starts the child in its own process group, waits, and kills the whole group on time-out or
-// cancellation (then throws Error{kCancelled}). The child dies with this process. Throws
-// Error{kFailedPrecondition} if the program is not installed.
+// cancellation (then throws Error{kCancelled}). The child has the default actions of all signals
+// and dies with the calling thread. Throws Error{kFailedPrecondition} if the program is not
+// installed.
 SubprocessResult RunSubprocess(const SubprocessOptions& options, const CancellationToken& cancel);
+
+// Returns true for a child of RunSubprocess, whose exit status no other thread may take.
+bool IsSubprocess(pid_t process);
 
 }  // namespace color3d

@@ -41,6 +41,23 @@ TEST(Subprocess, ReportsExitCodeLogTimeoutAndCancellation) {
   }
 }
 
+// As from a server, which handles its signals itself.
+TEST(Subprocess, RestoresSignalsOfTheProgram) {
+  ScratchFolder scratch;
+  sigset_t blocked, before;
+  sigemptyset(&blocked);
+  sigaddset(&blocked, SIGTERM);
+  ASSERT_EQ(pthread_sigmask(SIG_BLOCK, &blocked, &before), 0);
+  const auto old = std::signal(SIGUSR1, SIG_IGN);
+  SubprocessOptions options;
+  options.arguments = {"grep", "-E", "^Sig(Blk|Ign)", "/proc/self/status"};
+  options.log_path = scratch.path() / "log";
+  EXPECT_EQ(RunSubprocess(options, CancellationToken()).exit_code, 0);
+  std::signal(SIGUSR1, old);
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  EXPECT_EQ(ReadFile(options.log_path), "SigBlk:\t0000000000000000\nSigIgn:\t0000000000000000\n");
+}
+
 // Runs a shell script under these limits.
 SubprocessResult RunShell(const std::string& script,
                           const ProcessLimits& limits,

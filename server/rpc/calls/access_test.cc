@@ -39,6 +39,7 @@ class AccessTest : public RpcTest {
     submit_ = AddToken(file, "submitter", Role::kSubmit);
     admin_ = AddToken(file, "admin", Role::kAdmin);
     worker_ = AddToken(file, "worker", Role::kWorker);
+    other_admin_ = AddToken(file, "other", Role::kAdmin, "other-project");
     options_.listen = "127.0.0.1:0";
     options_.tokens = std::make_shared<TokenBook>(file);
   }
@@ -83,7 +84,7 @@ class AccessTest : public RpcTest {
 
   RpcServerOptions options_;
   std::unique_ptr<RpcServer> guarded_;
-  std::string read_, submit_, admin_, worker_;
+  std::string read_, submit_, admin_, worker_, other_admin_;
 };
 
 TEST_F(AccessTest, EveryRpcRequiresRole) {
@@ -137,7 +138,7 @@ TEST_F(AccessTest, OnlyWorkersMakeCallsOfWorkers) {
     EXPECT_EQ(ReasonOfStatus(Call(channel, name, "")), "TOKEN_MISSING");
     EXPECT_EQ(ReasonOfStatus(Call(channel, name, "Bearer " + std::string(68, 'x'))),
               "TOKEN_UNKNOWN");
-    for (const std::string& token : {read_, submit_, admin_}) {
+    for (const std::string& token : {read_, submit_, admin_, other_admin_}) {
       const grpc::Status refused = Call(channel, name, "Bearer " + token);
       EXPECT_EQ(refused.error_code(), StatusCode::PERMISSION_DENIED);
       EXPECT_EQ(ReasonOfStatus(refused), "ROLE_TOO_LOW");

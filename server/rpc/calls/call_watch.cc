@@ -7,6 +7,8 @@
 #include <cctype>
 #include <chrono>
 #include <map>
+#include <optional>
+#include <utility>
 
 #include "server/store/job.h"
 
@@ -15,9 +17,26 @@ namespace {
 using grpc::experimental::InterceptionHookPoints;
 using SteadyClock = std::chrono::steady_clock;
 
-bool IsLowHex(std::string_view text) {
-  return std::ranges::all_of(
-      text, [](char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f'); });
+constexpr char kTraceparent[] = "traceparent";
+
+// Not health checks, reflection and the polling of workers.
+bool HasSpan(const std::string& method) {
+  return !method.starts_with("/grpc.") && !method.starts_with("/color3d.internal.");
+}
+
+// Faults of the server; those of the caller are no errors of its span.
+bool IsServerFault(grpc::StatusCode code) {
+  switch (code) {
+    case grpc::StatusCode::UNKNOWN:
+    case grpc::StatusCode::DEADLINE_EXCEEDED:
+    case grpc::StatusCode::UNIMPLEMENTED:
+    case grpc::StatusCode::INTERNAL:
+    case grpc::StatusCode::UNAVAILABLE:
+    case grpc::StatusCode::DATA_LOSS:
+      return true;
+    default:
+      return false;
+  }
 }
 
 bool IsValidRequestId(std::string_view id) {
@@ -30,8 +49,9 @@ class CallWatch final : public grpc::experimental::Interceptor {
  public:
   CallWatch(const CallObserver& observer,
             const PeerObserver& peers,
+            Tracer* tracer,
             grpc::experimental::ServerRpcInfo* info)
-      : observer_(observer), peers_(peers), info_(info), method_(info->method()) {}
+      : observer_(observer), peers_(peers), tracer_(tracer), info_(info), method_(info->method()) {}
   // Cancelled calls may end without a status of the service.
   ~CallWatch() override {
     if (!ended_) End(grpc::StatusCode::CANCELLED);
@@ -40,7 +60,7 @@ class CallWatch final : public grpc::experimental::Interceptor {
 
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
-      TakeMetadata(*methods->GetRecvInitialMetadata());
+      TakeMetadata(methods->GetRecvInitialMetadata());
       RecordPeer();
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
@@ -51,14 +71,51 @@ class CallWatch final : public grpc::experimental::Interceptor {
   }
 
  private:
-  void TakeMetadata(const std::multimap<grpc::string_ref, grpc::string_ref>& metadata) {
+  void TakeMetadata(std::multimap<grpc::string_ref, grpc::string_ref>* metadata) {
     const auto find = [&](const char* name) {
-      const auto entry = metadata.find(name);
-      return entry == metadata.end() ? std::string()
-                                     : std::string(entry->second.data(), entry->second.size());
+      const auto entry = metadata->find(name);
+      return entry == metadata->end() ? std::string()
+                                      : std::string(entry->second.data(), entry->second.size());
     };
     request_id_ = ChooseRequestId(find("x-request-id"));
-    trace_ = ParseTraceId(find("traceparent"));
+    const std::optional<TraceContext> parent = ParseTraceparent(find(kTraceparent));
+    if (parent) trace_ = parent->trace_id;
+    if (tracer_ != nullptr && HasSpan(method_)) BeginSpan(parent, metadata);
+  }
+
+  // What the call creates becomes part of its span.
+  void BeginSpan(const std::optional<TraceContext>& parent,
+                 std::multimap<grpc::string_ref, grpc::string_ref>* metadata) {
+    span_.start_ns = UnixNanoseconds();
+    span_.context = tracer_->Begin(parent);
+    if (parent) span_.parent_id = parent->span_id;
+    // A caller that records keeps its span as the parent of what is not recorded here.
+    if (!span_.context.sampled) {
+      if (!parent) return;
+      span_.context.span_id = parent->span_id;
+    }
+    trace_ = span_.context.trace_id;
+    traceparent_ = ToTraceparent(span_.context);
+    metadata->erase(kTraceparent);
+    metadata->emplace(kTraceparent, traceparent_);
+  }
+
+  void EndSpan(grpc::StatusCode code) {
+    if (!span_.context.sampled) return;
+    span_.end_ns = UnixNanoseconds();
+    span_.kind = SpanKind::kServer;
+    span_.name = method_.substr(1);
+    const size_t slash = span_.name.find('/');
+    span_.attributes = {{"rpc.system", "grpc"},
+                        {"rpc.service", span_.name.substr(0, slash)},
+                        {"rpc.method", span_.name.substr(slash + 1)},
+                        {"rpc.grpc.status_code", static_cast<int64_t>(code)},
+                        {"color3d.request", request_id_}};
+    if (IsServerFault(code)) {
+      span_.status = SpanStatus::kError;
+      span_.status_message = StatusName(code);
+    }
+    tracer_->Record(std::move(span_));
   }
 
   void RecordPeer() {
@@ -71,6 +128,7 @@ class CallWatch final : public grpc::experimental::Interceptor {
     ended_ = true;
     const double seconds = std::chrono::duration<double>(SteadyClock::now() - start_).count();
     if (observer_) observer_(method_, code, seconds);
+    EndSpan(code);
     const bool is_ours = code == grpc::StatusCode::INTERNAL ||
                          code == grpc::StatusCode::DATA_LOSS || code == grpc::StatusCode::UNKNOWN;
     spdlog::log(is_ours ? spdlog::level::warn : spdlog::level::debug,
@@ -85,26 +143,30 @@ class CallWatch final : public grpc::experimental::Interceptor {
 
   const CallObserver& observer_;
   const PeerObserver& peers_;
+  Tracer* const tracer_;  // may be null
   grpc::experimental::ServerRpcInfo* const info_;
   const std::string method_;
   std::string peer_;  // empty: on_begin was not called
   const SteadyClock::time_point start_ = SteadyClock::now();
   std::string request_id_, trace_;
+  std::string traceparent_;  // the metadata refer to it
+  Span span_;
   bool ended_ = false;
 };
 
 class CallWatchFactory final : public grpc::experimental::ServerInterceptorFactoryInterface {
  public:
-  CallWatchFactory(CallObserver observer, PeerObserver peers)
-      : observer_(std::move(observer)), peers_(std::move(peers)) {}
+  CallWatchFactory(CallObserver observer, PeerObserver peers, std::shared_ptr<Tracer> tracer)
+      : observer_(std::move(observer)), peers_(std::move(peers)), tracer_(std::move(tracer)) {}
   grpc::experimental::Interceptor* CreateServerInterceptor(
       grpc::experimental::ServerRpcInfo* info) override {
-    return new CallWatch(observer_, peers_, info);
+    return new CallWatch(observer_, peers_, tracer_.get(), info);
   }
 
  private:
   const CallObserver observer_;
   const PeerObserver peers_;
+  const std::shared_ptr<Tracer> tracer_;
 };
 
 }  // namespace
@@ -131,33 +193,14 @@ const char* StatusName(grpc::StatusCode code) {
   return index < std::size(kNames) ? kNames[index] : "UNKNOWN";
 }
 
-std::string ParseTraceId(std::string_view traceparent) {
-  // version "-" trace id "-" parent id "-" flags; later versions may append fields.
-  if (traceparent.size() < 55 || traceparent[2] != '-' || traceparent[35] != '-' ||
-      traceparent[52] != '-') {
-    return "";
-  }
-  const std::string_view version = traceparent.substr(0, 2), trace = traceparent.substr(3, 32),
-                         parent = traceparent.substr(36, 16), flags = traceparent.substr(53, 2);
-  const auto is_zero = [](std::string_view id) {
-    return id.find_first_not_of('0') == std::string_view::npos;
-  };
-  const bool is_whole = version == "00" ? traceparent.size() == 55
-                                        : traceparent.size() == 55 || traceparent[55] == '-';
-  if (!is_whole || version == "ff" || !IsLowHex(version) || !IsLowHex(trace) || !IsLowHex(parent) ||
-      !IsLowHex(flags) || is_zero(trace) || is_zero(parent)) {
-    return "";
-  }
-  return std::string(trace);
-}
-
 std::string ChooseRequestId(std::string_view header) {
   return IsValidRequestId(header) ? std::string(header) : NewId();
 }
 
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
-    CallObserver observer, PeerObserver peers) {
-  return std::make_unique<CallWatchFactory>(std::move(observer), std::move(peers));
+    CallObserver observer, PeerObserver peers, std::shared_ptr<Tracer> tracer) {
+  return std::make_unique<CallWatchFactory>(
+      std::move(observer), std::move(peers), std::move(tracer));
 }
 
 }  // namespace color3d

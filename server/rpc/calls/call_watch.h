@@ -10,6 +10,8 @@
 #include <string>
 #include <string_view>
 
+#include "core/trace/tracer.h"
+
 namespace color3d {
 
 // Called when a call has ended. `method`: e.g. "/color3d.v1.JobService/GetJob".
@@ -18,10 +20,6 @@ using CallObserver =
 
 // "OK", "NOT_FOUND", ...
 const char* StatusName(grpc::StatusCode code);
-
-// Returns the trace id of a W3C "traceparent", 32 hexadecimal digits; empty if it is malformed or
-// all zeros. https://www.w3.org/TR/trace-context/
-std::string ParseTraceId(std::string_view traceparent);
 
 // Returns the client's "x-request-id" if it is 1 to 64 letters, digits, '-', '_' or '.', else a new
 // id.
@@ -33,8 +31,10 @@ struct PeerObserver {
   std::function<void(const std::string&peer)> on_begin, on_end;
 };
 
-// Trailers of each call carry "x-request-id" (ChooseRequestId). Observers may be empty.
+// Trailers of each call carry "x-request-id" (ChooseRequestId). Observers may be empty. `tracer`
+// records a span of each call but those of gRPC's own services and of workers, and may be null. The
+// service finds that span, or else that of its caller, as "traceparent" in the client's metadata.
 std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> MakeCallWatch(
-    CallObserver observer, PeerObserver peers = {});
+    CallObserver observer, PeerObserver peers = {}, std::shared_ptr<Tracer> tracer = nullptr);
 
 }  // namespace color3d

@@ -44,12 +44,16 @@ v1::Scene ToProto(const SceneRecord& scene) {
   return proto;
 }
 
+v1::Job::State StateToProto(JobState state) {
+  return static_cast<v1::Job::State>(static_cast<int>(state) + 1);
+}
+
 v1::Job ToProgressProto(const JobRecord& job) {
   v1::Job proto;
   proto.set_name(job.name);
   proto.set_parent(job.parent);
   proto.set_kind(job.kind);
-  proto.set_state(static_cast<v1::Job::State>(static_cast<int>(job.state) + 1));
+  proto.set_state(StateToProto(job.state));
   proto.set_attempt(job.attempt);
   proto.set_revision(job.revision);
   v1::Progress* progress = proto.mutable_progress();
@@ -85,6 +89,7 @@ v1::Job ToProto(const JobRecord& job) {
   proto.set_peak_memory_bytes(job.usage.peak_memory_bytes);
   proto.set_queued_seconds(static_cast<double>(job.queued_ms) / 1000.0);
   proto.set_pinned(job.pinned);
+  if (job.deadline_ms != kNoDeadline) *proto.mutable_deadline() = ToTimestamp(job.deadline_ms);
   return proto;
 }
 

@@ -22,6 +22,7 @@ v1::Job ToProto(const JobRecord& job);
 v1::Job ToProgressProto(const JobRecord& job);
 v1::Colorizer ToProto(const ColorizerRecord& colorizer);
 google::protobuf::Timestamp ToTimestamp(int64_t ms);
+v1::Job::State StateToProto(JobState state);
 
 // Throws Error{kInvalidArgument} unless `name` is "<collection>/<id>" with a plausible id.
 void CheckName(std::string_view name, std::string_view collection);

@@ -6,9 +6,9 @@
 #include <set>
 
 #include "core/base/digest.h"
+#include "core/trace/trace_context.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_spec.h"
-#include "server/rpc/calls/call_watch.h"
 
 namespace color3d {
 namespace {
@@ -34,12 +34,13 @@ void CheckRequestId(const std::string& request_id) {
 
 Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context) {
   const Caller caller = parts.access.Require(role, context);
-  const auto trace = context.client_metadata().find("traceparent");
-  return {caller,
-          ProjectStore(parts.store, caller.project),
-          trace == context.client_metadata().end()
-              ? ""
-              : ParseTraceId({trace->second.data(), trace->second.size()})};
+  // CallWatch has put the span of the call there, if it is recorded.
+  const auto given = context.client_metadata().find("traceparent");
+  std::optional<TraceContext> trace;
+  if (given != context.client_metadata().end()) {
+    trace = ParseTraceparent({given->second.data(), given->second.size()});
+  }
+  return {caller, ProjectStore(parts.store, caller.project), trace ? ToTraceparent(*trace) : ""};
 }
 
 void RequireNotDraining(const RpcParts& parts) {
@@ -101,6 +102,7 @@ v1::ProjectUsage ToProto(const ProjectRecord& project, const ServiceLimits& limi
   usage.set_max_scenes(limits.project_max_scenes);
   usage.set_uncommitted_scenes(project.uncommitted_scenes);
   usage.set_max_uncommitted_scenes(limits.project_max_uncommitted_scenes);
+  usage.set_weight(project.weight);
   return usage;
 }
 

@@ -21,6 +21,7 @@
 #include "server/rpc/calls/call_memory.h"
 #include "server/rpc/calls/error_mapping.h"
 #include "server/rpc/calls/executor.h"
+#include "server/rpc/calls/job_logs.h"
 #include "server/rpc/calls/silence_watch.h"
 #include "server/rpc/calls/stream_limit.h"
 #include "server/rpc/calls/worker_messages.h"
@@ -101,7 +102,7 @@ struct RpcParts {
   FileDigests& digests;
   BackendProbe probe_backends;
   WorkerTimes worker_times;
-  std::filesystem::path job_logs;           // folder; empty: no logs
+  std::shared_ptr<JobLogs> job_logs;        // null: no logs
   std::vector<std::string> notify_allowed;  // see CheckNotifyUrl
   std::function<void()> drain;              // asks the program to end
   std::function<bool()> make_room;          // see RetryAfterMakingRoom; may be empty
@@ -111,7 +112,7 @@ struct RpcParts {
 struct Call {
   Caller caller;
   ProjectStore store;
-  std::string trace;  // W3C trace id of the call; empty: none
+  std::string trace;  // W3C traceparent of the call; empty: none
 };
 // Throws as Access::Require.
 Call Admit(const RpcParts& parts, Role role, const grpc::CallbackServerContext& context);

@@ -133,6 +133,7 @@ wire::Job ToWire(const JobRecord& job) {
   message.set_queued_ms(job.queued_ms);
   message.set_create_ms(job.create_ms);
   message.set_start_ms(job.start_ms);
+  message.set_batch_group(job.needs.batch_group);
   message.set_end_ms(job.end_ms);
   return message;
 }
@@ -168,6 +169,7 @@ JobRecord FromWire(const wire::Job& job) {
   record.create_ms = job.create_ms();
   record.start_ms = job.start_ms();
   record.end_ms = job.end_ms();
+  record.needs.batch_group = job.batch_group();
   return record;
 }
 
@@ -216,12 +218,63 @@ wire::Worker ToWire(const WorkerRecord& worker) {
   message.set_job(worker.job);
   message.set_memory_bytes(worker.memory_bytes);
   message.set_heartbeat_ms(worker.heartbeat_ms);
+  message.set_machine(worker.machine);
+  message.set_release(worker.release);
+  message.set_threads(worker.threads);
+  message.set_memory_limit_bytes(worker.memory_limit_bytes);
+  message.set_simd(worker.simd);
+  message.set_cache_bytes(worker.cache_bytes);
+  message.set_cache_limit_bytes(worker.cache_limit_bytes);
+  message.set_cache_hit_bytes(worker.cache_hit_bytes);
+  message.set_cache_miss_bytes(worker.cache_miss_bytes);
+  message.set_finished_jobs(worker.finished_jobs);
   return message;
 }
 
 WorkerRecord FromWire(const wire::Worker& worker) {
-  return {
-      worker.worker_id(), worker.pid(), worker.job(), worker.memory_bytes(), worker.heartbeat_ms()};
+  WorkerRecord record;
+  record.worker_id = worker.worker_id();
+  record.pid = worker.pid();
+  record.job = worker.job();
+  record.memory_bytes = worker.memory_bytes();
+  record.heartbeat_ms = worker.heartbeat_ms();
+  record.machine = worker.machine();
+  record.release = worker.release();
+  record.threads = worker.threads();
+  record.memory_limit_bytes = worker.memory_limit_bytes();
+  record.simd = worker.simd();
+  record.cache_bytes = worker.cache_bytes();
+  record.cache_limit_bytes = worker.cache_limit_bytes();
+  record.cache_hit_bytes = worker.cache_hit_bytes();
+  record.cache_miss_bytes = worker.cache_miss_bytes();
+  record.finished_jobs = worker.finished_jobs();
+  return record;
+}
+
+wire::ClaimRequest ToWire(const ClaimTerms& terms) {
+  wire::ClaimRequest message;
+  message.set_worker(terms.worker);
+  message.set_lease_ms(terms.lease_ms);
+  message.set_memory_limit_bytes(terms.memory_limit_bytes);
+  message.set_batch_kind(terms.batch_kind);
+  message.set_batch_group(terms.batch_group);
+  message.set_lists_models(terms.models.has_value());
+  if (terms.models) {
+    for (const std::string& model : *terms.models) message.add_models(model);
+  }
+  return message;
+}
+
+ClaimTerms FromWire(const wire::ClaimRequest& request) {
+  ClaimTerms terms{.worker = request.worker(),
+                   .lease_ms = request.lease_ms(),
+                   .memory_limit_bytes = request.memory_limit_bytes(),
+                   .models = {},
+                   .batch_kind = request.batch_kind(),
+                   .batch_group = request.batch_group()};
+  if (request.lists_models())
+    terms.models.emplace(request.models().begin(), request.models().end());
+  return terms;
 }
 
 wire::StoredBlob ToWire(const StoredBlob& blob) {

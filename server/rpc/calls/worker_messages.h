@@ -36,6 +36,7 @@ internal::v1::JobError ToWire(const JobError& error);
 internal::v1::Job ToWire(const JobRecord& job);
 internal::v1::Scene ToWire(const SceneRecord& scene);
 internal::v1::Worker ToWire(const WorkerRecord& worker);
+internal::v1::ClaimRequest ToWire(const ClaimTerms& terms);  // without protocol and release
 internal::v1::StoredBlob ToWire(const StoredBlob& blob);
 internal::v1::GreetResponse ToWire(const WorkerTimes& times);
 
@@ -48,6 +49,7 @@ JobError FromWire(const internal::v1::JobError& error);
 JobRecord FromWire(const internal::v1::Job& job);
 SceneRecord FromWire(const internal::v1::Scene& scene);
 WorkerRecord FromWire(const internal::v1::Worker& worker);
+ClaimTerms FromWire(const internal::v1::ClaimRequest& request);
 StoredBlob FromWire(const internal::v1::StoredBlob& blob);
 WorkerTimes FromWire(const internal::v1::GreetResponse& greeting);
 

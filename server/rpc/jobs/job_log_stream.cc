@@ -3,11 +3,9 @@
 #include <grpcpp/alarm.h>
 
 #include <atomic>
-#include <fstream>
 #include <memory>
 #include <optional>
 
-#include "server/ops/job_log.h"
 #include "server/rpc/calls/convert.h"
 
 namespace color3d {
@@ -15,6 +13,7 @@ namespace {
 
 constexpr size_t kChunkBytes = 64 << 10;
 constexpr std::chrono::milliseconds kPause{500};
+constexpr int kPausesAtEnd = 3;
 
 // Runs one step at a time, each on the executor or after a pause; the last step finishes. A step
 // holds a reference, because what it starts may finish the stream while the step still runs.
@@ -60,15 +59,16 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
       if (offset_ < 0) throw InvalidArgument("offset is {}; it must not be negative", offset_);
       place_ = parts_.streams.watches.Take(store_->project());
     }
-    // Read before the file: the log of a finished job is complete.
+    // Read before the log.
     const bool finished = IsFinished(store_->GetJob(request_.name()).state);
-    std::ifstream file(JobLogFile(parts_.job_logs, request_.name()), std::ios::binary);
     std::string* data = chunk_.mutable_data();
-    data->resize(kChunkBytes);
-    file.seekg(offset_);
-    file.read(data->data(), static_cast<std::streamsize>(data->size()));
-    data->resize(static_cast<size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+    data->clear();
+    if (parts_.job_logs) *data = parts_.job_logs->Read(request_.name(), offset_, kChunkBytes);
     data->resize(data->rfind('\n') + 1);  // whole lines only
+    // Workers send their last lines within a second of the job's end.
+    if (data->empty() && request_.follow() && finished && ++pauses_at_end_ <= kPausesAtEnd) {
+      return Next::kPause;
+    }
     if (data->empty()) return finished || !request_.follow() ? Next::kEnd : Next::kPause;
     chunk_.set_offset(offset_);
     offset_ += static_cast<int64_t>(data->size());
@@ -82,6 +82,7 @@ class JobLogStream final : public grpc::ServerWriteReactor<v1::JobLogChunk> {
   std::optional<ProjectStore> store_;  // set by the first step
   StreamLimit::Place place_;
   int64_t offset_;
+  int pauses_at_end_ = 0;
   v1::JobLogChunk chunk_;
   std::unique_ptr<grpc::Alarm> alarm_;
   std::atomic<bool> cancelled_{false};

@@ -11,6 +11,7 @@
 
 #include "color3d/v1/job.grpc.pb.h"
 #include "core/catalogue/stages.h"
+#include "core/trace/trace_context.h"
 #include "server/access/notify_targets.h"
 #include "server/base/service_error.h"
 #include "server/planning/job_plan.h"
@@ -107,15 +108,32 @@ SceneRouteInputs LoadRoute(const ProjectStore& store,
   return inputs;
 }
 
+// Options of the import in the graph, else among the inputs.
+v1::ImportSceneSpec FindImport(const NewGraph& graph, const std::vector<JobRecord>& inputs) {
+  for (const NewJob& job : graph.jobs) {
+    if (job.kind == kind::kImportScene) return ParseSpec(job.spec, job.kind).import_scene();
+  }
+  for (const JobRecord& job : inputs) {
+    if (job.kind == kind::kImportScene) return ParseSpec(job.spec, job.name).import_scene();
+  }
+  return {};
+}
+
 NewGraph PlanRequest(const ProjectStore& store, const v1::JobSpec& spec) {
-  if (!spec.has_personalize_scenes()) {
-    return PlanJob(spec, LoadInputs(store, spec), SceneFactsFrom(store.GetScene(spec.scene())));
+  const SceneFacts facts = SceneFactsFrom(store.GetScene(spec.scene()));
+  const std::vector<JobRecord> inputs = LoadInputs(store, spec);
+  NewGraph graph;
+  if (spec.has_personalize_scenes()) {
+    std::vector<SceneRouteInputs> routes;
+    for (const auto& route : spec.personalize_scenes().routes()) {
+      routes.push_back(LoadRoute(store, route));
+    }
+    graph = PlanPersonalizeScenes(spec, routes);
+  } else {
+    graph = PlanJob(spec, inputs, facts);
   }
-  std::vector<SceneRouteInputs> routes;
-  for (const auto& route : spec.personalize_scenes().routes()) {
-    routes.push_back(LoadRoute(store, route));
-  }
-  return PlanPersonalizeScenes(spec, routes);
+  SetNeeds(facts, FindImport(graph, inputs), &graph);
+  return graph;
 }
 
 // Throws Error{kInvalidArgument} for facts that no scene can have.
@@ -165,17 +183,6 @@ std::vector<MeasuredJob> MeasuredJobs(const ProjectStore& store) {
   return measured;
 }
 
-// Options of the import in the graph, else among the inputs.
-v1::ImportSceneSpec FindImport(const NewGraph& graph, const std::vector<JobRecord>& inputs) {
-  for (const NewJob& job : graph.jobs) {
-    if (job.kind == kind::kImportScene) return ParseSpec(job.spec, job.kind).import_scene();
-  }
-  for (const JobRecord& job : inputs) {
-    if (job.kind == kind::kImportScene) return ParseSpec(job.spec, job.name).import_scene();
-  }
-  return {};
-}
-
 v1::JobPlan DescribeRequest(const RpcParts& parts,
                             const ProjectStore& store,
                             const v1::PlanJobRequest& request) {
@@ -207,6 +214,18 @@ v1::JobPlan DescribeRequest(const RpcParts& parts,
   return plan;
 }
 
+// Throws Error{kInvalidArgument} for a malformed time.
+int64_t DeadlineMs(const google::protobuf::Timestamp& deadline) {
+  constexpr int64_t kLastSecond = 253'402'300'799;  // of the year 9999
+  if (deadline.seconds() <= 0 || deadline.seconds() > kLastSecond || deadline.nanos() < 0 ||
+      deadline.nanos() > 999'999'999) {
+    throw InvalidArgument("deadline is no time between 1970 and 9999: {} s and {} ns",
+                          deadline.seconds(),
+                          deadline.nanos());
+  }
+  return deadline.seconds() * 1000 + deadline.nanos() / 1'000'000;
+}
+
 JobRecord CreateJobRecord(const RpcParts& parts,
                           const Call& call,
                           const v1::CreateJobRequest& request) {
@@ -232,6 +251,7 @@ JobRecord CreateJobRecord(const RpcParts& parts,
   CheckBlobs(parts, store, spec);
   NewGraph graph = PlanRequest(store, spec);
   graph.priority = priority;
+  if (request.has_deadline()) graph.deadline_ms = DeadlineMs(request.deadline());
   graph.notify_url = request.notify_url();
   RequireRoomForRows(parts, store, EstimateRowBytes(graph));
   graph.trace = call.trace;
@@ -239,7 +259,7 @@ JobRecord CreateJobRecord(const RpcParts& parts,
   spdlog::info("[job={}{}{}] accepted {} of {} ({} jobs)",
                job.name,
                call.trace.empty() ? "" : " trace=",
-               call.trace,
+               TraceIdOf(call.trace),
                job.kind,
                job.scene,
                graph.jobs.size());

@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <set>
+#include <map>
 
 #include "color3d/internal/v1/worker.grpc.pb.h"
 #include "core/base/text/utf8.h"
 #include "server/base/service_error.h"
-#include "server/ops/job_log.h"
 #include "server/rpc/blobs/blob_streams.h"
 #include "server/rpc/calls/convert.h"
 
@@ -25,7 +24,8 @@ using grpc::ServerUnaryReactor;
 
 // Owner of the workers' calls, streams and uploads: not a name of a project.
 constexpr char kOwner[] = "-workers";
-constexpr size_t kMaxShown = 16;
+// Of a text that a worker tells about itself.
+constexpr size_t kMaxFactBytes = 100;
 
 struct WorkerCaller {
   std::string name;  // of the token or certificate; empty: none
@@ -63,17 +63,11 @@ class WorkerServiceImpl final : public wire::WorkerService::CallbackService {
       RequireWorkerProtocol(
           kWorkerProtocol, request->protocol(), parts_.version, request->release());
       if (parts_.draining) return;
-      const std::string worker = IdOf(caller, request->worker());
-      const std::set<int64_t> declined(request->declined().begin(), request->declined().end());
-      std::vector<JobRecord> shown;
-      const auto choice = [&](const JobRecord& job) {
-        if (!request->show()) return request->job_id() == 0 || job.id == request->job_id();
-        if (shown.size() < kMaxShown && !declined.contains(job.id)) shown.push_back(job);
-        return false;
-      };
-      const auto claimed = ClaimFor(worker, *request, choice);
-      if (claimed) shown.push_back(*claimed);
-      for (const JobRecord& job : shown) *response->add_jobs() = ToWire(job);
+      ClaimTerms terms = FromWire(*request);
+      terms.worker = IdOf(caller, terms.worker);
+      terms.lease_ms = LeaseMs(terms.lease_ms);
+      const std::optional<JobRecord> job = store_.Claim(terms);
+      if (job) *response->mutable_job() = ToWire(*job);
     });
   }
 
@@ -194,6 +188,9 @@ class WorkerServiceImpl final : public wire::WorkerService::CallbackService {
     return Answer(context, request, response, [=, this](const WorkerCaller& caller) {
       WorkerRecord worker = FromWire(*request);
       worker.worker_id = IdOf(caller, worker.worker_id);
+      for (std::string* text : {&worker.machine, &worker.release, &worker.simd}) {
+        *text = EscapeControls(text->substr(0, kMaxFactBytes));
+      }
       if (place_ == WorkerPlace::kElsewhere) worker.pid = 0;
       store_.UpdateWorker(worker);
     });
@@ -221,11 +218,13 @@ class WorkerServiceImpl final : public wire::WorkerService::CallbackService {
                                     const wire::AppendJobLogsRequest* request,
                                     wire::Done* response) override {
     return Answer(context, request, response, [=, this](const WorkerCaller&) {
+      std::map<std::string, std::string> logs;  // lines by job
       for (const wire::JobLogLine& line : request->lines()) {
         CheckName(line.job(), "jobs");
-        if (parts_.job_logs.empty()) continue;
-        AppendJobLog(parts_.job_logs, line.job(), EscapeControls(line.text()));
+        logs[line.job()] += EscapeControls(CleanUtf8(line.text())) + "\n";
       }
+      if (!parts_.job_logs) return;
+      for (const auto& [job, lines] : logs) parts_.job_logs->Append(job, lines);
     });
   }
 
@@ -330,17 +329,6 @@ class WorkerServiceImpl final : public wire::WorkerService::CallbackService {
 
   int64_t LeaseMs(int64_t asked) const {
     return std::clamp<int64_t>(asked, 1, parts_.worker_times.lease_ms);
-  }
-
-  std::optional<JobRecord> ClaimFor(const std::string& worker,
-                                    const wire::ClaimRequest& request,
-                                    const JobChoice& choice) const {
-    const int64_t lease_ms = LeaseMs(request.lease_ms());
-    if (!request.batch_kind().empty()) {
-      return store_.ClaimForBatch(worker, lease_ms, request.batch_kind(), choice);
-    }
-    if (!request.show() && request.job_id() == 0) return store_.Claim(worker, lease_ms);
-    return store_.ClaimAccepted(worker, lease_ms, choice);
   }
 
   const RpcParts& parts_;

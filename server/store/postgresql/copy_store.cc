@@ -67,7 +67,9 @@ std::vector<Column> ColumnsOf(SqlDatabase& target, const char* table) {
 
 // What is selected of a column. Steady times of a machine mean nothing in the database.
 std::string Selected(const Column& column, bool from_sqlite) {
-  if (column.name == "run_after_ms") return from_sqlite ? "0" : column.name;
+  if (column.name == "run_after_ms" || column.name == "preferred_until_ms") {
+    return from_sqlite ? "0" : column.name;
+  }
   if (column.name == "lease_expires_ms" && from_sqlite) {
     return fmt::format("case when {0} is null then {1} else 0 end", column.name, kNull);
   }

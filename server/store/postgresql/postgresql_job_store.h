@@ -10,12 +10,13 @@
 
 #include "server/store/postgresql/postgresql_connections.h"
 #include "server/store/postgresql/postgresql_listener.h"
+#include "server/store/shared_job_logs.h"
 #include "server/store/sql_job_store.h"
 #include "server/store/store_schema.h"
 
 namespace color3d {
 
-class PostgresqlJobStore : public SqlJobStore {
+class PostgresqlJobStore : public SqlJobStore, public SharedJobLogs {
  public:
   // `address`: postgresql://[ROLE@]HOST[:PORT]/DATABASE[?OPTIONS]. Clocks are for tests. Throws
   // like PreparePostgresql.
@@ -29,6 +30,9 @@ class PostgresqlJobStore : public SqlJobStore {
   // Asks the database only if it has told of events after `revision`.
   std::vector<EventRecord> EventsSince(int64_t revision, int limit) override;
   using SqlJobStore::EventsSince;
+
+  void AppendJobLog(const std::string& job, const std::string& lines) override;
+  std::string ReadJobLog(const std::string& job, int64_t offset, size_t max_bytes) override;
 
   // See PostgresqlListener.
   bool WaitForEvent(int64_t revision, std::chrono::milliseconds limit) {

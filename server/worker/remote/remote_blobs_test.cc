@@ -90,6 +90,18 @@ TEST_F(RemoteBlobsTest, ResultsAreCachedAndCheckpointsAreNot) {
   EXPECT_EQ(Read(remote_, result.sha256), "result");
 }
 
+TEST_F(RemoteBlobsTest, FileOfManyStagesIsFetchedOnce) {
+  const FileDigest photo = blobs_.PutBytes(RandomBytes(100'000, 3));
+  for (int stage = 0; stage < 5; ++stage) Read(remote_, photo.sha256);
+  EXPECT_EQ(cache_.use().miss_bytes, photo.size_bytes);
+  EXPECT_EQ(cache_.use().hit_bytes, 4 * photo.size_bytes);
+  EXPECT_EQ(cache_.use().bytes, photo.size_bytes);
+  EXPECT_EQ(cache_.use().limit_bytes, 64 << 20);
+  WriteFileAtomic(scratch_.path() / "result", "result");
+  Read(remote_, remote_.PutFile(scratch_.path() / "result").sha256);
+  EXPECT_EQ(cache_.use().miss_bytes, photo.size_bytes) << "its own result was not fetched";
+}
+
 TEST_F(RemoteBlobsTest, RemovesOnlyWhatNothingNames) {
   const FileDigest state = remote_.PutBytes("state");
   const StoredBlob blob = remote_.Look(state.sha256).value();

@@ -5,9 +5,6 @@ namespace wire = internal::v1;
 using Stub = WorkerLink::Stub;
 namespace {
 
-// Rounds of looking for an acceptable job.
-constexpr int kMaxRounds = 20;
-
 wire::Name NameOf(const std::string& name) {
   wire::Name message;
   message.set_name(name);
@@ -57,58 +54,13 @@ void RemoteStore::RemoveWorker(const std::string& worker_id) {
   link_.Once(&Stub::RemoveWorker, NameOf(worker_id));
 }
 
-wire::ClaimRequest RemoteStore::NewClaim(const std::string& worker, int64_t lease_ms) const {
-  wire::ClaimRequest request;
+std::optional<JobRecord> RemoteStore::Claim(const ClaimTerms& terms) {
+  wire::ClaimRequest request = ToWire(terms);
   request.set_protocol(protocol_);
   request.set_release(release_);
-  request.set_worker(worker);
-  request.set_lease_ms(lease_ms);
-  return request;
-}
-
-std::optional<JobRecord> RemoteStore::SendClaim(const wire::ClaimRequest& request) {
   const wire::ClaimResponse response = link_.Once(&Stub::Claim, request);
-  if (response.jobs().empty()) return std::nullopt;
-  return FromWire(response.jobs(0));
-}
-
-std::optional<JobRecord> RemoteStore::Choose(wire::ClaimRequest request, const JobChoice& accept) {
-  for (int round = 0; round < kMaxRounds; ++round) {
-    request.set_show(true);
-    request.set_job_id(0);
-    const wire::ClaimResponse shown = link_.Once(&Stub::Claim, request);
-    if (shown.jobs().empty()) return std::nullopt;
-    for (const wire::Job& job : shown.jobs()) {
-      if (!accept(FromWire(job))) {
-        request.add_declined(job.id());
-        continue;
-      }
-      request.set_show(false);
-      request.set_job_id(job.id());
-      if (auto claimed = SendClaim(request)) return claimed;
-      break;  // another worker was faster
-    }
-  }
-  return std::nullopt;
-}
-
-std::optional<JobRecord> RemoteStore::Claim(const std::string& worker, int64_t lease_ms) {
-  return SendClaim(NewClaim(worker, lease_ms));
-}
-
-std::optional<JobRecord> RemoteStore::ClaimAccepted(const std::string& worker,
-                                                    int64_t lease_ms,
-                                                    const JobChoice& accept) {
-  return Choose(NewClaim(worker, lease_ms), accept);
-}
-
-std::optional<JobRecord> RemoteStore::ClaimForBatch(const std::string& worker,
-                                                    int64_t lease_ms,
-                                                    const std::string& kind,
-                                                    const JobChoice& accept) {
-  wire::ClaimRequest request = NewClaim(worker, lease_ms);
-  request.set_batch_kind(kind);
-  return Choose(std::move(request), accept);
+  if (!response.has_job()) return std::nullopt;
+  return FromWire(response.job());
 }
 
 HeartbeatReply RemoteStore::Heartbeat(const Lease& lease,

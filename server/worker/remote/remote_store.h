@@ -27,15 +27,8 @@ class RemoteStore : public WorkerStore {
   std::vector<WorkerRecord> ListWorkers() override;
   void RemoveWorker(const std::string& worker_id) override;
 
-  std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override;
-  // Asks for the next jobs, chooses here, and claims the choice if it is still the turn of it.
-  std::optional<JobRecord> ClaimAccepted(const std::string& worker,
-                                         int64_t lease_ms,
-                                         const JobChoice& accept) override;
-  std::optional<JobRecord> ClaimForBatch(const std::string& worker,
-                                         int64_t lease_ms,
-                                         const std::string& kind,
-                                         const JobChoice& accept) override;
+  using WorkerStore::Claim;
+  std::optional<JobRecord> Claim(const ClaimTerms& terms) override;
   // One try, because the next heartbeat follows.
   HeartbeatReply Heartbeat(const Lease& lease,
                            const ProgressRecord& progress,
@@ -53,10 +46,6 @@ class RemoteStore : public WorkerStore {
   void UpdateWorker(const WorkerRecord& worker) override;
 
  private:
-  internal::v1::ClaimRequest NewClaim(const std::string& worker, int64_t lease_ms) const;
-  std::optional<JobRecord> Choose(internal::v1::ClaimRequest request, const JobChoice& accept);
-  std::optional<JobRecord> SendClaim(const internal::v1::ClaimRequest& request);
-
   WorkerLink& link_;
   const std::string release_;
   const int32_t protocol_;

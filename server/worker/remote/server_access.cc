@@ -54,7 +54,8 @@ ServerAccess::ServerAccess(const DataPaths& paths,
       link_({sockets_->Address(kWorkerSocket)}, timing),
       heartbeat_link_({sockets_->Address(kWorkerSocket)}, timing),
       store_(link_, release),
-      heartbeat_store_(heartbeat_link_, release) {
+      heartbeat_store_(heartbeat_link_, release),
+      logs_(std::make_shared<LogSender>(heartbeat_link_)) {
   if (cache.bytes == 0) {
     blobs_ = std::make_unique<FileBlobStore>(paths.Blobs(), BlobStoreOptions{reserve_bytes});
     return;

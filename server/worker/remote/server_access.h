@@ -46,7 +46,8 @@ class ServerAccess {
   // For heartbeats: with its own connection, so that transfers do not delay them.
   WorkerStore& heartbeat_store() { return heartbeat_store_; }
   WorkerBlobs& blobs() { return *blobs_; }
-  // Null on the server's machine, where they are written to files.
+  // Without a cache: zeros.
+  CacheUse cache_use() const { return cache_ ? cache_->use() : CacheUse{}; }
   const std::shared_ptr<LogSender>& logs() const { return logs_; }
 
  private:

@@ -130,19 +130,31 @@ TEST_P(WorkerStoreTest, ClaimsByPriorityThenAge) {
   EXPECT_EQ(ClaimOne().name, first.name);
 }
 
-TEST_P(WorkerStoreTest, ClaimsFirstAcceptedJob) {
-  for (int i = 0; i < 40; ++i) CreateSingle();
-  const JobRecord wanted = CreateSingle();
-  CreateSingle();
-  const auto accept = [&](const JobRecord& job) { return job.id >= wanted.id; };
-  const auto job = worker().ClaimAccepted("w", kLease, accept);
+TEST_P(WorkerStoreTest, ClaimsJobsWhoseModelsItHas) {
+  const auto create = [&](std::vector<std::string> models) {
+    NewGraph graph;
+    graph.scene = "scenes/test";
+    graph.jobs = {Job("single")};
+    graph.jobs[0].needs.models = std::move(models);
+    return store_->CreateGraph(graph, {}, kNoLimit).name;
+  };
+  for (int i = 0; i < 40; ++i) create({"model clip", "model absent"});
+  const std::string wanted = create({"model clip"});
+  const std::string plain = create({});
+  ClaimTerms terms{.worker = "w", .lease_ms = kLease};
+  terms.models = {"model clip", "backend paint"};
+  store_->SetHold(Hold::kPaused, true);
+  EXPECT_FALSE(worker().Claim(terms));
+  store_->SetHold(Hold::kPaused, false);
+  const auto job = worker().Claim(terms);
   ASSERT_TRUE(job.has_value());
-  EXPECT_EQ(job->name, wanted.name);
+  EXPECT_EQ(job->name, wanted);
   EXPECT_EQ(job->state, JobState::kRunning);
   EXPECT_EQ(job->spec, "spec of single");
-  EXPECT_FALSE(worker().ClaimAccepted("w", kLease, [](const JobRecord&) { return false; }));
-  store_->SetHold(Hold::kPaused, true);
-  EXPECT_FALSE(worker().ClaimAccepted("w", kLease, accept));
+  terms.models.emplace();
+  EXPECT_EQ(worker().Claim(terms).value().name, plain);
+  EXPECT_FALSE(worker().Claim(terms));
+  EXPECT_TRUE(worker().Claim("w", kLease)) << "a worker that lists none has all";
 }
 
 // Every field that a worker reads.
@@ -210,20 +222,26 @@ TEST_P(WorkerStoreTest, JoinsEqualWork) {
   EXPECT_EQ(StateOf(second.name), JobState::kQueued);
 }
 
-const auto kAnyJob = [](const JobRecord&) { return true; };
+const ClaimTerms kBatch{.worker = "w",
+                        .lease_ms = kLease,
+                        .memory_limit_bytes = 0,
+                        .models = {},
+                        .batch_kind = "personalize",
+                        .batch_group = ""};
 
 TEST_P(WorkerStoreTest, BatchTakesTurnsBetweenSubmittedJobs) {
   const JobRecord many = store_->CreateGraph(PersonalizeJobs(5), {}, kNoLimit);
   const JobRecord few = store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
   EXPECT_EQ(ClaimOne().parent, many.name);
-  const auto next = [&] { return worker().ClaimForBatch("w", kLease, "personalize", kAnyJob); };
+  const auto next = [&] { return worker().Claim(kBatch); };
   EXPECT_EQ(next()->parent, few.name) << "it has none running yet";
   const auto third = next();
   EXPECT_EQ(third->parent, many.name);
   EXPECT_EQ(third->state, JobState::kRunning);
   EXPECT_EQ(third->attempt, 1);
-  EXPECT_FALSE(
-      worker().ClaimForBatch("w", kLease, "personalize", [](const JobRecord&) { return false; }));
+  ClaimTerms other = kBatch;
+  other.batch_group = "of another encoder";
+  EXPECT_FALSE(worker().Claim(other));
 }
 
 TEST_P(WorkerStoreTest, BatchTakesTurnsBetweenProjects) {
@@ -233,7 +251,7 @@ TEST_P(WorkerStoreTest, BatchTakesTurnsBetweenProjects) {
   graph.project = "b";
   store_->CreateGraph(graph, {}, kNoLimit);
   EXPECT_EQ(ClaimOne().project, "a");
-  const auto next = worker().ClaimForBatch("w", kLease, "personalize", kAnyJob);
+  const auto next = worker().Claim(kBatch);
   ASSERT_TRUE(next.has_value());
   EXPECT_EQ(next->project, "b");
 }
@@ -242,11 +260,11 @@ TEST_P(WorkerStoreTest, BatchDoesNotOvertakeOtherKinds) {
   store_->CreateGraph(PersonalizeJobs(2), {}, kNoLimit);
   ClaimOne();
   const JobRecord other = CreateSingle();
-  EXPECT_TRUE(worker().ClaimForBatch("w", kLease, "personalize", kAnyJob)) << "it came before";
+  EXPECT_TRUE(worker().Claim(kBatch)) << "it came before";
   store_->CreateGraph(PersonalizeJobs(1), {}, kNoLimit);
-  EXPECT_FALSE(worker().ClaimForBatch("w", kLease, "personalize", kAnyJob));
+  EXPECT_FALSE(worker().Claim(kBatch));
   EXPECT_EQ(ClaimOne().name, other.name);
-  EXPECT_TRUE(worker().ClaimForBatch("w", kLease, "personalize", kAnyJob));
+  EXPECT_TRUE(worker().Claim(kBatch));
 }
 
 TEST_P(WorkerStoreTest, JobsThatLostWorkerAreNotBatched) {
@@ -255,7 +273,7 @@ TEST_P(WorkerStoreTest, JobsThatLostWorkerAreNotBatched) {
   now_ += kLease + 1;
   EXPECT_EQ(store_->ReapExpired(), 1);
   now_ += 1'000'000;
-  EXPECT_FALSE(worker().ClaimForBatch("w", kLease, "personalize", kAnyJob));
+  EXPECT_FALSE(worker().Claim(kBatch));
   EXPECT_EQ(ClaimOne().attempt, 2);
 }
 

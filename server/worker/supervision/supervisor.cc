@@ -12,6 +12,7 @@
 #include <map>
 
 #include "core/base/process/environment.h"
+#include "core/base/process/subprocess.h"
 #include "server/ops/process_state.h"
 
 namespace color3d {
@@ -224,6 +225,7 @@ void Supervisor::ReapInheritedProcesses() {
     if (::waitid(P_ALL, 0, &ended, WEXITED | WNOHANG | WNOWAIT) != 0 || ended.si_pid == 0) return;
     const auto is_it = [&](const Slot& slot) { return slot.pid == ended.si_pid; };
     if (std::ranges::any_of(slots_, is_it)) return;  // in the next round
+    if (IsSubprocess(ended.si_pid)) return;          // another thread waits for it
     ::waitpid(ended.si_pid, nullptr, WNOHANG);
   }
 }

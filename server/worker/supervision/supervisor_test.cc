@@ -1,9 +1,10 @@
-// Workers without reports are killed unless the disk is full.
+// Workers without reports are killed unless the disk is full; other children are left alone.
 #include "server/worker/supervision/supervisor.h"
 
 #include <atomic>
 #include <fstream>
 
+#include "core/base/process/subprocess.h"
 #include "tests/support/service/job_store_fixture.h"
 
 namespace color3d {
@@ -47,6 +48,22 @@ TEST_F(JobStoreTest, KillsSilentWorkerUnlessDiskIsFull) {
   EXPECT_EQ(count(), 1) << "it could not have reported itself";
   store.full = false;
   EXPECT_TRUE(becomes([&] { return count() >= 2; }));
+}
+
+// It takes the exit status of orphans, which a container's first process inherits.
+TEST_F(JobStoreTest, LeavesExitStatusOfSubprocessesToTheirThreads) {
+  SqliteJobStore store(File(), StoreRole::kTool, TestClocks());
+  SupervisorOptions options;
+  options.workers = 0;
+  Supervisor supervisor(options, store);
+  SubprocessOptions run;
+  run.arguments = {"sh", "-c", "sleep 0.0$(($$ % 10)); exit 7"};
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(3);
+  int runs = 0;
+  for (; std::chrono::steady_clock::now() < end; ++runs) {
+    ASSERT_EQ(RunSubprocess(run, CancellationToken()).exit_code, 7) << "run " << runs;
+  }
+  EXPECT_GT(runs, 10);
 }
 
 }  // namespace

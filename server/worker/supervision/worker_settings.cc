@@ -24,6 +24,10 @@ std::vector<std::string> ToFlags(const WorkerSettings& settings) {
   VisitTimings(settings, [&](const char* flag, const auto& value) {
     flags.insert(flags.end(), {flag, fmt::to_string(value)});
   });
+  if (settings.sends_logs) flags.emplace_back("--send-logs");
+  if (!settings.otlp_endpoint.empty()) {
+    flags.insert(flags.end(), {"--otlp-endpoint", settings.otlp_endpoint});
+  }
   if (!settings.sandbox) flags.emplace_back("--no-sandbox");
   return flags;
 }

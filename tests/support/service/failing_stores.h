@@ -75,17 +75,10 @@ class FailingStore : public SqliteJobStore {
   std::vector<JobRecord> ListChildren(const std::string& name) override {
     return faults_.Around("ListChildren", [&] { return SqliteJobStore::ListChildren(name); });
   }
-  std::optional<JobRecord> Claim(const std::string& worker, int64_t lease_ms) override {
-    return faults_.Around("Claim", [&] { return SqliteJobStore::Claim(worker, lease_ms); });
-  }
-  std::optional<JobRecord> ClaimForBatch(
-      const std::string& worker,
-      int64_t lease_ms,
-      const std::string& kind,
-      const std::function<bool(const JobRecord&)>& accept) override {
-    return faults_.Around("ClaimForBatch", [&] {
-      return SqliteJobStore::ClaimForBatch(worker, lease_ms, kind, accept);
-    });
+  using WorkerStore::Claim;
+  std::optional<JobRecord> Claim(const ClaimTerms& terms) override {
+    return faults_.Around(terms.batch_kind.empty() ? "Claim" : "ClaimForBatch",
+                          [&] { return SqliteJobStore::Claim(terms); });
   }
   std::vector<JobRecord> GetInputs(int64_t job_id) override {
     return faults_.Around("GetInputs", [&] { return SqliteJobStore::GetInputs(job_id); });

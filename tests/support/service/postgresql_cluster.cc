@@ -11,6 +11,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -132,6 +133,12 @@ void PostgresqlCluster::Start() {
     if (::waitpid(server_, nullptr, WNOHANG) == server_) server_ = 0;
   }
   throw std::runtime_error("PostgreSQL does not start; see " + folder_.string() + "/postgres.log");
+}
+
+void PostgresqlCluster::AllowFrom(const std::string& addresses) {
+  std::ofstream(folder_ / "data" / "pg_hba.conf", std::ios::app)
+      << "host all all " << addresses << " trust\n";
+  Run("select pg_reload_conf()");
 }
 
 void PostgresqlCluster::Kill() {

@@ -29,6 +29,8 @@ class PostgresqlCluster {
   std::string AddressOf(const std::string& database) const;
   // Path of the socket.
   std::filesystem::path Socket() const;
+  // Lets everybody in from these addresses, e.g. "10.0.0.0/8". Requires: `listen_addresses` is set.
+  void AllowFrom(const std::string& addresses);
   // Kills the server without a shutdown.
   void Kill();
   void Start();

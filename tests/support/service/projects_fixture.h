@@ -24,7 +24,7 @@ class ProjectsTest : public RpcTest {
     options.limits.project_max_scenes = 3;
     options.limits.project_max_unfinished_jobs = 20;
     options.limits.project_max_streams = 2;
-    options.job_logs = scratch_.path();
+    options.job_logs = MakeFileJobLogs(scratch_.path());
     options.inference.target = "unix:" + (scratch_.path() / "nobody").string();
     options.drain = [this] { asked_to_drain_ = true; };
     guarded_ = std::make_unique<RpcServer>(options, store_, blobs_, uploads_, SystemClock());

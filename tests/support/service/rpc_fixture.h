@@ -33,7 +33,7 @@ class RpcTest : public ::testing::Test {
     options.watch.keepalive = std::chrono::milliseconds(300);
     options.limits.max_unfinished_jobs = 40;
     options.limits.max_watches = kMaxWatches;
-    options.job_logs = scratch_.path();
+    options.job_logs = MakeFileJobLogs(scratch_.path());
     server_ = std::make_unique<RpcServer>(options, store_, blobs_, uploads_, SystemClock());
     client_ = std::make_unique<TestClient>(server_->address());
   }

@@ -20,7 +20,8 @@ class TestAuthority {
   TestAuthority(const std::filesystem::path& folder, const std::string& name);
 
   const std::filesystem::path& certificate() const { return file_; }
-  // For "localhost" and 127.0.0.1, valid from `from_s` to `until_s` seconds from now.
+  // For "localhost", 127.0.0.1 and the first three machines of a TestNetwork, valid from `from_s`
+  // to `until_s` seconds from now.
   CertificateFiles Issue(const std::string& name, long from_s = -60, long until_s = 3600);
 
  private:
