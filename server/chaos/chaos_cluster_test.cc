@@ -15,7 +15,6 @@
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "server/access/tokens.h"
-#include "server/keeping/fsck.h"
 #include "server/store/postgresql/postgresql_db.h"
 #include "tests/support/service/chaos_service.h"
 #include "tests/support/service/postgresql_cluster.h"
@@ -119,13 +118,7 @@ class Cluster {
 
   AnyServer Servers() const { return {addresses_, authority_.certificate(), operator_}; }
   int faults() const { return faults_sum_; }
-  std::string FaultsText() const {
-    std::string text;
-    for (const auto& [kind, count] : faults_) {
-      text += fmt::format("{}{} x {}", text.empty() ? "" : ", ", count, kind);
-    }
-    return text;
-  }
+  std::string FaultsText() const { return testing::DescribeFaults(faults_); }
 
   // Injects one fault, in shuffled rounds of all kinds, and ends it. `frozen_only`: freezes
   // workers.
@@ -286,9 +279,6 @@ void Cluster::Disturb(Random& random, bool frozen_only) {
 
 std::vector<std::string> Cluster::EndAndAudit() {
   std::vector<std::string> problems;
-  const auto require_none = [&](int64_t count, const std::string& what) {
-    if (count != 0) problems.push_back(fmt::format("{}: {}", what, count));
-  };
   for (auto* group : {&workers_, &servers_}) {
     for (auto& [i, process] : *group) {
       process->Signal(SIGTERM);
@@ -302,17 +292,12 @@ std::vector<std::string> Cluster::EndAndAudit() {
       }
     }
   }
-  require_none(testing::RepeatedEffects((folder_ / "effects.saved").string()),
-               "effects that occur twice");
-  require_none(Count("select count(*) from job where end_ms=0"), "jobs that have not ended");
-  require_none(Count("select count(*) from job_attempt where end_ms=0"), "attempts without an end");
-  require_none(Count("select count(*) - count(distinct job_id) from job_attempt where "
-                     "outcome='SUCCEEDED'"),
-               "jobs that succeeded twice");
-  const FsckResult whole = Fsck(Data(0), address_, /*repair=*/false, [](int64_t) {});
-  require_none(static_cast<int64_t>(whole.store_problems.size()), "problems of the database");
-  require_none(static_cast<int64_t>(whole.missing.size()), "blobs that are missing");
-  require_none(static_cast<int64_t>(whole.damaged.size()), "blobs that are damaged");
+  for (std::string& problem :
+       testing::AuditJobs(Data(0), address_, folder_ / "effects", [this](const auto& sql) {
+         return Count(sql);
+       })) {
+    problems.push_back(std::move(problem));
+  }
   return problems;
 }
 

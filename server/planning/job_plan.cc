@@ -141,6 +141,28 @@ void SetPeakMemory(v1::JobPlan* plan) {
   plan->set_saved_memory_bytes(saved);
 }
 
+// Job of a graph that is no composite, with its options and its work.
+struct StageOfGraph {
+  size_t index = 0;
+  v1::JobSpec spec;
+  StageWork work;
+};
+
+std::vector<StageOfGraph> StagesOf(const NewGraph& graph,
+                                   const SceneFacts& facts,
+                                   const v1::ImportSceneSpec& import) {
+  std::vector<v1::JobSpec> specs;
+  for (const NewJob& job : graph.jobs) specs.push_back(ParseSpec(job.spec, job.kind));
+  const v1::JobSpec* given = FindGeometry(specs, graph);
+  const auto* geometry = given == nullptr ? nullptr : &given->reconstruct_geometry();
+  std::vector<StageOfGraph> stages;
+  for (size_t i = 0; i < specs.size(); ++i) {
+    if (IsComposite(specs[i])) continue;
+    stages.push_back({i, specs[i], WorkWithGeometry(specs[i], geometry, facts, import)});
+  }
+  return stages;
+}
+
 }  // namespace
 
 double EstimateJobSeconds(const v1::JobSpec& stage,
@@ -168,25 +190,20 @@ v1::JobPlan DescribeGraph(const NewGraph& graph,
                           const SceneFacts& facts,
                           const v1::ImportSceneSpec& import,
                           const MachineFactor& machine) {
-  std::vector<v1::JobSpec> specs;
-  for (const NewJob& job : graph.jobs) specs.push_back(ParseSpec(job.spec, job.kind));
-  const v1::JobSpec* geometry = FindGeometry(specs, graph);
   v1::JobPlan plan;
   plan.set_machine_factor(machine.factor);
   plan.set_measured_jobs(machine.jobs);
   double expected = 0.0, saved = 0.0;
-  for (size_t i = 0; i < specs.size(); ++i) {
-    if (IsComposite(specs[i])) continue;
-    const std::string& skip_reason = graph.jobs[i].skip_reason;
-    const StageWork work = WorkWithGeometry(
-        specs[i], geometry == nullptr ? nullptr : &geometry->reconstruct_geometry(), facts, import);
-    const double seconds = machine.factor * SecondsOf(specs[i], work);
+  for (const auto& [index, spec, work] : StagesOf(graph, facts, import)) {
+    const NewJob& job = graph.jobs[index];
+    const std::string& skip_reason = job.skip_reason;
+    const double seconds = machine.factor * SecondsOf(spec, work);
     v1::PlannedStage* stage = plan.add_stages();
-    stage->set_kind(graph.jobs[i].kind);
+    stage->set_kind(job.kind);
     stage->set_runs(skip_reason.empty());
-    stage->set_reason(skip_reason.empty() ? ReasonToRun(specs[i], facts, import) : skip_reason);
+    stage->set_reason(skip_reason.empty() ? ReasonToRun(spec, facts, import) : skip_reason);
     stage->set_expected_seconds(seconds);
-    stage->set_expected_peak_memory_bytes(EstimatePeakBytes(graph.jobs[i].kind, work));
+    stage->set_expected_peak_memory_bytes(EstimatePeakBytes(job.kind, work));
     (skip_reason.empty() ? expected : saved) += seconds;
   }
   plan.set_expected_seconds(expected);
@@ -196,23 +213,13 @@ v1::JobPlan DescribeGraph(const NewGraph& graph,
 }
 
 void SetNeeds(const SceneFacts& facts, const v1::ImportSceneSpec& import, NewGraph* graph) {
-  std::vector<v1::JobSpec> specs;
-  for (const NewJob& job : graph->jobs) specs.push_back(ParseSpec(job.spec, job.kind));
-  const v1::JobSpec* geometry = FindGeometry(specs, *graph);
-  for (size_t i = 0; i < specs.size(); ++i) {
-    if (IsComposite(specs[i])) continue;
-    JobNeeds needs;
-    const SpecNames names = NamesIn(specs[i]);
-    for (const NameUse& use : names.models) needs.models.push_back("model " + use.name);
-    for (const NameUse& use : names.backends) needs.models.push_back("backend " + use.name);
-    needs.batch_group = specs[i].personalize().encoder();
-    needs.memory_bytes = EstimatePeakBytes(
-        graph->jobs[i].kind,
-        WorkWithGeometry(specs[i],
-                         geometry == nullptr ? nullptr : &geometry->reconstruct_geometry(),
-                         facts,
-                         import));
-    graph->jobs[i].needs = std::move(needs);
+  for (const auto& [index, spec, work] : StagesOf(*graph, facts, import)) {
+    NewJob& job = graph->jobs[index];
+    const SpecNames names = NamesIn(spec);
+    for (const NameUse& use : names.models) job.needs.models.push_back(ModelNeed(use.name));
+    for (const NameUse& use : names.backends) job.needs.models.push_back(BackendNeed(use.name));
+    job.needs.batch_group = spec.personalize().encoder();
+    job.needs.memory_bytes = EstimatePeakBytes(job.kind, work);
   }
 }
 

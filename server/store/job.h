@@ -75,9 +75,12 @@ constexpr int64_t kNoDeadline = INT64_MAX;
 // What a worker must have to run a job.
 struct JobNeeds {
   int64_t memory_bytes = 0;         // expected peak memory; 0: unknown
-  std::vector<std::string> models;  // weights and model servers: "model NAME", "backend NAME"
+  std::vector<std::string> models;  // ModelNeed and BackendNeed of weights and model servers
   std::string batch_group;          // jobs of a kind with equal groups may share a batch
 };
+
+inline std::string ModelNeed(const std::string& name) { return "model " + name; }
+inline std::string BackendNeed(const std::string& name) { return "backend " + name; }
 
 struct JobRecord {
   int64_t id = 0;      // ascending in order of creation

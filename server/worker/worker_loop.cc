@@ -25,8 +25,8 @@ constexpr int64_t kSceneMemoryBytes = int64_t{512} << 20;
 // As in JobNeeds.
 std::set<std::string> NamesOfModels(const UserModels& models) {
   std::set<std::string> names;
-  for (const auto& [name, file] : models.files) names.insert("model " + name);
-  for (const auto& [name, address] : models.backends) names.insert("backend " + name);
+  for (const auto& [name, file] : models.files) names.insert(ModelNeed(name));
+  for (const auto& [name, address] : models.backends) names.insert(BackendNeed(name));
   return names;
 }
 

@@ -43,6 +43,35 @@ uint64_t ChaosSeed() {
   return static_cast<uint64_t>(seed);
 }
 
+std::vector<std::string> AuditJobs(const fs::path& data_folder,
+                                   const std::string& address,
+                                   const fs::path& effects,
+                                   const CountRows& count) {
+  std::vector<std::string> problems;
+  const auto require_none = [&](int64_t number, const char* what) {
+    if (number != 0) problems.push_back(fmt::format("{}: {}", what, number));
+  };
+  require_none(RepeatedEffects(effects.string() + ".saved"), "effects that occur twice");
+  require_none(count("select count(*) from job where end_ms=0"), "jobs that have not ended");
+  require_none(count("select count(*) from job_attempt where end_ms=0"), "attempts without an end");
+  require_none(count("select count(*) - count(distinct job_id) from job_attempt where "
+                     "outcome='SUCCEEDED'"),
+               "jobs that succeeded twice");
+  const FsckResult whole = Fsck(data_folder, address, /*repair=*/false, [](int64_t) {});
+  require_none(static_cast<int64_t>(whole.store_problems.size()), "problems of the job store");
+  require_none(static_cast<int64_t>(whole.missing.size()), "blobs that are missing");
+  require_none(static_cast<int64_t>(whole.damaged.size()), "blobs that are damaged");
+  return problems;
+}
+
+std::string DescribeFaults(const std::map<std::string, int>& faults) {
+  std::string text;
+  for (const auto& [kind, count] : faults) {
+    text += fmt::format("{}{} x {}", text.empty() ? "" : ", ", count, kind);
+  }
+  return text;
+}
+
 ChaosService::ChaosService(const fs::path& folder,
                            std::vector<std::string> flags,
                            std::string program)
@@ -148,34 +177,20 @@ int64_t ChaosService::Count(const char* sql) const {
 }
 
 std::vector<std::string> ChaosService::EndAndAudit() {
-  const auto require_none = [&](int64_t count, const char* what) {
-    if (count != 0) problems_.push_back(fmt::format("{}: {}", what, count));
-  };
   server_->Signal(SIGTERM);
-  require_none(server_->Wait(), "exit status of the server");
-  require_none(RepeatedEffects(effects_.string() + ".saved"), "effects that occur twice");
-  require_none(Count("select count(*) from job where end_ms=0"), "jobs that have not ended");
-  require_none(Count("select count(*) from job_attempt where end_ms=0"), "attempts without an end");
-  require_none(Count("select count(*) - count(distinct job_id) from job_attempt where "
-                     "outcome='SUCCEEDED'"),
-               "jobs that succeeded twice");
-  const FsckResult whole =
-      Fsck(folder_ / "data", TestStoreAddress(folder_ / "data"), /*repair=*/false, [](int64_t) {});
-  require_none(static_cast<int64_t>(whole.store_problems.size()), "problems of jobs.db");
-  require_none(static_cast<int64_t>(whole.missing.size()), "blobs that are missing");
-  require_none(static_cast<int64_t>(whole.damaged.size()), "blobs that are damaged");
+  const int status = server_->Wait();
+  if (status != 0) problems_.push_back(fmt::format("exit status of the server: {}", status));
+  const fs::path data = folder_ / "data";
+  for (std::string& problem :
+       AuditJobs(data, TestStoreAddress(data), effects_, [&](const auto& sql) {
+         return Count(sql.c_str());
+       })) {
+    problems_.push_back(std::move(problem));
+  }
   return problems_;
 }
 
 int ChaosService::RepeatedSteps() const { return RepeatedEffects(effects_.string() + ".begun"); }
-
-std::string ChaosService::Faults() const {
-  std::string text;
-  for (const auto& [kind, count] : faults_) {
-    text += fmt::format("{}{} x {}", text.empty() ? "" : ", ", count, kind);
-  }
-  return text;
-}
 
 std::string ResultOf(TestClient& client, const std::string& job) {
   std::vector<v1::Job> jobs = client.Children(job);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -18,6 +19,18 @@ namespace color3d::testing {
 int64_t FromEnvironment(const char* name, int64_t otherwise);
 // COLOR3D_CHAOS_SEED, or the time; printed.
 uint64_t ChaosSeed();
+
+// Counts rows of the job store by a statement.
+using CountRows = std::function<int64_t(const std::string& sql)>;
+// Returns what is wrong after all jobs of a scenario have ended: effects that occur twice, jobs and
+// attempts without an end, blobs that are missing or damaged. `effects`: COLOR3D_TEST_EFFECTS;
+// `address`: of the store, empty: SQLite.
+std::vector<std::string> AuditJobs(const std::filesystem::path& data_folder,
+                                   const std::string& address,
+                                   const std::filesystem::path& effects,
+                                   const CountRows& count);
+// "20 x worker killed, ..."
+std::string DescribeFaults(const std::map<std::string, int>& faults);
 
 enum class Fault {
   kWorkerKilled,
@@ -52,8 +65,7 @@ class ChaosService {
   // Number of steps that more than one attempt began; 0: no job was taken over.
   int RepeatedSteps() const;
   int64_t Count(const char* sql) const;
-  // "20 x worker killed, ..."
-  std::string Faults() const;
+  std::string Faults() const { return DescribeFaults(faults_); }
 
  private:
   void Start();

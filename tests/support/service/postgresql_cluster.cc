@@ -68,12 +68,9 @@ PostgresqlCluster& PostgresqlCluster::Shared() {
 
 PostgresqlCluster::PostgresqlCluster(std::vector<std::string> settings)
     : settings_(std::move(settings)) {
-  std::string name = (fs::temp_directory_path() / "color3d-pg-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot create " + name);
-  folder_ = name;
   const passwd* user = ::getpwnam("postgres");
   if (::geteuid() == 0 && user != nullptr) {
-    static_cast<void>(::chown(name.c_str(), user->pw_uid, user->pw_gid));
+    static_cast<void>(::chown(folder_.c_str(), user->pw_uid, user->pw_gid));
   }
   const pid_t initdb = StartAsPostgres({(ProgramsOfPostgresql() / "initdb").string(),
                                         "-D",
@@ -89,7 +86,8 @@ PostgresqlCluster::PostgresqlCluster(std::vector<std::string> settings)
                                        folder_ / "initdb.log");
   int status = 0;
   ::waitpid(initdb, &status, 0);
-  if (status != 0) throw std::runtime_error("initdb failed; see " + name + "/initdb.log");
+  if (status != 0)
+    throw std::runtime_error("initdb failed; see " + folder_.string() + "/initdb.log");
   Start();
 }
 
@@ -98,8 +96,6 @@ PostgresqlCluster::~PostgresqlCluster() {
     ::kill(server_, SIGQUIT);
     ::waitpid(server_, nullptr, 0);
   }
-  std::error_code error;
-  fs::remove_all(folder_, error);
 }
 
 std::string PostgresqlCluster::AddressOf(const std::string& database) const {

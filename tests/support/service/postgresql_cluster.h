@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/files.h"
+
 namespace color3d::testing {
 
 class PostgresqlCluster {
@@ -37,7 +39,8 @@ class PostgresqlCluster {
   void Run(const std::string& sql, const std::string& database = "postgres") const;
 
  private:
-  std::filesystem::path folder_;
+  ScratchFolder scratch_;
+  const std::filesystem::path folder_ = scratch_.path();
   std::vector<std::string> settings_;
   pid_t server_ = 0;
   int databases_ = 0;

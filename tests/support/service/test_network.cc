@@ -54,9 +54,6 @@ TestNetwork::TestNetwork() {
     problem_ = std::string("unshare: ") + std::strerror(errno);
     return;
   }
-  std::string name = (fs::temp_directory_path() / "color3d-net-XXXXXX").string();
-  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot create " + name);
-  folder_ = name;
   try {
     Run("ip link set lo up");
     Run("ip link add name hub type bridge");
@@ -72,8 +69,6 @@ TestNetwork::~TestNetwork() {
     ::kill(machine.holder, SIGKILL);
     ::waitpid(machine.holder, nullptr, 0);
   }
-  std::error_code error;
-  if (!folder_.empty()) fs::remove_all(folder_, error);
 }
 
 void TestNetwork::Run(const std::string& command) {
@@ -105,7 +100,7 @@ std::string TestNetwork::AddressOf(const std::string& machine) const {
 
 std::string TestNetwork::ProgramOn(const std::string& machine, const std::string& program) const {
   const fs::path script =
-      fs::path(folder_) / fmt::format("on-{}-{}", machine, fs::path(program).filename().string());
+      scripts_.path() / fmt::format("on-{}-{}", machine, fs::path(program).filename().string());
   std::ofstream(script) << fmt::format(
       "#!/bin/sh\nexec nsenter --net={} {} \"$@\"\n", NamespaceOf(Find(machine).holder), program);
   ::chmod(script.c_str(), 0755);

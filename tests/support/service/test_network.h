@@ -7,6 +7,8 @@
 #include <map>
 #include <string>
 
+#include "core/base/files.h"
+
 namespace color3d::testing {
 
 class TestNetwork {
@@ -55,7 +57,7 @@ class TestNetwork {
 
   std::string problem_;
   std::map<std::string, Machine> machines_;
-  std::string folder_;  // of scripts
+  ScratchFolder scripts_;
 };
 
 }  // namespace color3d::testing
