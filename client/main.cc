@@ -68,6 +68,9 @@ ExitCode RunCommand(const std::filesystem::path& token_file, Context* context) {
 int Main(int argc, char** argv) {
   // Our own messages replace gRPC's log.
   ::setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);
+  // Without a call under way, gRPC polls its sockets every 5 s by default: too rarely for the steps
+  // of a TLS handshake between two tries of a call, and servers close slow ones.
+  ::setenv("GRPC_CLIENT_CHANNEL_BACKUP_POLL_INTERVAL_MS", "100", /*overwrite=*/0);
   Context context;
   context.interrupt = &interrupt;
   context.arguments.assign(argv + 1, argv + argc);

@@ -23,7 +23,8 @@ case "${1:-}" in
     python3-grpcio python3-protobuf python3-numpy python3-pil
     python3-venv python3-setuptools python3-wheel mypy python3-yaml) ;;
   --fuzz) packages+=(libgtest-dev libgmock-dev libbenchmark-dev clang libclang-rt-dev) ;;
-  --engines) packages+=(slurmctld slurmd slurm-client munge kubernetes-client python3-kubernetes python3-yaml) ;;
+  --engines) packages+=(slurmctld slurmd slurm-client munge python3-kubernetes python3-yaml)
+    command -v kubectl >/dev/null 2>&1 || packages+=(kubernetes-client) ;; # two packages own /usr/bin/kubectl
   *) echo "install-deps: unknown option $1; use --tests, --fuzz or --engines" >&2; exit 2 ;;
 esac
 

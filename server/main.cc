@@ -12,10 +12,12 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
+#include <memory>
 #include <sstream>
 
 #include "core/base/error.h"
 #include "server/access/tokens.h"
+#include "server/blob_place.h"
 #include "server/keeping/backup.h"
 #include "server/keeping/fsck.h"
 #include "server/ops/process.h"
@@ -24,6 +26,34 @@
 
 namespace color3d {
 namespace {
+
+void AddBlobPlace(CLI::App* command, BlobPlaceOptions* options) {
+  command->add_option("--blobs",
+                      options->blobs,
+                      "s3://BUCKET[/PREFIX]: keep files in an object store, which several servers "
+                      "may share; default: the data folder");
+  command->add_option("--s3-endpoint",
+                      options->endpoint,
+                      "Address of the object store: https://HOST[:PORT], or http://HOST[:PORT] in "
+                      "a trusted network; default: Amazon's of the region");
+  command->add_option("--s3-region", options->region, "Region of the bucket")
+      ->capture_default_str();
+  command->add_option("--s3-credentials-file",
+                      options->credentials,
+                      "File with lines access_key_id = ID and secret_access_key = SECRET, and "
+                      "session_token = TOKEN of temporary keys; reloaded after changes");
+  command->add_option("--s3-ca",
+                      options->authorities,
+                      "PEM file with the authorities of the object store's certificate; default: "
+                      "those of the system");
+  command
+      ->add_option("--blob-cache-gib",
+                   options->cache_gib,
+                   "Size of the files of the object store that are kept on this machine, GiB: half "
+                   "by the server, half by its workers")
+      ->check(CLI::Range(0.01, 1e6))
+      ->capture_default_str();
+}
 
 // Flags of the group "" are hidden, for tests.
 void AddServe(CLI::App* serve, ServeOptions* options) {
@@ -37,6 +67,7 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
                     options->store,
                     "postgresql://ROLE@HOST:PORT/DATABASE with the jobs, which several servers may "
                     "share; default: jobs.db in the data folder");
+  AddBlobPlace(serve, &options->blobs);
   serve
       ->add_option(
           "--workers", options->workers, "Number of worker processes; each runs one job at a time")
@@ -230,12 +261,18 @@ void TakeFromEnvironment(const char* variable, std::vector<std::string>* values)
 struct KeepingArguments {
   std::filesystem::path data_folder, copy;
   std::string address;  // of a PostgreSQL store
+  BlobPlaceOptions blobs;
   bool repair = false;
   std::function<int()> run;  // empty: another command
 };
 
 // Returns exit status 1 if the copy lacks blobs, which are listed.
 int ReportMissingBlobs(const CopiedBlobs& copied, const std::filesystem::path& from) {
+  if (!copied.elsewhere.empty()) {
+    std::cout << fmt::format(
+        "its blobs are in {} and were not copied: keep versions or a replica of that bucket\n",
+        copied.elsewhere);
+  }
   for (const std::string& sha256 : copied.missing) std::cout << "missing: " << sha256 << "\n";
   for (const std::string& sha256 : copied.damaged) std::cout << "damaged: " << sha256 << "\n";
   for (const std::string& what : copied.unreadable) std::cout << "unreadable: " << what << "\n";
@@ -284,8 +321,10 @@ int RunFsck(const KeepingArguments& arguments) {
   const auto progress = [&](int64_t blobs) {
     if (is_terminal && blobs % 100 == 0) std::cerr << "\r" << blobs << " blobs" << std::flush;
   };
+  const std::unique_ptr<BlobStore> elsewhere =
+      OpenBlobsAsTool(arguments.blobs, DataPaths(arguments.data_folder));
   const FsckResult result =
-      Fsck(arguments.data_folder, arguments.address, arguments.repair, progress);
+      Fsck(arguments.data_folder, arguments.address, elsewhere.get(), arguments.repair, progress);
   if (is_terminal) std::cerr << "\r";
   for (const std::string& problem : result.store_problems)
     std::cout << "jobs.db: " << problem << "\n";
@@ -351,6 +390,7 @@ void AddKeeping(CLI::App* app, KeepingArguments* arguments) {
   CLI::App* fsck = add("fsck", "Check a data folder; no server may use it", RunFsck);
   fsck->add_flag("--repair", arguments->repair, "Set damaged blobs aside");
   fsck->add_option("--store", arguments->address, "As for serve, if jobs are in PostgreSQL");
+  AddBlobPlace(fsck, &arguments->blobs);
   add("migrate", "Copy the jobs of a data folder to PostgreSQL; the server may run", RunMigrate)
       ->add_option("--to",
                    arguments->address,

@@ -38,7 +38,6 @@
 #include "server/rpc/rpc_server.h"
 #include "server/storage/ballast.h"
 #include "server/storage/data_folder.h"
-#include "server/storage/file_blob_store.h"
 #include "server/storage/upload_store.h"
 #include "server/store/open_store.h"
 #include "server/tracing/job_spans.h"
@@ -77,6 +76,7 @@ void CheckOptions(const ServeOptions& options) {
   }
   CheckAddressForm("--listen", options.listen);
   if (!options.metrics_listen.empty()) CheckAddressForm("--metrics-listen", options.metrics_listen);
+  CheckBlobPlace(options.blobs);
   if (options.data_folder.empty()) throw InvalidArgument("--data-dir is empty; name a folder");
   for (const std::string& target : options.notify_allow) CheckNotifyTarget(target);
   if (options.notify_allow.empty() == !options.notify_secret.empty()) {
@@ -134,6 +134,7 @@ SupervisorOptions WorkerSetup(const ServeOptions& options, const UserModels& mod
   settings.data_folder = options.data_folder;
   settings.threads = threads;
   settings.memory_mib = memory_mib;
+  settings.blob_cache_mib = WorkerCacheMib(options.blobs, options.workers + 1);
   settings.drain_grace_seconds = options.drain_seconds * 0.75;
   settings.sends_logs = !options.store.empty();
   setup.arguments = ToFlags(settings);
@@ -179,6 +180,7 @@ InferenceLink InferenceSetup(const ServeOptions& options,
   settings.data_folder = options.data_folder;
   settings.threads = options.live_threads > 0 ? options.live_threads : machine;
   settings.memory_mib = WorkerMemoryMib(options, 0.5);
+  settings.blob_cache_mib = WorkerCacheMib(options.blobs, options.workers + 1);
   settings.drain_grace_seconds = options.drain_seconds * 0.5;
   std::vector<std::string>& arguments = setup->inference_arguments;
   arguments = ToFlags(settings);
@@ -199,6 +201,7 @@ ServerSample SampleOf(const ServeOptions& options,
                       const Maintenance& maintenance,
                       const BlobStore& blobs,
                       const SelfProbe& probe,
+                      const Tracer* tracer,
                       bool draining) {
   const RpcServer::Open open = server.open();
   const ChoreCounts& counts = maintenance.counts();
@@ -214,6 +217,7 @@ ServerSample SampleOf(const ServeOptions& options,
   sample.blobs_damaged = blobs.damaged();
   sample.jobs_expired = counts.jobs_expired;
   sample.sweeps_failed = counts.sweeps_failed;
+  if (tracer != nullptr) sample.spans_dropped = tracer->counts().dropped;
   const ConnectionGate::Counts connections = server.connections();
   sample.connections = connections.open;
   sample.silent_connections = connections.silent;
@@ -306,9 +310,10 @@ void Serve(const ServeOptions& options) {
   const OpenedStore opened = OpenStore(options.store, paths.Store(), store_options);
   JobStore& store = *opened.store;
   notify.sends = opened.has_chores;
-  BlobStoreOptions blob_options;
-  blob_options.reserve_bytes = options.worker.reserve_mib << 20;
-  FileBlobStore blobs(paths.Blobs(), blob_options);
+  BlobPlaceOptions place = options.blobs;
+  place.reserve_mib = options.worker.reserve_mib;
+  const OpenedBlobs kept = OpenBlobs(place, paths, options.store.empty() ? "" : opened.name);
+  BlobStore& blobs = *kept.blobs;
   Ballast ballast(paths.BallastFile(), BallastBytes(paths.root));
   RpcServerOptions rpc;
   rpc.listen = options.listen;
@@ -392,11 +397,11 @@ void Serve(const ServeOptions& options) {
   const std::shared_ptr<void> stop_metrics(nullptr, [&](void*) { metrics.StopListening(); });
   if (!options.metrics_listen.empty()) {
     const int port = metrics.Listen(options.metrics_listen, store, blobs, [&] {
-      return SampleOf(options, server, maintenance, blobs, *probe, draining);
+      return SampleOf(options, server, maintenance, blobs, *probe, tracer.get(), draining);
     });
     spdlog::info("metrics on port {}", port);
   }
-  spdlog::info("listening on {}{}{}, data in {}, jobs in {}, {} workers",
+  spdlog::info("listening on {}{}{}, data in {}, jobs in {}, blobs in {}, {} workers",
                server.address(),
                tls.empty() ? "" : " with TLS",
                options.tokens.empty() && options.certificate_roles.empty()
@@ -404,6 +409,7 @@ void Serve(const ServeOptions& options) {
                    : ", for those with a token or a role",
                paths.root.string(),
                opened.name,
+               kept.name,
                options.workers);
 
   NotifyServiceManager("READY=1");
@@ -422,6 +428,7 @@ void Serve(const ServeOptions& options) {
   server.StartDraining();
   supervisor.Drain(Milliseconds(options.drain_seconds * 0.9));
   supervisor.Wait();
+  kept.stop();
   server.Shutdown(Milliseconds(std::min(2.0, options.drain_seconds * 0.1)));
   job_spans.reset();
   if (tracer && !tracer->Flush()) spdlog::warn("the last traces were not sent");

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "server/blob_place.h"
 #include "server/worker/supervision/worker_settings.h"
 
 namespace color3d {
@@ -23,6 +24,7 @@ struct ServeOptions {
   std::filesystem::path data_folder;
   // postgresql://..., shared with other servers; empty: jobs.db in the data folder.
   std::string store;
+  BlobPlaceOptions blobs;           // reserve_mib: that of the workers
   std::filesystem::path port_file;  // empty: none
   int workers = 1;
   // Passed to the workers, except for folder, threads, memory and grace, which `serve` sets.

@@ -180,14 +180,14 @@ public core/trace span trace_context trace_settings tracer
 public core/video film_reader mp4_writer sound_offset ticks
 public core/view view_page path/camera_path
 public core/weights safetensors weight_file weight_map weight_reader
-public server/access certificate_roles notify_targets tls tokens
+public server/access access_key_file certificate_roles notify_targets tls tokens
 public server/backends backend_address backend_prober grpc_colorizer
 public server/keeping backup fsck
 public server/metrics server_metrics
 public server/notify notifier webhook
 public server/planning asked_formats job_plan job_spec key_view_jobs plan_scenes planner presets scene_facts spec_check spec_names stage_key time_budget
 public server/rpc calls/error_mapping calls/worker_messages rpc_server
-public server/storage ballast blob_store collector data_folder file_blob_store upload_store worker_blobs
+public server/storage ballast blob_cache blob_store collector data_folder disk_space file_blob_store upload_store worker_blobs s3/s3_blob_store s3/s3_check
 public server/store chore_store client_store job job_store open_store project_store shared_job_logs worker_store sqlite_job_store postgresql/copy_store store_file user_models
 public server/tracing job_spans
 public server/worker supervision/supervisor supervision/worker_settings

@@ -48,6 +48,11 @@ fi
 
 build=${BUILD_DIR:-build}
 deploy/install-deps.sh --tests
+case "$label" in
+  slow) deploy/install-deps.sh --engines ;;
+  long) npm install --prefix tests/.npm --no-audit --no-fund --loglevel=error s3rver >/dev/null ||
+    echo "run.sh: npm could not install s3rver; its cases are skipped" >&2 ;;
+esac
 if [ -n "$name$changed" ]; then
   configure
   if [ -n "$name" ]; then

@@ -15,7 +15,9 @@ import subprocess
 import sys
 import time
 import unittest
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from unittest import mock
 
 sys.dont_write_bytecode = True
 
@@ -23,6 +25,8 @@ from test_support import BIN, HERE, PIP, PYTHON, QUICK, ROOM, SCRATCH, TRUTH, VE
 from test_support import CuttingProxy, Server, install_package, make_room, run
 
 install_package()
+import grpc
+
 import color3d
 from color3d import transfer
 from color3d.options import set_options
@@ -156,6 +160,25 @@ class ClientTest(unittest.TestCase):
             self.assertEqual(refused.exception.code.name, "PERMISSION_DENIED")
         with self.assertRaisesRegex(color3d.InputError, "unencrypted; give https://"):
             color3d.Client("192.0.2.1:50551", token=token)
+
+    def test_calls_belong_to_the_trace_of_the_environment(self):
+        seen = []
+
+        class Recorder(grpc.GenericRpcHandler):
+            def service(self, handler_call_details):
+                seen.append(dict(handler_call_details.invocation_metadata).get("traceparent"))
+
+        server = grpc.server(ThreadPoolExecutor(1), handlers=[Recorder()])
+        self.addCleanup(server.stop, None)
+        address = f"127.0.0.1:{server.add_insecure_port('127.0.0.1:0')}"
+        server.start()
+        good = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"
+        for trace, sent in ((good, good), ("nonsense", None)):
+            with mock.patch.dict(os.environ, TRACEPARENT=trace):
+                with color3d.Client(address) as client:
+                    with self.assertRaises(color3d.RpcError):
+                        client.server_info()
+            self.assertEqual(seen.pop(), sent)
 
     def test_tls_checks_the_certificate(self):
         if not shutil.which("openssl"):

@@ -4,17 +4,13 @@
 
 #include <utility>
 
+#include "core/base/process/host_name.h"
 #include "core/base/text/utf8.h"
 
 namespace color3d {
 namespace {
 
 constexpr size_t kMaxMessageBytes = 1024;
-
-std::string HostOfProcess() {
-  char name[256] = {};
-  return ::gethostname(name, sizeof(name) - 1) == 0 ? name : "";
-}
 
 }  // namespace
 
@@ -28,7 +24,7 @@ std::shared_ptr<Tracer> Tracer::Make(const TraceSettings& settings,
   options.resource.version = version;
   options.resource.attributes = {{"service.name", settings.service},
                                  {"service.version", version},
-                                 {"host.name", HostOfProcess()},
+                                 {"host.name", HostName("")},
                                  {"process.pid", static_cast<int64_t>(::getpid())}};
   options.resource.attributes.insert(
       options.resource.attributes.end(), settings.attributes.begin(), settings.attributes.end());

@@ -1,7 +1,7 @@
-// Two servers on one PostgreSQL, three workers and the database on machines of their own, while
-// links fail and everything is killed: each job ends as undisturbed, each effect happens once.
-// Requires root (network namespaces) and PostgreSQL. COLOR3D_CHAOS_JOBS, _FAULTS and _SEED; label
-// "chaos".
+// Two servers, three workers, PostgreSQL and an object store on machines of their own, while links
+// fail, the store errs and everything is killed: each job ends as undisturbed, each effect happens
+// once. Requires root (network namespaces), PostgreSQL and Python. COLOR3D_CHAOS_JOBS, _FAULTS and
+// _SEED; label "chaos".
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,10 +15,12 @@
 #include "core/base/files.h"
 #include "core/base/random.h"
 #include "server/access/tokens.h"
+#include "server/storage/s3/s3_blob_store.h"
 #include "server/store/postgresql/postgresql_db.h"
 #include "tests/support/service/chaos_service.h"
 #include "tests/support/service/postgresql_cluster.h"
 #include "tests/support/service/processes.h"
+#include "tests/support/service/s3_process.h"
 #include "tests/support/service/scripted_trace.h"
 #include "tests/support/service/test_certificates.h"
 #include "tests/support/service/test_network.h"
@@ -32,6 +34,7 @@ using testing::FromEnvironment;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::PostgresqlCluster;
+using testing::S3Process;
 using testing::ScriptedSpec;
 using testing::SleepMs;
 using testing::TestClient;
@@ -40,6 +43,7 @@ using testing::TestNetwork;
 constexpr int kServers = 2, kWorkers = 3;
 constexpr char kScript[] = "steps=8,ms=150";  // longer than a lease
 constexpr char kPort[] = ":50551";
+constexpr char kBlobPrefix[] = "lab";
 constexpr int kFrozenMs = 2500;  // past the lease, its reaping and the next claim
 
 // Calls until it succeeds, at the servers in turn; throws the last error after five minutes.
@@ -88,7 +92,12 @@ class Cluster {
         server_program_(std::move(server_program)),
         authority_(folder, "ours") {
     ::setenv("COLOR3D_TEST_EFFECTS", (folder / "effects").c_str(), 1);
-    fs::create_directories(folder / "blobs");
+    const std::string blobs_host = network_.Add("s3");
+    {
+      const TestNetwork::OnMachine on(network_, "s3");
+      blobs_ = std::make_unique<S3Process>(folder, std::vector<std::string>{}, blobs_host);
+    }
+    blobs_key_ = blobs_->KeyFile(folder);
     const std::string database_host = network_.Add("db");
     {
       const TestNetwork::OnMachine on(network_, "db");
@@ -101,14 +110,15 @@ class Cluster {
                          database_host,
                          address_.substr(address_.rfind('/') + 1));
     tokens_ = folder / "tokens";
-    certificate_ = authority_.Issue("server");
     operator_ = AddToken(tokens_, "operator", Role::kAdmin);
     WriteFileAtomic(folder / "token", AddToken(tokens_, "lab", Role::kWorker) + "\n");
     for (int i = 0; i < kServers; ++i) {
       const std::string host = network_.Add(Server(i));
       addresses_.push_back(host + kPort);
-      StartServer(i);
+      authority_.AddAddress(host);
     }
+    certificate_ = authority_.Issue("server");
+    for (int i = 0; i < kServers; ++i) StartServer(i);
     for (int i = 0; i < kWorkers; ++i) {
       network_.Add(Worker(i));
       StartWorker(i);
@@ -160,6 +170,8 @@ class Cluster {
   const std::string server_program_;
   testing::TestAuthority authority_;
   testing::CertificateFiles certificate_;
+  std::unique_ptr<S3Process> blobs_;
+  fs::path blobs_key_;
   std::unique_ptr<PostgresqlCluster> database_;
   std::string address_, store_, operator_;
   fs::path tokens_;
@@ -172,14 +184,18 @@ class Cluster {
 
 void Cluster::StartServer(int i) {
   fs::create_directories(Data(i));
-  std::error_code error;
-  fs::create_directory_symlink(folder_ / "blobs", Data(i) / "blobs", error);
   const std::vector<std::string> arguments = {network_.ProgramOn(Server(i), server_program_),
                                               "serve",
                                               "--data-dir",
                                               Data(i),
                                               "--store",
                                               store_,
+                                              "--blobs",
+                                              "s3://blobs/" + std::string(kBlobPrefix),
+                                              "--s3-endpoint",
+                                              blobs_->endpoint(),
+                                              "--s3-credentials-file",
+                                              blobs_key_,
                                               "--listen",
                                               addresses_[static_cast<size_t>(i)],
                                               "--tls-cert",
@@ -237,6 +253,11 @@ void Cluster::Disturb(Random& random, bool frozen_only) {
     SleepMs(pause_ms);
     (network_.*fail)(machine, false);
   };
+  const auto store_fails = [&](const std::string& match, const std::string& fault) {
+    blobs_->Fail(match, 1'000'000, fault);
+    SleepMs(pause_ms);
+    blobs_->EndFaults();
+  };
   struct Kind {
     const char* name;
     std::function<void()> inject;
@@ -262,6 +283,12 @@ void Cluster::Disturb(Random& random, bool frozen_only) {
       {"database deaf", [&] { link("db", &TestNetwork::Deafen); }},
       {"link of a worker slow", [&] { link(Worker(worker), &TestNetwork::Slow); }},
       {"link of a server slow", [&] { link(Server(server), &TestNetwork::Slow); }},
+      {"object store cut off", [&] { link("s3", &TestNetwork::Cut); }},
+      {"object store answers 503",
+       [&] { store_fails("", R"("kind": "status", "status": 503, "code": "SlowDown")"); }},
+      {"object store slow", [&] { store_fails("", R"("kind": "late", "seconds": 0.7)"); }},
+      {"object store sends half", [&] { store_fails("GET", R"("kind": "truncate")"); }},
+      {"object store loses answers", [&] { store_fails("PUT|DELETE", R"("kind": "lose")"); }},
   };
   if (round_.empty()) {
     for (int i = 0; i < static_cast<int>(kinds.size()); ++i) round_.push_back(i);
@@ -292,8 +319,12 @@ std::vector<std::string> Cluster::EndAndAudit() {
       }
     }
   }
+  S3BlobOptions stored;
+  stored.s3 = blobs_->Options(kBlobPrefix);
+  stored.folder = folder_ / "audit";
+  S3BlobStore blobs(stored);
   for (std::string& problem :
-       testing::AuditJobs(Data(0), address_, folder_ / "effects", [this](const auto& sql) {
+       testing::AuditJobs(Data(0), address_, &blobs, folder_ / "effects", [this](const auto& sql) {
          return Count(sql);
        })) {
     problems.push_back(std::move(problem));
@@ -304,11 +335,14 @@ std::vector<std::string> Cluster::EndAndAudit() {
 class ChaosClusterTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
+    // So that connections are made between the tries of AnyServer.
+    ::setenv("GRPC_CLIENT_CHANNEL_BACKUP_POLL_INTERVAL_MS", "100", 1);
     if (PostgresqlCluster::IsInstalled()) network_ = std::make_unique<TestNetwork>();
   }
   static void TearDownTestSuite() { network_.reset(); }
   void SetUp() override {
     if (!network_) GTEST_SKIP() << "NOT TESTED: the programs of PostgreSQL are missing";
+    if (!S3Process::IsInstalled()) GTEST_SKIP() << "NOT TESTED: python3 is missing";
     if (!network_->problem().empty()) GTEST_SKIP() << "NOT TESTED: " << network_->problem();
   }
 

@@ -112,7 +112,13 @@ CopiedBlobs CopyAll(const fs::path& copied_store, const DataPaths& from, const D
 CopiedBlobs CopyWhole(const DataPaths& from, const DataPaths& to) {
   const fs::path part = to.root / "jobs.db.part";
   CopyStore(from.Store(), part);
-  const CopiedBlobs result = CopyAll(part, from, to);
+  CopiedBlobs result;
+  result.elsewhere = BlobPlaceOf(from);
+  if (result.elsewhere.empty()) {
+    result = CopyAll(part, from, to);
+  } else {
+    WriteFileAtomic(to.BlobPlace(), result.elsewhere + "\n");
+  }
   // Reading the store has left an empty log beside it.
   std::error_code error;
   for (const char* log : {"-wal", "-shm"}) fs::remove(part.string() + log, error);

@@ -16,7 +16,8 @@ struct CopiedBlobs {
   std::vector<std::string> missing, damaged;  // referenced by jobs or scenes; not in the copy
   // "DIGEST: REASON" of blobs that cannot be read; not in the copy.
   std::vector<std::string> unreadable;
-  int64_t awaited = 0;  // not uploaded yet, of uncommitted scenes
+  std::string elsewhere;  // object store that keeps the blobs; none was copied
+  int64_t awaited = 0;    // not uploaded yet, of uncommitted scenes
 
   bool IsWhole() const { return missing.empty() && damaged.empty() && unreadable.empty(); }
 };
@@ -27,7 +28,7 @@ struct CopiedBlobs {
 // and damaged blobs are listed; jobs whose checkpoint is missing or was replaced meanwhile start
 // over in the copy. Blobs that uncommitted scenes still expect are no faults. Throws
 // Error{kFailedPrecondition} if there is no store of this release or `target` is neither empty nor
-// a backup.
+// a backup. If an object store has the blobs, only the store is copied.
 CopiedBlobs BackUp(const std::filesystem::path& data_folder, const std::filesystem::path& target);
 
 // Copies a backup to a new data folder and verifies all blobs. Like BackUp; throws

@@ -15,17 +15,25 @@ namespace fs = std::filesystem;
 
 FsckResult Fsck(const fs::path& data_folder,
                 const std::string& address,
+                BlobStore* elsewhere,
                 bool repair,
                 const std::function<void(int64_t blobs)>& progress) {
   const DataPaths paths(data_folder);
   if (address.empty()) RequireStore(paths.Store());
   const DataFolderLock lock(paths);
+  if (const std::string place = BlobPlaceOf(paths); elsewhere == nullptr && !place.empty()) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "the blobs of {} are in {}; give --blobs and the flags of the object store",
+                data_folder.string(),
+                place);
+  }
   FsckResult result;
   if (address.empty()) result.store_problems = StoreProblems(paths.Store());
   if (!result.store_problems.empty()) return result;  // its references are unreliable
   const std::unique_ptr<JobStore> store = OpenStoreAsTool(address, paths.Store());
   std::set<std::string> named = store->ReferencedBlobs();
-  FileBlobStore blobs(paths.Blobs());
+  FileBlobStore in_folder(paths.Blobs());
+  BlobStore& blobs = elsewhere != nullptr ? *elsewhere : in_folder;
   std::vector<std::string> damaged;
   const auto check = [&](const StoredBlob& blob) {
     const bool is_named = named.erase(blob.digest.sha256) > 0;

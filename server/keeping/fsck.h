@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "server/storage/blob_store.h"
+
 namespace color3d {
 
 struct FsckResult {
@@ -25,12 +27,13 @@ struct FsckResult {
   }
 };
 
-// Verifies the whole folder, with the references of the PostgreSQL store at `address`, or of
-// jobs.db if that is empty. Throws kFailedPrecondition if a server uses the folder. `repair`: sets
-// damaged blobs aside, so that an upload or another run replaces them. Calls `progress` with the
-// number of blobs read so far.
+// Verifies the whole folder, or the blobs in `elsewhere` in place of those in the folder, with the
+// references of the PostgreSQL store at `address`, or of jobs.db if that is empty. Throws
+// kFailedPrecondition if a server uses the folder. `repair`: sets damaged blobs aside, so that an
+// upload or another run replaces them. Calls `progress` with the number of blobs read so far.
 FsckResult Fsck(const std::filesystem::path& data_folder,
                 const std::string& address,
+                BlobStore* elsewhere,
                 bool repair,
                 const std::function<void(int64_t blobs)>& progress);
 

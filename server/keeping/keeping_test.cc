@@ -55,7 +55,7 @@ class KeepingTest : public ::testing::Test {
     std::ofstream(file, std::ios::binary) << std::string(digest.size_bytes, '!');
   }
   static FsckResult Check(const fs::path& folder, bool repair = false) {
-    return Fsck(folder, "", repair, [](int64_t) {});
+    return Fsck(folder, "", nullptr, repair, [](int64_t) {});
   }
 
   ScratchFolder scratch_;

@@ -245,6 +245,9 @@ class Sampled : public prometheus::Collectable {
             "Jobs deleted after their retention period.",
             sample.jobs_expired);
     counter("color3d_sweeps_failed_total", "Failed sweeps.", sample.sweeps_failed);
+    counter("color3d_trace_spans_dropped_total",
+            "Spans of traces that the collector did not take.",
+            sample.spans_dropped);
   }
 
   ClientStore& store_;

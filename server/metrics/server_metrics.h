@@ -22,7 +22,7 @@ struct ServerSample {
   int64_t connections = 0, silent_connections = 0, max_connections = 0;
   // Counts since the start.
   int64_t attempts_lost = 0, blobs_removed = 0, blobs_damaged = 0, jobs_expired = 0,
-          sweeps_failed = 0, connections_closed = 0, connections_refused = 0;
+          sweeps_failed = 0, connections_closed = 0, connections_refused = 0, spans_dropped = 0;
   int64_t reserve_bytes = 0;      // free space to be kept
   int64_t certificate_end_s = 0;  // since the epoch; 0: no TLS
 };

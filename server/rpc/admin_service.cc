@@ -97,7 +97,7 @@ void DescribeQueue(const RpcParts& parts,
     v1::QueuedJob* entry = response->add_jobs();
     *entry = ToQueuedProto(job, now);
     if (job.state == JobState::kQueued) {
-      entry->set_waits_for(parts.store.PlaceInQueue(job).waits_for);
+      entry->set_waits_for(parts.store.WaitsFor(job));
     }
   }
   const JobCounts counts = parts.store.CountJobs();

@@ -1,7 +1,5 @@
 #include "server/storage/blob_store.h"
 
-#include "core/base/error.h"
-
 namespace color3d {
 
 ListedBlobs ListBlobs(const BlobStore& blobs, const std::function<bool()>& stop) {
@@ -13,14 +11,10 @@ ListedBlobs ListBlobs(const BlobStore& blobs, const std::function<bool()>& stop)
   return all;
 }
 
-bool IsIntact(const BlobStore& blobs, const FileDigest& digest) {
-  try {
-    const FileDigest actual = DigestFile(blobs.Fetch(digest.sha256));
-    return actual.sha256 == digest.sha256 && actual.size_bytes == digest.size_bytes;
-  } catch (const Error& e) {
-    if (e.code() == ErrorCode::kDataLoss) return false;
-    throw;
-  }
+std::vector<bool> BlobStore::TouchAll(const std::vector<FileDigest>& digests) const {
+  std::vector<bool> stored;
+  for (const FileDigest& digest : digests) stored.push_back(Touch(digest));
+  return stored;
 }
 
 }  // namespace color3d

@@ -1,60 +1,28 @@
 // Immutable bytes by SHA-256 digest. Thread-safe; several processes may share a store.
 #pragma once
 
-#include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "core/base/digest.h"
+#include "server/storage/disk_space.h"
 #include "server/storage/worker_blobs.h"
 
 namespace color3d {
 
-// Disk space reserved for a file that is being written; released by the destructor. Not
-// thread-safe.
-class SpaceReservation {
- public:
-  SpaceReservation() = default;
-  SpaceReservation(std::shared_ptr<std::atomic<int64_t>> total, int64_t bytes)
-      : total_(std::move(total)), bytes_(bytes) {}
-  ~SpaceReservation() { Use(bytes_); }
-  SpaceReservation(SpaceReservation&& other) noexcept
-      : total_(std::move(other.total_)), bytes_(std::exchange(other.bytes_, 0)) {}
-  SpaceReservation& operator=(SpaceReservation&& other) noexcept {
-    std::swap(total_, other.total_);
-    std::swap(bytes_, other.bytes_);
-    return *this;
-  }
-
-  // Reduces the reservation by bytes that are now on disk.
-  void Use(int64_t bytes) {
-    const int64_t used = std::min(bytes, bytes_);
-    if (total_) *total_ -= used;
-    bytes_ -= used;
-  }
-
- private:
-  std::shared_ptr<std::atomic<int64_t>> total_;
-  int64_t bytes_ = 0;
-};
-
 class BlobStore : public WorkerBlobs {
  public:
-  // Returns the path of a read-only file. Throws Error{kNotFound, BLOB_MISSING}.
-  virtual std::filesystem::path Fetch(const std::string& sha256) const = 0;
-  void Borrow(const std::string& sha256,
-              const std::function<void(const std::filesystem::path&)>& use) const override {
-    use(Fetch(sha256));
-  }
+  // As Touch, for many blobs: each by its place in the list.
+  virtual std::vector<bool> TouchAll(const std::vector<FileDigest>& digests) const;
+  // Rereads the blob where it is stored. Returns true if the bytes match the digest, false also if
+  // the disk fails. Throws Error{kNotFound, BLOB_MISSING}, kFailedPrecondition without permission
+  // to read, kUnavailable if the store cannot be reached.
+  virtual bool IsIntact(const FileDigest& digest) const = 0;
   virtual void Remove(const std::string& sha256) = 0;
   // Rereads the blob and sets it aside if its digest is wrong; it is then missing, so that an
   // upload can replace it. Returns false if the bytes are good, e.g. replaced since they were found
@@ -63,9 +31,8 @@ class BlobStore : public WorkerBlobs {
   // Number of damaged blobs found by this process.
   virtual int64_t damaged() const = 0;
 
-  // As RequireSpace, and reserves the space within this process.
+  // Space on the disk of the server, where uploads wait until they are whole (DiskSpace).
   virtual SpaceReservation Reserve(int64_t bytes) = 0;
-  // Free space minus reservations, at least 0; reservations may exceed the free space.
   virtual int64_t FreeBytes() const = 0;
 
   // Visits all blobs until `visit` returns false. Returns unreadable paths as "PATH: REASON", which
@@ -85,8 +52,8 @@ struct ListedBlobs {
 // Lists all blobs, or those found until `stop` returns true.
 ListedBlobs ListBlobs(const BlobStore& blobs, const std::function<bool()>& stop);
 
-// Returns true if the bytes match the digest, false also on read errors. Throws Error{kNotFound,
-// BLOB_MISSING}, or kFailedPrecondition without permission to read.
-bool IsIntact(const BlobStore& blobs, const FileDigest& digest);
+inline bool IsIntact(const BlobStore& blobs, const FileDigest& digest) {
+  return blobs.IsIntact(digest);
+}
 
 }  // namespace color3d

@@ -15,6 +15,14 @@
 namespace color3d {
 namespace fs = std::filesystem;
 
+std::string BlobPlaceOf(const DataPaths& paths) {
+  std::error_code error;
+  if (!fs::exists(paths.BlobPlace(), error)) return "";
+  std::string name = ReadFile(paths.BlobPlace());
+  while (name.ends_with('\n')) name.pop_back();
+  return name;
+}
+
 void PrepareDataFolder(const DataPaths& paths) {
   std::error_code error;
   const bool is_fresh = !fs::exists(paths.root, error);

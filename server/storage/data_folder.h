@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 namespace color3d {
 
@@ -17,12 +18,19 @@ struct DataPaths {
   std::filesystem::path Logs() const { return root / "logs"; }
   // Logs of single jobs, "<job id>.log".
   std::filesystem::path JobLogs() const { return Logs() / "jobs"; }
+  // Blobs of an object store, only for the server; may be deleted while it does not run.
+  std::filesystem::path BlobCache() const { return root / "blob-cache"; }
+  // Names the object store with the blobs; no file: they are in Blobs().
+  std::filesystem::path BlobPlace() const { return root / "blob-place"; }
   // Private sockets between the server and its workers.
   std::filesystem::path Sockets() const { return root / "sockets"; }
   // Released when the disk is full.
   std::filesystem::path BallastFile() const { return root / "ballast"; }
   std::filesystem::path Lock() const { return root / "lock"; }
 };
+
+// Returns the name of the object store with the blobs of the folder, "s3://..."; empty: blobs/.
+std::string BlobPlaceOf(const DataPaths& paths);
 
 // Creates the folders. Throws Error{kFailedPrecondition} if that fails or the folder is not
 // writable.

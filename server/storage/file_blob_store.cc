@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/stat.h>
-#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -112,7 +111,7 @@ std::optional<std::string> DigestOf(int fd) {
 }  // namespace
 
 FileBlobStore::FileBlobStore(const fs::path& folder, BlobStoreOptions options)
-    : folder_(folder), options_(options) {
+    : folder_(folder), space_(folder, options.reserve_bytes) {
   std::error_code error;
   fs::create_directories(folder_, error);
 }
@@ -157,47 +156,19 @@ fs::path FileBlobStore::PlaceFor(const std::string& sha256) const {
   return path;
 }
 
-int64_t FileBlobStore::FreeBytes() const { return std::max<int64_t>(0, UnpromisedBytes()); }
-
-int64_t FileBlobStore::UnpromisedBytes() const {
-  struct statvfs status {};
-  if (::statvfs(folder_.c_str(), &status) != 0) return 0;
-  return static_cast<int64_t>(status.f_bavail) * static_cast<int64_t>(status.f_frsize) -
-         reserved_->load();
-}
-
-SpaceReservation FileBlobStore::Reserve(int64_t bytes) {
-  *reserved_ += bytes;
-  SpaceReservation reservation(reserved_, bytes);
-  const int64_t left = UnpromisedBytes();
-  if (left < options_.reserve_bytes) ThrowFull(bytes, left + bytes);
-  return reservation;
-}
-
-void FileBlobStore::RequireSpace(int64_t bytes) const {
-  const int64_t free = UnpromisedBytes();
-  if (free - bytes < options_.reserve_bytes) ThrowFull(bytes, free);
-}
-
-void FileBlobStore::ThrowFull(int64_t bytes, int64_t free) const {
-  std::error_code error;
-  if (!fs::exists(folder_, error)) {
-    throw Error(ErrorCode::kUnavailable,
-                "the folder {} does not exist; check that its disk is mounted",
-                folder_.string());
+bool FileBlobStore::IsIntact(const FileDigest& digest) const {
+  try {
+    const FileDigest actual = DigestFile(Fetch(digest.sha256));
+    return actual.sha256 == digest.sha256 && actual.size_bytes == digest.size_bytes;
+  } catch (const Error& e) {
+    if (e.code() == ErrorCode::kDataLoss) return false;
+    throw;
   }
-  throw ServiceError(
-      ErrorReason::kStorageFull,
-      "{} more bytes do not fit: {} are free and unreserved on the server's disk, of "
-      "which {} must stay free; delete jobs or scenes, or add disk space",
-      bytes,
-      free,
-      options_.reserve_bytes);
 }
 
 bool FileBlobStore::IsThere(const FileDigest& digest) {
   if (!Touch(digest)) return false;
-  if (IsIntact(*this, digest)) return true;
+  if (IsIntact(digest)) return true;
   ++damaged_;
   return false;
 }

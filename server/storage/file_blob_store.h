@@ -2,6 +2,8 @@
 // renamed. Thread-safe.
 #pragma once
 
+#include <atomic>
+
 #include "server/storage/blob_store.h"
 #include "server/storage/stale_files.h"
 
@@ -18,35 +20,38 @@ class FileBlobStore : public BlobStore {
 
   bool Touch(const FileDigest& digest) const override;
   std::optional<StoredBlob> Look(const std::string& sha256) const override;
-  std::filesystem::path Fetch(const std::string& sha256) const override;
+  // Returns the path of a read-only file. Throws Error{kNotFound, BLOB_MISSING}.
+  virtual std::filesystem::path Fetch(const std::string& sha256) const;
+  void Borrow(const std::string& sha256,
+              const std::function<void(const std::filesystem::path&)>& use) const override {
+    use(Fetch(sha256));
+  }
+  bool IsIntact(const FileDigest& digest) const override;
   FileDigest PutBytes(std::string_view bytes) override;
   FileDigest PutFile(const std::filesystem::path& file) override;
   void Adopt(const std::filesystem::path& file, const FileDigest& digest) override;
   void Remove(const std::string& sha256) override;
   bool SetAside(const std::string& sha256) override;
   int64_t damaged() const override { return damaged_; }
-  void RequireSpace(int64_t bytes) const override;
-  SpaceReservation Reserve(int64_t bytes) override;
-  int64_t FreeBytes() const override;
+  void RequireSpace(int64_t bytes) const override { space_.Require(bytes); }
+  SpaceReservation Reserve(int64_t bytes) override { return space_.Reserve(bytes); }
+  int64_t FreeBytes() const override { return space_.FreeBytes(); }
   std::vector<std::string> ForEach(
       const std::function<bool(const StoredBlob&)>& visit) const override;
   bool RemoveIfUntouched(const StoredBlob& blob) override;
   int RemoveLeftovers(std::chrono::seconds age) override;
 
  private:
-  int64_t UnpromisedBytes() const;  // below 0 if more is reserved than free
   // Returns true if the blob exists and is undamaged. Counts damaged blobs.
   bool IsThere(const FileDigest& digest);
-  [[noreturn]] void ThrowFull(int64_t bytes, int64_t free) const;
   std::filesystem::path PathOf(const std::string& sha256) const;
   // Creates the folders above the file and syncs each level.
   std::filesystem::path PlaceFor(const std::string& sha256) const;
 
   std::filesystem::path folder_;
-  BlobStoreOptions options_;
+  DiskSpace space_;
   StaleFiles stale_;
   std::atomic<int64_t> damaged_{0};
-  std::shared_ptr<std::atomic<int64_t>> reserved_ = std::make_shared<std::atomic<int64_t>>(0);
 };
 
 }  // namespace color3d

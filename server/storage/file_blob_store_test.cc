@@ -1,3 +1,4 @@
+// What is special about blobs in a folder; s3/any_blob_store_test.cc has what all stores do.
 #include "server/storage/file_blob_store.h"
 
 #include <fcntl.h>
@@ -6,7 +7,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <fstream>
 #include <map>
 #include <optional>
 
@@ -30,16 +30,6 @@ TEST_F(FileBlobStoreTest, BlobsAreNamedByDigestAndReadOnly) {
   EXPECT_FALSE(blobs_.Touch({digest.sha256, 4})) << "another size is another blob";
   EXPECT_EQ(ReasonThrown([&] { blobs_.Fetch(Sha256Hex("no")); }), "BLOB_MISSING");
   EXPECT_EQ(ReasonThrown([&] { blobs_.Fetch("../../etc/passwd"); }), "INVALID_ARGUMENT");
-}
-
-TEST_F(FileBlobStoreTest, MovesFilesIn) {
-  const fs::path file = scratch_.path() / "file";
-  WriteFileAtomic(file, "content");
-  const FileDigest digest = blobs_.PutFile(file);
-  EXPECT_FALSE(fs::exists(file));
-  WriteFileAtomic(file, "content");
-  EXPECT_EQ(blobs_.PutFile(file).sha256, digest.sha256);
-  EXPECT_FALSE(fs::exists(file)) << "a duplicate is dropped";
 }
 
 // At least one of the folders is on another file system than the blobs.
@@ -106,46 +96,6 @@ TEST_F(FileBlobStoreTest, RemovesLeftoversOfCrash) {
   EXPECT_EQ(blobs_.RemoveLeftovers(std::chrono::hours(24)), 0) << "the clock may have been set";
   EXPECT_EQ(blobs_.RemoveLeftovers(std::chrono::hours(24)), 2);
   EXPECT_TRUE(fs::exists(folder / "new.part"));
-}
-
-// Other bytes of the same number, as from a failing disk.
-void Damage(const fs::path& blob) {
-  ASSERT_EQ(::chmod(blob.c_str(), 0644), 0);
-  std::string bytes = ReadFile(blob);
-  bytes[bytes.size() / 2] ^= 1;
-  std::ofstream(blob, std::ios::binary) << bytes;
-}
-
-TEST_F(FileBlobStoreTest, PutReplacesDamagedBytes) {
-  const FileDigest digest = blobs_.PutBytes("some bytes");
-  Damage(blobs_.Fetch(digest.sha256));
-  EXPECT_FALSE(IsIntact(blobs_, digest));
-  blobs_.PutBytes("some bytes");
-  EXPECT_TRUE(IsIntact(blobs_, digest));
-  Damage(blobs_.Fetch(digest.sha256));
-  const fs::path file = scratch_.path() / "again";
-  WriteFileAtomic(file, "some bytes");
-  blobs_.PutFile(file);
-  EXPECT_TRUE(IsIntact(blobs_, digest));
-  Damage(blobs_.Fetch(digest.sha256));
-  EXPECT_TRUE(blobs_.SetAside(digest.sha256));
-  EXPECT_FALSE(blobs_.Touch(digest));
-  blobs_.PutBytes("some bytes");
-  EXPECT_TRUE(IsIntact(blobs_, digest));
-}
-
-// The damaged blob was replaced after it was read.
-TEST_F(FileBlobStoreTest, SetsAsideDamagedBlobsOnly) {
-  const FileDigest digest = blobs_.PutBytes("some bytes");
-  Damage(blobs_.Fetch(digest.sha256));
-  blobs_.PutBytes("some bytes");
-  EXPECT_EQ(blobs_.damaged(), 1);
-  EXPECT_FALSE(blobs_.SetAside(digest.sha256));
-  EXPECT_TRUE(blobs_.Touch(digest));
-  Damage(blobs_.Fetch(digest.sha256));
-  EXPECT_TRUE(blobs_.SetAside(digest.sha256));
-  EXPECT_EQ(blobs_.damaged(), 2);
-  EXPECT_FALSE(blobs_.SetAside(digest.sha256)) << "gone";
 }
 
 TEST_F(FileBlobStoreTest, EachTouchChangesTime) {

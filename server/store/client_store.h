@@ -173,6 +173,8 @@ class ClientStore : public virtual CommonStore {
   // Throws kInvalidArgument for a child of a submitted job.
   virtual JobRecord Pin(const std::string& name, bool pinned) = 0;
   virtual QueuePlace PlaceInQueue(const JobRecord& job) = 0;
+  // As PlaceInQueue, without counting the jobs before it.
+  virtual std::string WaitsFor(const JobRecord& job) = 0;
   // Returns the running jobs, oldest start first, then at most `max_waiting` jobs that wait for a
   // worker, in the order of their turns. Without spec and artifacts; at most 1,000 of each.
   virtual std::vector<JobRecord> ListQueue(int max_waiting) = 0;

@@ -1,23 +1,16 @@
 #include "server/store/open_store.h"
 
 #include <sys/vfs.h>
-#include <unistd.h>
 
-#include <array>
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/process/host_name.h"
 #include "server/store/postgresql/postgresql_job_store.h"
 #include "server/store/sqlite_job_store.h"
 
 namespace color3d {
 namespace {
-
-std::string HostName() {
-  std::array<char, 256> name{};
-  if (::gethostname(name.data(), name.size() - 1) != 0) return "server";
-  return name.data();
-}
 
 OpenedStore OpenSqlite(const std::filesystem::path& file, StoreOptions options) {
   RequireLocalFolder(file.parent_path());
@@ -31,7 +24,7 @@ OpenedStore OpenSqlite(const std::filesystem::path& file, StoreOptions options) 
 
 OpenedStore OpenPostgresql(const std::string& address, StoreOptions options) {
   OpenedStore opened;
-  options.server_name = HostName();
+  options.server_name = HostName("server");
   auto store = std::make_unique<PostgresqlJobStore>(
       address, StoreRole::kServer, std::nullopt, std::move(options));
   opened.has_chores = [store = store.get()] { return store->HasChores(); };

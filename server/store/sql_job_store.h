@@ -65,6 +65,7 @@ class SqlJobStore : public JobStore {
   JobRecord Kill(const std::string& name) override;
   JobRecord Pin(const std::string& name, bool pinned) override;
   QueuePlace PlaceInQueue(const JobRecord& job) override;
+  std::string WaitsFor(const JobRecord& job) override;
 
   using WorkerStore::Claim;
   std::optional<JobRecord> Claim(const ClaimTerms& terms) override;

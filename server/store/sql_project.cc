@@ -42,6 +42,51 @@ bool NeedsBusyWorker(SqlDatabase& db, int64_t bytes) {
   return idle > 0 && idle < bytes && any > idle;
 }
 
+struct WaitingJob {
+  int64_t priority = 0, job_id = 0, run_after_ms = 0;
+  bool has_equal_work = false;  // in a running job
+  int64_t needs_memory_bytes = 0;
+};
+
+// The job itself; of a submitted job whose stages all wait, its first stage.
+std::optional<WaitingJob> FirstWaiting(SqlDatabase& db, const JobRecord& job) {
+  if (job.state != JobState::kQueued && job.state != JobState::kBlocked) return std::nullopt;
+  SqlStatement first(
+      db,
+      "select priority, job_id, run_after_ms, joins_key, needs_memory_bytes from job where "
+      "(name=?1 or parent=?1) and state='QUEUED' and not exists(select 1 from job where "
+      "parent=?1 and state='RUNNING') "
+      "order by priority, job_id limit 1",
+      job.name);
+  if (!first.Step()) return std::nullopt;
+  return WaitingJob{.priority = first.Int(0),
+                    .job_id = first.Int(1),
+                    .run_after_ms = first.Int(2),
+                    .has_equal_work = !first.Text(3).empty(),
+                    .needs_memory_bytes = first.Int(4)};
+}
+
+// `now_ms`: of the clock of retries.
+std::string ReasonOfWait(SqlDatabase& db, const WaitingJob& job, int64_t now_ms) {
+  SqlStatement holds(db,
+                     "select name from meta where name in('hold_paused','hold_storage') and "
+                     "value<>0 order by name limit 1");
+  if (holds.Step()) {
+    return holds.Text(0) == NameOf(Hold::kPaused)
+               ? "the operator, who has paused the queue"
+               : "space on the server's disk, which is nearly full";
+  }
+  if (!SqlStatement(db, "select 1 from worker limit 1").Step()) return "a worker; none is running";
+  const int64_t pause_ms = job.run_after_ms - now_ms;
+  if (pause_ms > 0) return fmt::format("its next attempt, in {} s", (pause_ms + 999) / 1000);
+  if (job.has_equal_work) return "a running job with equal work";
+  if (NeedsBusyWorker(db, job.needs_memory_bytes)) {
+    return fmt::format("a worker with {} MiB of memory; the idle ones have less",
+                       job.needs_memory_bytes >> 20);
+  }
+  return "";
+}
+
 }  // namespace
 
 std::vector<ProjectRecord> SqlJobStore::ListProjects() {
@@ -165,44 +210,22 @@ std::vector<JobRecord> SqlJobStore::ListQueue(int max_waiting) {
 }
 
 QueuePlace SqlJobStore::PlaceInQueue(const JobRecord& job) {
-  if (job.state != JobState::kQueued && job.state != JobState::kBlocked) return {};
   return connections_->Read([&](SqlDatabase& db) -> QueuePlace {
-    // For a submitted job whose stages all wait: its first stage.
-    SqlStatement first(
-        db,
-        "select priority, job_id, run_after_ms, joins_key, needs_memory_bytes from job where "
-        "(name=?1 or parent=?1) and state='QUEUED' and not exists(select 1 from job where "
-        "parent=?1 and state='RUNNING') "
-        "order by priority, job_id limit 1",
-        job.name);
-    if (!first.Step()) return {};
-    QueuePlace place;
-    place.position =
-        1 +
-        SqlStatement(db,
-                     "select count(*) from job where state='QUEUED' and (priority, job_id)<(?, ?)",
-                     first.Int(0),
-                     first.Int(1))
-            .NextInt();
-    SqlStatement holds(db,
-                       "select name from meta where name in('hold_paused','hold_storage') and "
-                       "value<>0 order by name limit 1");
-    const int64_t pause_ms = first.Int(2) - SteadyNow(db);
-    if (holds.Step()) {
-      place.waits_for = holds.Text(0) == NameOf(Hold::kPaused)
-                            ? "the operator, who has paused the queue"
-                            : "space on the server's disk, which is nearly full";
-    } else if (!SqlStatement(db, "select 1 from worker limit 1").Step()) {
-      place.waits_for = "a worker; none is running";
-    } else if (pause_ms > 0) {
-      place.waits_for = fmt::format("its next attempt, in {} s", (pause_ms + 999) / 1000);
-    } else if (!first.Text(3).empty()) {
-      place.waits_for = "a running job with equal work";
-    } else if (const int64_t bytes = first.Int(4); NeedsBusyWorker(db, bytes)) {
-      place.waits_for =
-          fmt::format("a worker with {} MiB of memory; the idle ones have less", bytes >> 20);
-    }
-    return place;
+    const std::optional<WaitingJob> first = FirstWaiting(db, job);
+    if (!first) return {};
+    SqlStatement before(db,
+                        "select count(*) from job where state='QUEUED' and "
+                        "(priority, job_id)<(?, ?)",
+                        first->priority,
+                        first->job_id);
+    return {.position = 1 + before.NextInt(), .waits_for = ReasonOfWait(db, *first, SteadyNow(db))};
+  });
+}
+
+std::string SqlJobStore::WaitsFor(const JobRecord& job) {
+  return connections_->Read([&](SqlDatabase& db) -> std::string {
+    const std::optional<WaitingJob> first = FirstWaiting(db, job);
+    return first ? ReasonOfWait(db, *first, SteadyNow(db)) : "";
   });
 }
 

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "core/base/memory.h"
+#include "core/base/process/host_name.h"
 #include "core/catalogue/stages.h"
 #include "server/base/service_error.h"
 #include "server/ops/process.h"
@@ -68,7 +69,7 @@ class WorkerLoop {
     const int64_t memory = std::min(MachineMemoryBytes(), OwnMemoryLimitBytes());
     facts_.worker_id = id_;
     facts_.pid = ::getpid();
-    facts_.machine = HostName();
+    facts_.machine = HostName("worker");
     facts_.release = options_.release;
     facts_.threads = options_.threads;
     facts_.memory_limit_bytes = memory == INT64_MAX ? 0 : memory;
@@ -310,7 +311,8 @@ void RunWorker(const WorkerOptions& options,
   ServerAccess server(DataPaths(options.data_folder),
                       LinkTiming::For(options.timing.lease),
                       options.release,
-                      options.reserve_mib << 20);
+                      options.reserve_mib << 20,
+                      {options.name, options.cache_bytes});
   if (options.sends_logs) SendLogs(server);
   WorkerLoop(options, server, runner, draining).Run();
 }

@@ -15,14 +15,15 @@
 #include "core/base/error.h"
 #include "core/base/memory.h"
 #include "core/base/mutex.h"
+#include "core/base/process/host_name.h"
 #include "core/base/process/process_limits.h"
 #include "core/base/process/sandbox.h"
 #include "core/trace/tracer.h"
 #include "server/ops/process.h"
 #include "server/ops/stop_signals.h"
 #include "server/storage/data_folder.h"
-#include "server/storage/file_blob_store.h"
 #include "server/worker/live/inference_worker.h"
+#include "server/worker/remote/server_access.h"
 #include "server/worker/remote/worker_place.h"
 #include "server/worker/supervision/worker_settings.h"
 #include "server/worker/worker_loop.h"
@@ -137,6 +138,7 @@ void AddFlags(CLI::App* app, WorkerArguments* arguments) {
                [app](const char* flag, auto& value) { app->add_option(flag, value)->group(""); });
   app->add_option("--drain-grace-seconds", settings.drain_grace_seconds)->group("");
   app->add_option("--reserve-mib", settings.reserve_mib)->group("");
+  app->add_option("--blob-cache-mib", settings.blob_cache_mib)->group("");
   app->add_flag("--send-logs", settings.sends_logs)->group("");
   app->add_option("--recycle-jobs", options.recycle_jobs)->group("");
   app->add_option("--code-version", options.code_version)->group("");
@@ -156,9 +158,10 @@ std::unique_ptr<WorkerFolder> SetUpPlace(WorkerArguments* arguments) {
     std::error_code ignored;
     std::filesystem::create_directories(DataPaths(arguments->settings.data_folder).Cache(),
                                         ignored);
+    options.cache_bytes = arguments->settings.blob_cache_mib << 20;
     return nullptr;
   }
-  if (options.name.empty()) options.name = HostName();
+  if (options.name.empty()) options.name = HostName("worker");
   if (!arguments->token_file.empty()) options.server.token = ReadToken(arguments->token_file);
   if (arguments->cache_folder.empty()) arguments->cache_folder = DefaultWorkerFolder();
   arguments->settings.data_folder = arguments->cache_folder;
@@ -334,9 +337,15 @@ void EnterSandbox(const WorkerArguments& arguments, const TraceSettings& traces)
 
 void ServeInference(const WorkerArguments& arguments, const WorkerProgram& program) {
   const DataPaths paths(arguments.settings.data_folder);
-  FileBlobStore blobs(paths.Blobs(), {arguments.settings.reserve_mib << 20});
-  const std::unique_ptr<LiveEngine> engine = program.make_engine(
-      {blobs, ParseUserModels(arguments.models, arguments.backends), arguments.settings.threads});
+  ServerAccess server(paths,
+                      LinkTiming::For(Milliseconds(arguments.settings.lease_seconds)),
+                      COLOR3D_VERSION,
+                      arguments.settings.reserve_mib << 20,
+                      {arguments.options.name, arguments.options.cache_bytes});
+  const std::unique_ptr<LiveEngine> engine =
+      program.make_engine({server.blobs(),
+                           ParseUserModels(arguments.models, arguments.backends),
+                           arguments.settings.threads});
   InferenceOptions options;
   options.data_folder = arguments.settings.data_folder;
   options.socket = arguments.inference;

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ipaddress
+import os
+import re
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +21,7 @@ _FIRST_WAIT_S, _LONGEST_WAIT_S = 0.2, 3.0
 _CONNECT_LIMIT_S = 4.0
 _FULL_SERVER_PATIENCE_S = 600.0
 _MAX_MESSAGE_BYTES = 64 << 20  # a scene of 10,000 files with long names
+_TRACEPARENT = re.compile("[0-9a-f]{2}-[0-9a-f]{32}-[0-9a-f]{16}-[0-9a-f]{2}")
 
 
 @dataclass(frozen=True)
@@ -72,12 +75,16 @@ class Connection:
     patience_s: maximum time to wait for an unreachable server, seconds.
     Waits at most 4 s for the server. Raises UnreachableError; InputError for a malformed address,
     for a token that would travel unencrypted to another machine and for files that cannot be read.
+    Calls belong to the trace of the variable TRACEPARENT, as W3C Trace Context defines it.
     """
 
     def __init__(self, address: str, token: str, tls: Optional[Tls], patience_s: float) -> None:
         self.address = address
         self.patience_s = patience_s
         self._metadata = [("authorization", f"Bearer {token}")] if token else []
+        trace = os.environ.get("TRACEPARENT", "").strip()
+        if _TRACEPARENT.fullmatch(trace):
+            self._metadata.append(("traceparent", trace))
         uses_tls = tls is not None or address.startswith("https://")
         host_port = address[len("https://") :] if address.startswith("https://") else address
         here = _is_loopback(host_port)

@@ -52,12 +52,21 @@ class BlobServiceImpl final : public v1::BlobService::CallbackService {
       }
       const std::set<std::string> held = call.store.HeldBlobs(asked);
       std::set<std::string> seen;
+      std::vector<FileDigest> touched;
+      std::vector<const v1::Digest*> protos;
       for (const v1::Digest& proto : request->digests()) {
         const FileDigest digest = FromProto(proto);
         if (!seen.insert(digest.sha256).second) continue;
-        if (!held.contains(digest.sha256) || !parts_.blobs.Touch(digest)) {
+        if (held.contains(digest.sha256)) {
+          touched.push_back(digest);
+          protos.push_back(&proto);
+        } else {
           *response->add_missing() = proto;
         }
+      }
+      const std::vector<bool> stored = parts_.blobs.TouchAll(touched);
+      for (size_t i = 0; i < stored.size(); ++i) {
+        if (!stored[i]) *response->add_missing() = *protos[i];
       }
     });
   }

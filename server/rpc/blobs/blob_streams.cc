@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <filesystem>
 #include <memory>
 #include <utility>
 
@@ -95,7 +96,9 @@ class BlobReader final : public grpc::ServerWriteReactor<ReadResponse> {
       is_whole_ &= request_.read_limit() >= end_;
       end_ = std::min(end_, offset_ + request_.read_limit());
     }
-    fd_ = ::open(parts_.blobs.Fetch(digest.sha256).c_str(), O_RDONLY | O_CLOEXEC);
+    parts_.blobs.Borrow(digest.sha256, [this](const std::filesystem::path& file) {
+      fd_ = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+    });
     if (fd_ < 0) throw Error(ErrorCode::kInternal, "cannot open a stored blob");
   }
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -135,7 +136,11 @@ FileChecks::Part FileChecks::PartOf(const std::string& path) {
 }
 
 FileChecks::Problem FileChecks::ProblemOf(const SceneFileRecord& file, Part part) const {
-  const MappedFile mapped(blobs_.Fetch(file.digest.sha256), file.digest.size_bytes, is_cancelled_);
+  std::optional<MappedFile> opened;
+  blobs_.Borrow(file.digest.sha256, [&](const fs::path& path) {
+    opened.emplace(path, file.digest.size_bytes, is_cancelled_);
+  });
+  const MappedFile& mapped = *opened;
   if (!mapped.is_readable()) {
     return {file.path, "cannot be read from the server's disk; upload it again"};
   }

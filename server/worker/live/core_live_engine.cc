@@ -1,5 +1,7 @@
 // Live colorization of pictures with the method library.
+#include <filesystem>
 #include <map>
+#include <string>
 #include <utility>
 
 #include "core/base/files.h"
@@ -55,7 +57,10 @@ class CoreLiveEngine : public LiveEngine {
   LoadedColorizer Load(const Request& request);
   LoadedColorizer FromExample(const Request& request);
   std::string ReadBlob(const std::string& sha256) {
-    return ReadFile(setup_.blobs.Fetch(sha256), kMaxFileBytes);
+    std::string bytes;
+    setup_.blobs.Borrow(
+        sha256, [&](const std::filesystem::path& file) { bytes = ReadFile(file, kMaxFileBytes); });
+    return bytes;
   }
 
   const LiveEngineSetup setup_;

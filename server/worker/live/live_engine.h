@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "color3d/internal/v1/inference.pb.h"
-#include "server/storage/blob_store.h"
+#include "server/storage/worker_blobs.h"
 #include "server/store/user_models.h"
 
 namespace color3d {
@@ -31,7 +31,7 @@ class LiveEngine {
 };
 
 struct LiveEngineSetup {
-  BlobStore& blobs;  // must outlive the engine
+  WorkerBlobs& blobs;  // must outlive the engine
   UserModels models;
   int threads = 1;
   int64_t cache_bytes = int64_t{512} << 20;  // size of the colorizer cache

@@ -7,8 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "server/storage/blob_cache.h"
 #include "server/storage/worker_blobs.h"
-#include "server/worker/remote/blob_cache.h"
 #include "server/worker/remote/worker_link.h"
 
 namespace color3d {

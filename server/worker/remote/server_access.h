@@ -1,15 +1,17 @@
 // What a worker has of its server: job store and blobs. On the server's machine it calls the
-// private socket and shares the folder of blobs, so that files are linked and not sent; from
-// another machine it calls the server's port and has a cache. Thread-safe.
+// private socket and shares the folder of blobs, so that files are linked and not sent. If that
+// server keeps its blobs in an object store, and on another machine, blobs go through the server
+// and the worker has a cache: only the server has the keys of the object store. Thread-safe.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "server/ops/socket_folder.h"
+#include "server/storage/blob_cache.h"
 #include "server/storage/data_folder.h"
-#include "server/worker/remote/blob_cache.h"
 #include "server/worker/remote/log_sender.h"
 #include "server/worker/remote/remote_store.h"
 #include "server/worker/remote/worker_link.h"
@@ -18,17 +20,27 @@ namespace color3d {
 
 class ServerAccess {
  public:
+  // Cache of a worker on the server's machine.
+  struct LocalCache {
+    std::string name;   // of the worker; its folder is named by it
+    int64_t bytes = 0;  // 0: none, because the folder of blobs is shared
+  };
   // On the server's machine: `paths` is its data folder.
   ServerAccess(const DataPaths& paths,
                const LinkTiming& timing,
                const std::string& release,
-               int64_t reserve_bytes);
+               int64_t reserve_bytes,
+               const LocalCache& cache);
   // On another machine: `paths` is a folder of this worker. Log lines of jobs go to the server.
   ServerAccess(const DataPaths& paths,
                const LinkTiming& timing,
                const std::string& release,
                const WorkerTarget& target,
                int64_t cache_bytes);
+
+  ~ServerAccess();
+  ServerAccess(const ServerAccess&) = delete;
+  ServerAccess& operator=(const ServerAccess&) = delete;
 
   WorkerStore& store() { return store_; }
   // For heartbeats: with its own connection, so that transfers do not delay them.
@@ -42,6 +54,7 @@ class ServerAccess {
   std::optional<SocketFolder> sockets_;  // gives addresses that are valid while it lives
   WorkerLink link_, heartbeat_link_;
   RemoteStore store_, heartbeat_store_;
+  int cache_lock_ = -1;  // on the folder of a local cache
   std::optional<BlobCache> cache_;
   std::unique_ptr<WorkerBlobs> blobs_;
   std::shared_ptr<LogSender> logs_;

@@ -7,8 +7,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cctype>
 #include <cerrno>
 #include <charconv>
 #include <cstdlib>
@@ -55,14 +53,6 @@ fs::path DefaultWorkerFolder() {
   if (cache != nullptr && *cache != '\0') return fs::path(cache) / "color3d-worker";
   if (home != nullptr && *home != '\0') return fs::path(home) / ".cache" / "color3d-worker";
   throw InvalidArgument("there is no home folder for the cache; give --cache-dir");
-}
-
-std::string HostName() {
-  std::array<char, 64> name{};
-  if (::gethostname(name.data(), name.size() - 1) != 0) return "worker";
-  std::string text = name.data();
-  std::erase_if(text, [](unsigned char c) { return std::isalnum(c) == 0 && c != '.' && c != '-'; });
-  return text.empty() ? "worker" : text;
 }
 
 std::string ReadToken(const fs::path& file) {

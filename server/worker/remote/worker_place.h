@@ -26,9 +26,6 @@ class WorkerFolder {
 // "color3d-worker" in $XDG_CACHE_HOME or ~/.cache. Throws Error{kInvalidArgument} without a home.
 std::filesystem::path DefaultWorkerFolder();
 
-// Name of this machine in the form of a worker's name: letters, digits, '.', '-'.
-std::string HostName();
-
 // Returns the only word of the file. Throws Error.
 std::string ReadToken(const std::filesystem::path& file);
 

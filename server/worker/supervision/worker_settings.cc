@@ -17,6 +17,8 @@ std::vector<std::string> ToFlags(const WorkerSettings& settings) {
                                     settings.log_format,
                                     "--reserve-mib",
                                     fmt::to_string(settings.reserve_mib),
+                                    "--blob-cache-mib",
+                                    fmt::to_string(settings.blob_cache_mib),
                                     "--drain-grace-seconds",
                                     fmt::to_string(settings.drain_grace_seconds)};
   VisitTimings(settings, [&](const char* flag, const auto& value) {

@@ -45,6 +45,7 @@ uint64_t ChaosSeed() {
 
 std::vector<std::string> AuditJobs(const fs::path& data_folder,
                                    const std::string& address,
+                                   BlobStore* elsewhere,
                                    const fs::path& effects,
                                    const CountRows& count) {
   std::vector<std::string> problems;
@@ -57,7 +58,7 @@ std::vector<std::string> AuditJobs(const fs::path& data_folder,
   require_none(count("select count(*) - count(distinct job_id) from job_attempt where "
                      "outcome='SUCCEEDED'"),
                "jobs that succeeded twice");
-  const FsckResult whole = Fsck(data_folder, address, /*repair=*/false, [](int64_t) {});
+  const FsckResult whole = Fsck(data_folder, address, elsewhere, /*repair=*/false, [](int64_t) {});
   require_none(static_cast<int64_t>(whole.store_problems.size()), "problems of the job store");
   require_none(static_cast<int64_t>(whole.missing.size()), "blobs that are missing");
   require_none(static_cast<int64_t>(whole.damaged.size()), "blobs that are damaged");
@@ -182,7 +183,7 @@ std::vector<std::string> ChaosService::EndAndAudit() {
   if (status != 0) problems_.push_back(fmt::format("exit status of the server: {}", status));
   const fs::path data = folder_ / "data";
   for (std::string& problem :
-       AuditJobs(data, TestStoreAddress(data), effects_, [&](const auto& sql) {
+       AuditJobs(data, TestStoreAddress(data), nullptr, effects_, [&](const auto& sql) {
          return Count(sql.c_str());
        })) {
     problems_.push_back(std::move(problem));

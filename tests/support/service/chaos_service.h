@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/random.h"
+#include "server/storage/blob_store.h"
 #include "tests/support/service/server_process.h"
 
 namespace color3d::testing {
@@ -24,9 +25,11 @@ uint64_t ChaosSeed();
 using CountRows = std::function<int64_t(const std::string& sql)>;
 // Returns what is wrong after all jobs of a scenario have ended: effects that occur twice, jobs and
 // attempts without an end, blobs that are missing or damaged. `effects`: COLOR3D_TEST_EFFECTS;
-// `address`: of the store, empty: SQLite.
+// `address`: of the store, empty: SQLite; `elsewhere`: blobs that are not in the data folder, or
+// null.
 std::vector<std::string> AuditJobs(const std::filesystem::path& data_folder,
                                    const std::string& address,
+                                   BlobStore* elsewhere,
                                    const std::filesystem::path& effects,
                                    const CountRows& count);
 // "20 x worker killed, ..."

@@ -31,11 +31,13 @@ inline void MakeOld(const std::filesystem::path& path, int hours) {
   ASSERT_EQ(::utimensat(AT_FDCWD, path.c_str(), times, 0), 0);
 }
 
+inline FileDigest DigestOfBytes(const std::string& bytes) {
+  return {Sha256Hex(bytes), static_cast<int64_t>(bytes.size())};
+}
+
 class StorageTest : public ::testing::Test {
  protected:
-  FileDigest DigestOf(const std::string& text) {
-    return {Sha256Hex(text), static_cast<int64_t>(text.size())};
-  }
+  FileDigest DigestOf(const std::string& text) { return DigestOfBytes(text); }
   ScratchFolder scratch_;
   FileBlobStore blobs_{scratch_.path() / "blobs", {0}};
   UploadStore uploads_{scratch_.path() / "uploads", blobs_, 1000};

@@ -60,11 +60,7 @@ TestAuthority::Certificate TestAuthority::Make(
   X509* issuer = is_ca ? x : own_.get();
   X509_set_issuer_name(x, X509_get_subject_name(issuer));
   AddExtension(x, issuer, NID_basic_constraints, is_ca ? "critical,CA:TRUE" : "CA:FALSE");
-  if (!is_ca)
-    AddExtension(x,
-                 issuer,
-                 NID_subject_alt_name,
-                 "DNS:localhost,IP:127.0.0.1,IP:10.77.0.11,IP:10.77.0.12,IP:10.77.0.13");
+  if (!is_ca) AddExtension(x, issuer, NID_subject_alt_name, names_.c_str());
   Require(X509_sign(x, key_.get(), EVP_sha256()) != 0);
   return certificate;
 }

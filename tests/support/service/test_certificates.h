@@ -20,8 +20,9 @@ class TestAuthority {
   TestAuthority(const std::filesystem::path& folder, const std::string& name);
 
   const std::filesystem::path& certificate() const { return file_; }
-  // For "localhost", 127.0.0.1 and the first three machines of a TestNetwork, valid from `from_s`
-  // to `until_s` seconds from now.
+  // Later certificates are for this IP address, too.
+  void AddAddress(const std::string& address) { names_ += ",IP:" + address; }
+  // For "localhost" and the addresses, valid from `from_s` to `until_s` seconds from now.
   CertificateFiles Issue(const std::string& name, long from_s = -60, long until_s = 3600);
 
  private:
@@ -31,6 +32,7 @@ class TestAuthority {
 
   const std::filesystem::path folder_, file_;
   const std::string name_;
+  std::string names_ = "DNS:localhost,IP:127.0.0.1";  // of the certificates it issues
   Key key_;
   Certificate own_;
   long serial_ = 1;

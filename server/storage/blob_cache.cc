@@ -1,4 +1,4 @@
-#include "server/worker/remote/blob_cache.h"
+#include "server/storage/blob_cache.h"
 
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
@@ -51,8 +51,8 @@ BlobCache::BlobCache(const fs::path& folder, int64_t budget_bytes)
   }
   if (error) {
     throw Error(ErrorCode::kFailedPrecondition,
-                "cannot use the cache folder {}: {}; choose another --cache-dir or change its "
-                "permissions",
+                "cannot use the cache folder {}: {}; change its permissions, or choose another "
+                "(--cache-dir of a worker)",
                 folder_.string(),
                 error.message());
   }
@@ -110,7 +110,8 @@ bool BlobCache::MakeReady(const std::string& sha256,
     MutexLock lock(mutex_);
     Entry& entry = entries_.at(sha256);
     while (entry.filling) filled_.Wait(mutex_);
-    if (entry.present && entry.verified) return false;
+    std::error_code none;
+    if (entry.present && entry.verified && fs::exists(PathOf(sha256), none)) return false;
     entry.filling = true;
     present = entry.present;
   }

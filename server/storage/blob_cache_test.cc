@@ -1,4 +1,4 @@
-#include "server/worker/remote/blob_cache.h"
+#include "server/storage/blob_cache.h"
 
 #include <gtest/gtest.h>
 
