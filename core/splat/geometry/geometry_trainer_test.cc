@@ -94,14 +94,14 @@ TEST(TrainGeometryTest, RaisesPsnrOfHeldOutView) {
   EXPECT_NEAR(view.depth.At(0, 36, 48), 3.1f, 0.5f);
 }
 
-// Every photo shows an object of its own in front of the room, at another position each. The
-// held-out view is without one.
+// Every photo shows an object in front of the room: a bright one on the left, or a dark one on the
+// right. The held-out view is without one.
 TEST(TrainGeometryTest, IgnoresMaskedPixels) {
   const ProceduralScene s = MakeRoomCorner(7, 96, 72, 800);
   std::vector<std::shared_ptr<const Image>> masks;
   for (int view = 0; view < 7; ++view) {
     Image mask(96, 72, 1, 1.0f);
-    const int left = 4 + 29 * (view % 3), top = view % 2 == 0 ? 6 : 36;
+    const int left = 4 + 29 * (view % 2), top = view % 2 == 0 ? 6 : 36;
     for (int y = top; y < top + 30; ++y) {
       for (int x = left; x < left + 30; ++x) mask.At(0, y, x) = 0.0f;
     }
@@ -128,8 +128,8 @@ TEST(TrainGeometryTest, IgnoresMaskedPixels) {
   };
   const double spoilt = psnr(true, false), masked = psnr(true, true), clean = psnr(false, false);
   EXPECT_EQ(psnr(false, true), masked) << "what is masked out leaks";
-  EXPECT_GT(masked, spoilt + 0.5);
-  EXPECT_GT(masked, clean - 0.5);
+  EXPECT_GT(masked, spoilt + 5.0);
+  EXPECT_GT(masked, clean - 1.5);  // half of the views show less
 }
 
 // One camera does not determine depth: parameters along it are unchanged.
