@@ -111,6 +111,9 @@ int Main(int argc, char** argv) {
   app.add_option("--token-file", token_file, "File with the token; or set COLOR3D_TOKEN")
       ->envname("COLOR3D_TOKEN_FILE");
   app.add_flag("--json", context.json, "Print one JSON object instead of text");
+#if defined(COLOR3D_STUDIO)
+  AddStudioCommand(app, context);
+#endif
   AddColorizeCommand(app, context);
   AddPlanCommand(app, context);
   AddInspectCommand(app, context);
