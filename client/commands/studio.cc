@@ -64,11 +64,10 @@ ExitCode RunStudio(const Context& context, const StudioFlags& flags) {
 
 void AddStudioCommand(CLI::App& app, Context& context) {
   const auto flags = std::make_shared<StudioFlags>();
-  CLI::App* studio = AddCommand(app,
-                                context,
-                                "studio",
-                                "Colour photos or film in the browser",
-                                [&context, flags] { return RunStudio(context, *flags); });
+  CLI::App* studio =
+      AddCommand(app, context, "studio", "Colour photos or film in the browser", [&context, flags] {
+        return RunStudio(context, *flags);
+      });
   studio->add_option("TARGET",
                      flags->target,
                      "Folder of photos, a film or a splat; or results to look at: their folder, "

@@ -219,8 +219,8 @@ std::string FindOrStartServer(const LocalServerOptions& options,
   while (!AcceptsConnections(address)) {
     cancel.ThrowIfCancelled();
     if (child == 0 && !IsDataFolderInUse(folder)) {  // an ending server may still hold it
-      if (!said) say(fmt::format("starting a server of your own; its files are in {}",
-                                 folder.string()));
+      if (!said)
+        say(fmt::format("starting a server of your own; its files are in {}", folder.string()));
       said = true;
       child = StartDetached({options.program.string(),
                              "serve",

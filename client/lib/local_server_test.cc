@@ -119,16 +119,17 @@ TEST_F(LocalServerTest, UnwritableDataFolderNamesRemedy) {
   std::ofstream(scratch_.path() / "file") << "no folder";
   options_.data_folder = scratch_.path() / "file" / "color3d";
   WriteProgram("exit 0");
-  EXPECT_THAT(Refusal(),
-              testing::AllOf(HasSubstr("FAILED_PRECONDITION cannot create"),
-                             HasSubstr("XDG_DATA_HOME")));
+  EXPECT_THAT(
+      Refusal(),
+      testing::AllOf(HasSubstr("FAILED_PRECONDITION cannot create"), HasSubstr("XDG_DATA_HOME")));
 }
 
 TEST_F(LocalServerTest, WaitsForAnotherStartAndForDataFolder) {
   WriteProgram("echo started >>" + (scratch_.path() / "starts").string() + "; exit 3");
   fs::create_directories(options_.data_folder);
   // Another command is about to start one: this one takes it.
-  const int starting = ::open((options_.data_folder / "start-lock").c_str(), O_RDWR | O_CREAT, 0600);
+  const int starting =
+      ::open((options_.data_folder / "start-lock").c_str(), O_RDWR | O_CREAT, 0600);
   ASSERT_EQ(::flock(starting, LOCK_EX), 0);
   int listener = -1;
   std::thread other([&] {

@@ -76,7 +76,7 @@ Json DescribePhotos(const PhotoFolder& folder, const CancellationToken& cancel) 
   pool.ForEach(static_cast<int64_t>(photos.size()), [&](int64_t i, int) {
     cancel.ThrowIfCancelled();
     photos[i] = reads_all ? DescribePhoto(folder.photos[i])
-                          : Json{{"name", ViewName(folder.photos[i])}};
+                          : Json::object({{"name", ViewName(folder.photos[i])}});
   });
   Json notes = folder.notes;
   Json in_color;
@@ -141,8 +141,10 @@ std::string ScaleStrokes(const std::string& strokes, double scale) {
       }
     }
     // Defaults of hints.h, so that they are scaled, too; thinner strokes would cover no pixel.
-    if (stroke.contains("x")) stroke["radius"] = std::max(0.75, stroke.value("radius", 2.0) * scale);
-    if (stroke.contains("line")) stroke["width"] = std::max(1.5, stroke.value("width", 4.0) * scale);
+    if (stroke.contains("x"))
+      stroke["radius"] = std::max(0.75, stroke.value("radius", 2.0) * scale);
+    if (stroke.contains("line"))
+      stroke["width"] = std::max(1.5, stroke.value("width", 4.0) * scale);
     for (const char* outline : {"line", "region"}) {
       if (!stroke.contains(outline) || !stroke[outline].is_array()) continue;
       for (Json& point : stroke[outline]) {

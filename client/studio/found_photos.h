@@ -21,8 +21,8 @@ v1::CaptureFacts CaptureFactsOf(const PhotoFolder& folder);
 // The photo whose name as a view is `name`. Throws Error{kNotFound}.
 const LocalFile& PhotoOfView(const PhotoFolder& folder, const std::string& name);
 
-// The photo as a JPEG with its longer side at most `max_side_px` (0: its own size), upright, in sRGB.
-// `gray`: its luminance. Throws Error{kInvalidArgument} if it cannot be decoded.
+// The photo as a JPEG with its longer side at most `max_side_px` (0: its own size), upright, in
+// sRGB. `gray`: its luminance. Throws Error{kInvalidArgument} if it cannot be decoded.
 std::string PhotoJpeg(const LocalFile& photo, int max_side_px, bool gray);
 
 struct SmallPhoto {

@@ -6,8 +6,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <deque>
+#include <functional>
+#include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "core/base/mutex.h"
@@ -63,7 +67,7 @@ class TimedStream : public httplib::Stream {
     ip = "127.0.0.1";
     port = 0;
   }
-  httplib::socket_t socket() const override { return socket_; }
+  socket_t socket() const override { return socket_; }
 
  private:
   Steady::time_point ReadLimit() const {
@@ -168,7 +172,7 @@ class BoundedThreads : public httplib::TaskQueue {
 HttpServer::HttpServer(const HttpLimits& limits) : limits_(limits) {
   new_task_queue = [this] { return new BoundedThreads(limits_.threads, limits_.waiting); };
   // Without SO_REUSEPORT, which httplib sets: two servers would share a port.
-  set_socket_options([](httplib::socket_t socket) {
+  set_socket_options([](socket_t socket) {
     const int yes = 1;
     ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof(yes));
   });
@@ -179,7 +183,7 @@ void HttpServer::Stop() {
   stop();
 }
 
-bool HttpServer::process_and_close_socket(httplib::socket_t socket) {
+bool HttpServer::process_and_close_socket(socket_t socket) {
   if (is_turned_away) {
     ::send(socket, kBusy.data(), kBusy.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
     ::shutdown(socket, SHUT_RDWR);

@@ -27,7 +27,7 @@ class HttpServer : public httplib::Server {
   bool is_stopping() const { return stopping_; }
 
  private:
-  bool process_and_close_socket(httplib::socket_t socket) override;
+  bool process_and_close_socket(socket_t socket) override;
 
   const HttpLimits limits_;
   std::atomic<bool> stopping_{false};

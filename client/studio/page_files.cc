@@ -5,7 +5,7 @@
 #include <cstddef>
 
 // page_files.S
-#define PAGE_FILE(name)                            \
+#define PAGE_FILE(name)                           \
   extern "C" const char color3d_##name##_begin[]; \
   extern "C" const char color3d_##name##_end[]
 PAGE_FILE(studio_page);

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <ctime>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "client/lib/names.h"
 #include "client/lib/out_folder.h"
@@ -83,10 +84,11 @@ class PartFile {
 };
 
 PhotoSet Read(const fs::path& folder) {
-  const auto json =
-      nlohmann::json::parse(ReadFile(folder / kFacts, 1 << 20), nullptr, /*allow_exceptions=*/false);
+  const auto json = nlohmann::json::parse(
+      ReadFile(folder / kFacts, 1 << 20), nullptr, /*allow_exceptions=*/false);
   if (!json.is_object()) {
-    throw Error(ErrorCode::kDataLoss, "{} is damaged; remove its folder", (folder / kFacts).string());
+    throw Error(
+        ErrorCode::kDataLoss, "{} is damaged; remove its folder", (folder / kFacts).string());
   }
   PhotoSet set;
   set.id = folder.filename();
@@ -153,7 +155,8 @@ PhotoSet PhotoSets::Adopt(const fs::path& path) {
 PhotoSet PhotoSets::Get(const std::string& id) const {
   std::error_code none;
   if (!IsId(id) || !fs::exists(root_ / id / kFacts, none)) {
-    throw Error(ErrorCode::kNotFound, "there are no photos {}; reload the page", EscapeControls(id));
+    throw Error(
+        ErrorCode::kNotFound, "there are no photos {}; reload the page", EscapeControls(id));
   }
   return Read(root_ / id);
 }
@@ -215,6 +218,20 @@ fs::path PhotoSets::KeepPicture(const std::string& id,
   const fs::path file = root_ / set.id / (Sha256Hex(bytes).substr(0, 32) + ending);
   WriteFileAtomic(file, bytes);
   return file;
+}
+
+fs::path PhotoSets::KeptPicture(const std::string& id, const std::string& name) const {
+  const PhotoSet set = Get(id);
+  const size_t dot = name.rfind('.');
+  std::error_code none;
+  // As KeepPicture names them, so that nothing else in the folder is meant.
+  if (dot != 32 || !IsId(name.substr(0, dot)) || name.find('/') != name.npos) {
+    throw InvalidArgument("the picture is missing; bring the coloured photo again");
+  }
+  if (!fs::is_regular_file(fs::symlink_status(root_ / id / name, none))) {
+    throw Error(ErrorCode::kNotFound, "the picture is gone; bring the coloured photo again");
+  }
+  return root_ / id / name;
 }
 
 }  // namespace color3d::client

@@ -50,6 +50,9 @@ class PhotoSets {
                                     const std::string& ending,
                                     const std::string& bytes);
 
+  // Its file. Throws Error{kInvalidArgument} for other names, kNotFound.
+  std::filesystem::path KeptPicture(const std::string& id, const std::string& name) const;
+
  private:
   void Write(const PhotoSet& set) const;
 

@@ -44,7 +44,8 @@ TEST_F(PhotoSetsTest, KeepsDroppedFiles) {
 
 TEST_F(PhotoSetsTest, RefusesPathsOutside) {
   const PhotoSet set = sets_.Create("");
-  for (const char* name : {"../a.jpg", "/etc/a.jpg", "a/../../b.jpg", "", "a\\b.jpg", "a\nb.jpg", "."}) {
+  for (const char* name :
+       {"../a.jpg", "/etc/a.jpg", "a/../../b.jpg", "", "a\\b.jpg", "a\nb.jpg", "."}) {
     EXPECT_THAT(Receive(set.id, name), HasSubstr("INVALID_ARGUMENT")) << name;
   }
   fs::create_symlink(scratch_.path(), set.folder / "link");
@@ -73,6 +74,9 @@ TEST_F(PhotoSetsTest, OutlivesItself) {
   const PhotoSets again(scratch_.path() / "studio");
   EXPECT_EQ(again.Get(id).name, "a");
   EXPECT_EQ(ReadFile(picture), "bytes");
+  EXPECT_EQ(again.KeptPicture(id, picture.filename()), picture);
+  EXPECT_THROW(again.KeptPicture(id, "set.json"), Error);
+  EXPECT_THROW(again.KeptPicture(id, "../" + picture.filename().string()), Error);
   std::ofstream(scratch_.path() / "studio" / id / "set.json") << "{";
   EXPECT_TRUE(again.List().empty());
   EXPECT_THROW(again.Get(id), Error);

@@ -23,10 +23,8 @@ double ShareOf(const v1::Job& stage) {
   if (stage.state() == v1::Job::STATE_SUCCEEDED) return 1.0;
   const v1::Progress& progress = stage.progress();
   if (progress.total_steps() <= 0) return 0.0;
-  return std::clamp(static_cast<double>(progress.step()) /
-                        static_cast<double>(progress.total_steps()),
-                    0.0,
-                    1.0);
+  return std::clamp(
+      static_cast<double>(progress.step()) / static_cast<double>(progress.total_steps()), 0.0, 1.0);
 }
 
 bool IsPicture(const v1::Artifact& artifact) {

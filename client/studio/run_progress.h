@@ -25,8 +25,8 @@ class RunProgress {
   RunProgress(const v1::Job& job, const std::optional<v1::JobPlan>& plan);
 
   void OnEvent(const v1::JobEvent& event);
-  // JobFacts, with stages (kind, state, share 0..1, message, seconds, seconds_left), seconds_left of
-  // the whole (null: unknown), expected_error (CIEDE2000, or null), and pictures: artifacts of
+  // JobFacts, with stages (kind, state, share 0..1, message, seconds, seconds_left), seconds_left
+  // of the whole (null: unknown), expected_error (CIEDE2000, or null), and pictures: artifacts of
   // finished stages that a browser shows.
   nlohmann::ordered_json ToJson() const;
 

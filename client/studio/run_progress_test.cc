@@ -17,7 +17,8 @@ v1::Job Run() {
 
 v1::JobPlan Plan() {
   v1::JobPlan plan;
-  for (const auto& [kind, seconds] : {std::pair("import_scene", 4.0), std::pair("personalize", 30.0)}) {
+  for (const auto& [kind, seconds] :
+       {std::pair("import_scene", 4.0), std::pair("personalize", 30.0)}) {
     v1::PlannedStage* stage = plan.add_stages();
     stage->set_kind(kind);
     stage->set_runs(true);

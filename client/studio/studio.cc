@@ -3,6 +3,8 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cstdlib>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -17,6 +19,7 @@
 #include "client/studio/studio_answers.h"
 #include "client/studio/studio_calls.h"
 #include "client/studio/studio_guard.h"
+#include "client/studio/studio_requests.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/text/lower_case.h"
@@ -33,35 +36,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr int64_t kMaxPictureBytes = 256 << 20;
 constexpr int kMaxEventStreams = 8;
-constexpr int kMaxSidePx = 8192;
 std::string Pattern(const std::string& before, const std::string& after) {
   return "/api/" + before + "/([0-9a-f-]{1,64})" + after;
-}
-
-std::string TextOf(const nlohmann::json& body, const char* field) {
-  const auto value = body.find(field);
-  if (value == body.end()) return "";
-  if (!value->is_string()) throw InvalidArgument("{} is not a text", field);
-  return value->get<std::string>();
-}
-
-// 0 if it is not given.
-int SideOf(const Request& request) {
-  const std::string text = request.get_param_value("side");
-  if (text.empty()) return 0;
-  const int side = text.size() <= 4 ? std::atoi(text.c_str()) : 0;
-  if (side < 16 || side > kMaxSidePx) {
-    throw InvalidArgument("side is {}; 16 to {} px are possible", text.substr(0, 20), kMaxSidePx);
-  }
-  return side;
-}
-
-Json SetJson(const PhotoSet& set) {
-  return {{"id", set.id},
-          {"name", set.name},
-          {"scene", set.scene.empty() ? "" : IdOf(set.scene)},
-          {"created_s", set.created_s},
-          {"is_own", set.is_own}};
 }
 
 // Counts event streams, so that they leave threads for other requests.
@@ -119,7 +95,6 @@ class Studio::Parts {
   PhotoFolder FolderOf(const std::string& id) const { return CollectPhotos(sets_.Get(id).folder); }
   // "scenes/..." of the set, uploaded if it is not there yet.
   std::string SceneOf(const std::string& id);
-  RunChoices ChoicesFrom(const std::string& set, const nlohmann::json& body);
 };
 
 Studio::Parts::Parts(const StudioOptions& options, const CancellationToken& cancel)
@@ -223,7 +198,7 @@ void Studio::Parts::AddSetRoutes() {
   Post(Pattern("sets", "/plan"),
        [this](const Request& request, Response& response, const ContentReader& body) {
          const std::string id = request.matches[1];
-         const RunChoices choices = ChoicesFrom(id, ReadJsonBody(request, body));
+         const RunChoices choices = ReadChoices(ReadJsonBody(request, body), id, sets_);
          AnswerJson(calls_.Plan(FolderOf(id), choices), response);
        });
   Post(Pattern("sets", "/key"),
@@ -243,10 +218,10 @@ void Studio::Parts::AddSetRoutes() {
          const int side = std::clamp(json.value("max_side", 1000), 16, 2000);
          const auto strokes = json.find("strokes");
          if (strokes == json.end()) throw InvalidArgument("strokes are missing");
-         response.set_content(calls_.PreviewOfStrokes(PhotoOfView(folder, TextOf(json, "photo")),
-                                                      strokes->dump(),
-                                                      side),
-                              "image/png");
+         response.set_content(
+             calls_.PreviewOfStrokes(
+                 PhotoOfView(folder, TextOf(json, "photo")), strokes->dump(), side),
+             "image/png");
        });
   Post(Pattern("sets", "/colorize"),
        [this](const Request& request, Response& response, const ContentReader& body) {
@@ -264,7 +239,8 @@ void Studio::Parts::AddJobRoutes() {
   Get(Pattern("jobs", "/key-views"), [this](const Request& request, Response& response) {
     AnswerJson(calls_.KeyViews(request.matches[1]), response);
   });
-  const auto change = [this](const char* what, v1::Job (StudioCalls::*call)(const std::string&) const) {
+  const auto change = [this](const char* what,
+                             v1::Job (StudioCalls::*call)(const std::string&) const) {
     Post(Pattern("jobs", what),
          [this, call](const Request& request, Response& response, const ContentReader& body) {
            ReadJsonBody(request, body);
@@ -273,12 +249,10 @@ void Studio::Parts::AddJobRoutes() {
   };
   change("/cancel", &StudioCalls::Cancel);
   change("/retry", &StudioCalls::Retry);
-  Get(Pattern("jobs", "/events"), [this](const Request& request, Response& response) {
-    StreamEvents(request, response);
-  });
-  Get(Pattern("jobs", "/artifact"), [this](const Request& request, Response& response) {
-    SendArtifact(request, response);
-  });
+  Get(Pattern("jobs", "/events"),
+      [this](const Request& request, Response& response) { StreamEvents(request, response); });
+  Get(Pattern("jobs", "/artifact"),
+      [this](const Request& request, Response& response) { SendArtifact(request, response); });
   Get(Pattern("jobs", "/preview"), [this](const Request& request, Response& response) {
     const PhotoFolder folder = FolderOf(request.get_param_value("set"));
     const LocalFile& photo = PhotoOfView(folder, request.get_param_value("name"));
@@ -307,10 +281,13 @@ void Studio::Parts::Receive(const Request& request,
                             const ContentReader& reader) {
   RequireLength(request, options_.max_file_bytes);
   const std::string name = request.get_param_value("name");
-  const int64_t bytes =
-      sets_.Receive(request.matches[1], name, [&](const PhotoSets::Sink& sink) {
-        return reader([&](const char* piece, size_t count) { return sink(piece, count); });
-      });
+  int64_t received = 0;  // not announced in pieces, and more than announced where compressed
+  const int64_t bytes = sets_.Receive(request.matches[1], name, [&](const PhotoSets::Sink& sink) {
+    return reader([&](const char* piece, size_t count) {
+      received += static_cast<int64_t>(count);
+      return received <= options_.max_file_bytes && sink(piece, count);
+    });
+  });
   AnswerJson({{"name", name}, {"bytes", bytes}}, response);
 }
 
@@ -337,40 +314,11 @@ std::string Studio::Parts::SceneOf(const std::string& id) {
   return scene;
 }
 
-RunChoices Studio::Parts::ChoicesFrom(const std::string& set, const nlohmann::json& body) {
-  RunChoices choices;
-  const std::string preset = TextOf(body, "preset");
-  if (preset.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != preset.npos) {
-    throw InvalidArgument("the preset {} is unknown", preset.substr(0, 40));  // never a file
-  }
-  if (!preset.empty()) choices.preset = preset;
-  choices.key_view = TextOf(body, "key_view");
-  const std::string color = TextOf(body, "color");
-  if (color.empty() || color == "automatic") return choices;
-  choices.automatic = false;
-  if (color == "strokes") {
-    const auto strokes = body.find("strokes");
-    if (strokes == body.end() || !strokes->is_array() || strokes->empty()) {
-      throw InvalidArgument("there are no strokes yet; draw one, or choose automatic colours");
-    }
-    choices.is_strokes = true;
-    choices.picture = sets_.KeepPicture(set, ".json", strokes->dump());
-    return choices;
-  }
-  if (color != "picture") throw InvalidArgument("color is automatic, picture or strokes");
-  const std::string picture = TextOf(body, "picture");
-  if (!IsSafeRelativePath(picture) || picture.find('/') != picture.npos) {
-    throw InvalidArgument("the picture is missing; drop the coloured photo again");
-  }
-  choices.picture = SafePathBelow(options_.folder / set, picture);
-  return choices;
-}
-
 void Studio::Parts::Colorize(const Request& request,
                              Response& response,
                              const ContentReader& reader) {
   const std::string id = request.matches[1];
-  const RunChoices choices = ChoicesFrom(id, ReadJsonBody(request, reader));
+  const RunChoices choices = ReadChoices(ReadJsonBody(request, reader), id, sets_);
   AnswerJson(JobFacts(calls_.Colorize(SceneOf(id), choices)), response);
 }
 

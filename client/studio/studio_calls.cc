@@ -77,28 +77,27 @@ std::string LivePng(Connection& connection,
                     const LivePicture& picture,
                     int max_side_px) {
   std::string png;
-  ColorizeLive(connection,
-               source,
-               {picture},
-               {.max_side_px = max_side_px},
-               [&](size_t, const v1::ColorizeImagesResponse& answer) {
-                 if (answer.has_error()) {
-                   throw Error(
-                       ErrorCodeOf(static_cast<grpc::StatusCode>(answer.error().code())),
-                       "{}",
-                       answer.error().message());
-                 }
-                 if (!answer.has_image_digest()) {
-                   png = answer.image();
-                   return;
-                 }
-                 const ScratchFolder scratch;
-                 const auto file = scratch.path() / "picture.png";
-                 const v1::Digest& digest = answer.image_digest();
-                 DownloadBlob(
-                     connection, {digest.sha256(), digest.size_bytes()}, file, [](int64_t) {});
-                 png = ReadFile(file);
-               });
+  ColorizeLive(
+      connection,
+      source,
+      {picture},
+      {.max_side_px = max_side_px},
+      [&](size_t, const v1::ColorizeImagesResponse& answer) {
+        if (answer.has_error()) {
+          throw Error(ErrorCodeOf(static_cast<grpc::StatusCode>(answer.error().code())),
+                      "{}",
+                      answer.error().message());
+        }
+        if (!answer.has_image_digest()) {
+          png = answer.image();
+          return;
+        }
+        const ScratchFolder scratch;
+        const auto file = scratch.path() / "picture.png";
+        const v1::Digest& digest = answer.image_digest();
+        DownloadBlob(connection, {digest.sha256(), digest.size_bytes()}, file, [](int64_t) {});
+        png = ReadFile(file);
+      });
   return png;
 }
 
@@ -107,10 +106,9 @@ std::optional<v1::Job> ColoredKey(Connection& connection, const v1::Job& run) {
   std::vector<v1::Job> jobs = ListChildren(connection, run.name());
   for (const std::string& input : run.spec().inputs()) jobs.push_back(GetJob(connection, input));
   for (const v1::Job& job : jobs) {
-    const bool has_colored =
-        std::ranges::any_of(job.artifacts(), [](const v1::Artifact& artifact) {
-          return artifact.name() == artifact::kKeyViewColored;
-        });
+    const bool has_colored = std::ranges::any_of(job.artifacts(), [](const v1::Artifact& artifact) {
+      return artifact.name() == artifact::kKeyViewColored;
+    });
     if (has_colored) return job;
   }
   return std::nullopt;
@@ -173,7 +171,8 @@ Json StudioCalls::KeyViews(const std::string& job) const {
     views.push_back(row);
   }
   if (views.empty()) {
-    views.push_back({{"name", found.value("view", "")}, {"expected_error", nullptr}, {"saves", nullptr}});
+    views.push_back(
+        {{"name", found.value("view", "")}, {"expected_error", nullptr}, {"saves", nullptr}});
   }
   return {{"view", found.value("view", "")},
           {"description", found.value("description", "")},
@@ -247,8 +246,8 @@ void StudioCalls::Watch(const std::string& job,
   const auto tell = [&](bool at_once) {
     const auto now = steady_clock::now();
     if (is_new && (at_once || now - last >= kBetweenStates)) {
-      goes_on = send(progress.ToJson().dump(
-          -1, ' ', false, nlohmann::json::error_handler_t::replace));
+      goes_on =
+          send(progress.ToJson().dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
       is_new = false;
       last = now;
     } else if (now - last >= kQuiet) {
@@ -276,10 +275,8 @@ std::string StudioCalls::Fetch(const std::string& job,
   Connection connection = Connect();
   const v1::Job made = GetJob(connection, ResourceName(job, "jobs"));
   const v1::Artifact& found = FindArtifact(made, artifact);
-  DownloadBlob(connection,
-               {found.digest().sha256(), found.digest().size_bytes()},
-               file,
-               [](int64_t) {});
+  DownloadBlob(
+      connection, {found.digest().sha256(), found.digest().size_bytes()}, file, [](int64_t) {});
   return found.media_type();
 }
 
@@ -290,7 +287,8 @@ std::string StudioCalls::PreviewOfRun(const std::string& job,
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   const std::optional<v1::Job> colored = ColoredKey(connection, run);
   if (!colored) {
-    throw Error(ErrorCode::kFailedPrecondition, "the key view of {} is not coloured yet", run.name());
+    throw Error(
+        ErrorCode::kFailedPrecondition, "the key view of {} is not coloured yet", run.name());
   }
   LiveSource source;
   source.example = FindArtifact(*colored, artifact::kKeyViewColored).digest();

@@ -19,11 +19,11 @@ namespace color3d::client {
 // What the page chose for a run.
 struct RunChoices {
   std::string preset = "fast";
-  std::string key_view;               // empty: the service selects it
-  bool automatic = true;              // else `picture`
-  std::filesystem::path picture;      // a coloured key view, or its strokes
-  bool is_strokes = false;            // `picture` holds points as JSON, as for `key color --hints`
-  double time_budget_seconds = 0.0;   // 0: none
+  std::string key_view;              // empty: the service selects it
+  bool automatic = true;             // else `picture`
+  std::filesystem::path picture;     // a coloured key view, or its strokes
+  bool is_strokes = false;           // `picture` holds points as JSON, as for `key color --hints`
+  double time_budget_seconds = 0.0;  // 0: none
 };
 
 class StudioCalls {

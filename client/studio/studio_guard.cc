@@ -4,6 +4,7 @@
 #include <httplib.h>
 #include <sys/random.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -92,9 +93,10 @@ StudioGuard::Verdict StudioGuard::CheckOrigin(const httplib::Request& request) c
 
 StudioGuard::Verdict StudioGuard::CheckCookie(const httplib::Request& request) const {
   if (AreEqualSecrets(CookieOf(request, cookie_), session_)) return {};
-  return {403, std::string("this browser was not let in: open the address that `color3d studio` "
-                           "printed; it works once. Otherwise ") +
-                   kOpenAgain};
+  return {403,
+          std::string("this browser was not let in: open the address that `color3d studio` "
+                      "printed; it works once. Otherwise ") +
+              kOpenAgain};
 }
 
 }  // namespace color3d::client

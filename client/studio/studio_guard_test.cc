@@ -58,15 +58,21 @@ TEST(StudioGuardTest, RefusesOtherHostsAndPages) {
   EXPECT_EQ(status({host}), 200);
   EXPECT_EQ(status({{"Host", "localhost:4711"}}), 200);
   EXPECT_EQ(status({}), 421);
-  for (const char* other : {"127.0.0.1", "127.0.0.1:4712", "evil.example:4711",
-                            "127.0.0.1.evil.example:4711", "127.0.0.1:4711.evil.example"}) {
+  for (const char* other : {"127.0.0.1",
+                            "127.0.0.1:4712",
+                            "evil.example:4711",
+                            "127.0.0.1.evil.example:4711",
+                            "127.0.0.1:4711.evil.example"}) {
     EXPECT_EQ(status({{"Host", other}}), 421) << other;
   }
   EXPECT_EQ(status({host, {"Host", "evil.example"}}), 421);
   EXPECT_EQ(status({host, {"Origin", "http://127.0.0.1:4711"}}, "POST"), 200);
   EXPECT_EQ(status({host}, "POST"), 403);
-  for (const char* other : {"null", "http://evil.example", "https://127.0.0.1:4711",
-                            "http://localhost:4711", "http://127.0.0.1:4712"}) {
+  for (const char* other : {"null",
+                            "http://evil.example",
+                            "https://127.0.0.1:4711",
+                            "http://localhost:4711",
+                            "http://127.0.0.1:4712"}) {
     EXPECT_EQ(status({host, {"Origin", other}}), 403) << other;
     EXPECT_EQ(status({host, {"Origin", other}}, "POST"), 403) << other;
   }

@@ -160,31 +160,42 @@ TEST_F(StudioSecurityTest, ListensOnLoopbackAlone) {
 TEST_F(StudioSecurityTest, PathsStayInside) {
   const std::string id = NewSet();
   const size_t before = Files();
-  for (const char* name : {"../../x", "%2e%2e/x", "/etc/x", "a/%2e%2e/%2e%2e/x", "..%5cx", "a%00b"}) {
+  for (const char* name :
+       {"../../x", "%2e%2e/x", "/etc/x", "a/%2e%2e/%2e%2e/x", "..%5cx", "a%00b"}) {
     const auto answer = Client().Post(
         "/api/sets/" + id + "/files?name=" + name, Own(), "bytes", "application/octet-stream");
     EXPECT_EQ(answer->status, 400) << name;
   }
   EXPECT_EQ(Files(), before);
-  for (const char* path :
-       {"/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "/api/sets/..", "/api/sets/%2e%2e/photo"}) {
+  for (const char* path : {"/../../etc/passwd",
+                           "/%2e%2e/%2e%2e/etc/passwd",
+                           "/api/sets/..",
+                           "/api/sets/%2e%2e/photo"}) {
     EXPECT_THAT(Client().Get(path, Own())->status, AnyOf(400, 404)) << path;
   }
   EXPECT_EQ(Client().Get("/api/jobs/1/artifact?name=../../etc/passwd", Own())->status, 400);
-  const auto picture = Client().Post("/api/sets/" + id + "/colorize", Own(),
-      R"({"color": "picture", "key_view": "a", "picture": "../set.json"})", "application/json");
+  const auto picture =
+      Client().Post("/api/sets/" + id + "/colorize",
+                    Own(),
+                    R"({"color": "picture", "key_view": "a", "picture": "../set.json"})",
+                    "application/json");
   EXPECT_EQ(picture->status, 400);
   // A preset is a name, never a file.
-  EXPECT_EQ(Client().Post("/api/sets/" + id + "/plan", Own(), R"({"preset": "/etc/passwd"})",
-                          "application/json")->status, 400);
+  EXPECT_EQ(Client()
+                .Post("/api/sets/" + id + "/plan",
+                      Own(),
+                      R"({"preset": "/etc/passwd"})",
+                      "application/json")
+                ->status,
+            400);
 }
 
 TEST_F(StudioSecurityTest, BoundsBodies) {
   const std::string id = NewSet();
   const size_t before = Files();
   // Announced: refused before it is read.
-  const std::string announced =
-      Raw({OwnHead("POST /api/sets/" + id + "/files?name=a.jpg", "Content-Length: 2147483648\r\n")});
+  const std::string announced = Raw(
+      {OwnHead("POST /api/sets/" + id + "/files?name=a.jpg", "Content-Length: 2147483648\r\n")});
   EXPECT_THAT(announced, AnyOf(StartsWith("HTTP/1.1 413"), StartsWith("HTTP/1.1 507")));
   // Not announced: cut off.
   std::vector<std::string> chunks = {

@@ -21,8 +21,8 @@ class IdleWatch {
   IdleWatch(const IdleWatch&) = delete;
   IdleWatch& operator=(const IdleWatch&) = delete;
 
-  // Notes a call of a client; `method`: "/PACKAGE.SERVICE/METHOD". Calls of workers and health
-  // checks do not count.
+  // Notes a call of a client; `method`: its full name, with a leading slash. Calls of workers and
+  // health checks do not count.
   void NoteCall(const std::string& method);
 
  private:

@@ -30,11 +30,19 @@ class OwnServerTest : public ::testing::Test {
   std::string Socket() const { return "unix:" + (Data() / "server.sock").string(); }
   ProcessResult Color3d(const std::vector<std::string>& arguments) {
     const ScratchFolder log(home_.path());
-    return RunProcess(std::vector<std::string>{ClientProgram()} + arguments, log.path(), seconds(60));
+    return RunProcess(
+        std::vector<std::string>{ClientProgram()} + arguments, log.path(), seconds(60));
   }
   // Arguments of `color3d-server serve` as commands start it.
   std::vector<std::string> Serve(const std::string& idle_exit) const {
-    return {ServerProgram(), "serve", "--data-dir", Data(), "--listen", Socket(), "--idle-exit", idle_exit};
+    return {ServerProgram(),
+            "serve",
+            "--data-dir",
+            Data(),
+            "--listen",
+            Socket(),
+            "--idle-exit",
+            idle_exit};
   }
   void EndServer() { Color3d({"--server", Socket(), "server", "drain"}); }
   int Starts() const {
@@ -73,7 +81,14 @@ TEST_F(OwnServerTest, EndsWhenIdle) {
 TEST_F(OwnServerTest, WaitsForAnEndingServer) {
   {
     // Holds the data folder at another address, and ends while the command waits.
-    Process other({ServerProgram(), "serve", "--data-dir", Data(), "--listen", "127.0.0.1:0", "--idle-exit", "3s"},
+    Process other({ServerProgram(),
+                   "serve",
+                   "--data-dir",
+                   Data(),
+                   "--listen",
+                   "127.0.0.1:0",
+                   "--idle-exit",
+                   "3s"},
                   home_.path() / "log");
     ASSERT_TRUE(WaitUntil([&] { return fs::exists(Data() / "jobs.db"); }, seconds(30)));
     const ProcessResult result = Color3d({"job", "list"});

@@ -17,7 +17,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 bool IsInstalled(const std::string& program, const ScratchFolder& scratch) {
-  return RunProcess({"env", program, "--version"}, scratch.path() / "log", seconds(30)).exit_code == 0;
+  return RunProcess({"env", program, "--version"}, scratch.path() / "log", seconds(30)).exit_code ==
+         0;
 }
 
 class StudioTest : public ServiceTest {
@@ -30,7 +31,8 @@ class StudioTest : public ServiceTest {
   }
   // Returns the address that the studio prints.
   std::string AddressOf(Process& studio) {
-    EXPECT_TRUE(WaitUntil([&] { return studio.Out().find('\n') != std::string::npos; }, seconds(30)))
+    EXPECT_TRUE(
+        WaitUntil([&] { return studio.Out().find('\n') != std::string::npos; }, seconds(30)))
         << studio.Err();
     const std::string out = studio.Out();
     return out.substr(0, out.find('\n'));

@@ -54,9 +54,7 @@ class CoreLiveEngine : public LiveEngine {
   void Spread(const Request& request, internal::v1::ColorizeImageResponse* answer);
   // Colours and answers the group, then empties it.
   void Finish(std::vector<Picture>& group);
-  void Answer(const Image& luminance,
-              const Image& ab,
-              internal::v1::ColorizeImageResponse* answer);
+  void Answer(const Image& luminance, const Image& ab, internal::v1::ColorizeImageResponse* answer);
   Image ReadLuminance(const Request& request);
   std::string KeyOf(const Request& request);
   std::shared_ptr<const Encoder> FindEncoder(const std::string& name);
