@@ -5,7 +5,7 @@
 namespace color3d::client {
 namespace {
 
-v1::Job Run() {
+v1::Job ColorizeJob() {
   v1::Job job;
   job.set_name("jobs/1");
   job.set_kind("colorize_scene");
@@ -38,7 +38,7 @@ v1::JobEvent StageEvent(const char* name, const char* kind, v1::Job::State state
 }
 
 TEST(RunProgressTest, TellsStagesInTheirOrderWithTimeLeft) {
-  RunProgress run(Run(), Plan());
+  RunProgress run(ColorizeJob(), Plan());
   run.OnEvent(StageEvent("jobs/3", "personalize", v1::Job::STATE_BLOCKED));
   run.OnEvent(StageEvent("jobs/2", "import_scene", v1::Job::STATE_RUNNING));
   auto json = run.ToJson();
@@ -63,7 +63,7 @@ TEST(RunProgressTest, TellsStagesInTheirOrderWithTimeLeft) {
 }
 
 TEST(RunProgressTest, ListsPicturesOfFinishedStagesAndReasons) {
-  RunProgress run(Run(), std::nullopt);
+  RunProgress run(ColorizeJob(), std::nullopt);
   v1::JobEvent colored = StageEvent("jobs/2", "colorize_key_view", v1::Job::STATE_SUCCEEDED);
   v1::Artifact* picture = colored.mutable_job()->add_artifacts();
   picture->set_name("key_view_colored.png");

@@ -206,7 +206,9 @@ TEST_F(StudioSecurityTest, BoundsBodies) {
   EXPECT_THAT(answer, testing::Not(StartsWith("HTTP/1.1 200")));
   const std::string large(4 << 20, ' ');
   const auto json = Client().Post("/api/sets", Own(), large, "application/json");
-  if (json) EXPECT_THAT(json->status, AnyOf(413, 507));
+  if (json) {
+    EXPECT_THAT(json->status, AnyOf(413, 507));
+  }
   EXPECT_EQ(Files(), before);
 }
 

@@ -2,7 +2,7 @@
 //   node use_studio.mjs CHROMIUM ADDRESS FOLDER [SCREENSHOTS]
 // ADDRESS: as `color3d studio` printed it; FOLDER: photos to choose. errors: of the console; requests: beyond
 // the studio; texts: of the pages; wide: pages that are wider than a screen of 360 px; faint: texts with a
-// contrast below 4.5; shades: whether the finished scene is shown. With a fourth argument every page leaves a
+// contrast below 4.5; shades: whether the page of the finished scene is ready. With a fourth argument every page leaves a
 // PNG there, wide, dark and narrow.
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
@@ -72,6 +72,23 @@ const faintTexts = `(() => {
   return faint;
 })()`;
 
+// The page of the scene is sandboxed, a target of its own.
+const stateOfScene = async (limit) => {
+  const end = Date.now() + limit;
+  let state = 'missing';
+  while (Date.now() < end && state !== 'ready' && state !== 'failed') {
+    await pause(500);
+    const { targetInfos } = await send('Target.getTargets', {}, null);
+    const scene = targetInfos.find(({ url, type }) => type === 'iframe' && url.includes('view.html'));
+    if (!scene) continue;
+    const { sessionId } = await send('Target.attachToTarget', { targetId: scene.targetId, flatten: true }, null);
+    const { result } = await send('Runtime.evaluate', { expression: 'document.body?.dataset.state ?? "loading"' }, sessionId);
+    await send('Target.detachFromTarget', { sessionId }, null);
+    state = result.value;
+  }
+  return state;
+};
+
 const keep = async (name) => {
   if (!screenshots) return;
   const { data } = await send('Page.captureScreenshot', { format: 'png' });
@@ -132,10 +149,8 @@ const use = async () => {
   await click('.card');
   await waitFor('document.querySelector("main").dataset.state === "done"', 240000);
   await waitFor('!!document.querySelector("#scene")');
-  await pause(5000);
+  seen.shades = await stateOfScene(90000) === 'ready';
   await look('done');
-  const frames = (await send('Page.getFrameTree')).frameTree.childFrames ?? [];
-  seen.shades = frames.some(({ frame }) => frame.url.includes('view.html'));
   return { ...seen, errors, requests: requests.filter((url) => !url.startsWith(origin + '/')) };
 };
 

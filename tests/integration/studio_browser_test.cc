@@ -60,8 +60,8 @@ TEST_F(StudioTest, FolderBecomesColoredScene) {
   EXPECT_THAT(text("photos"), HasSubstr("240 × 180"));
   EXPECT_THAT(text("photos"), HasSubstr("monochrome"));
   EXPECT_THAT(text("photos"), HasSubstr("in the folder"));
-  EXPECT_THAT(text("key"), HasSubstr("Best of"));
-  EXPECT_THAT(text("key"), HasSubstr("would save"));
+  EXPECT_THAT(text("key"), HasSubstr("Proposed: view00"));
+  EXPECT_THAT(text("key"), HasSubstr("Expected colour error"));
   EXPECT_THAT(text("running"), HasSubstr("First colours"));
   EXPECT_THAT(text("again"), HasSubstr("room"));
   EXPECT_THAT(text("done"), HasSubstr("view.html"));

@@ -5,7 +5,7 @@ import {
 } from './api';
 import { bar, button, h, problem, replace, say } from './dom';
 import { painterClass, type PainterOfKeyView, type StrokeFile } from './painter';
-import { seconds, stageName } from './words';
+import { errorInWords, seconds, stageName } from './words';
 
 type Way = Choices['color'];
 const maxChosen = 4;
@@ -33,6 +33,14 @@ const select = async (set: string, found: Found, show: (run: Run) => void, stops
   const views = await keyViews(job.id);
   chosen.set(set, views);
   return views;
+};
+
+const reason = ({ view, description, views }: KeyViews): string => {
+  const error = views[0]?.expected_error ?? null;
+  if (error === null) return `Proposed: ${view}. ${description}`;
+  const second = views[1]?.expected_error ?? null;
+  return `Proposed: ${view}, because its colours reach most of the other photos. Expected colour error ${errorInWords(error)}`
+    + (second === null || error - second < 0.05 ? '.' : `; ${second.toFixed(1)} with ${views[1]!.name} coloured as well.`);
 };
 
 export const showKey = (main: HTMLElement, set: string): (() => void) => {
@@ -85,7 +93,8 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
       void mount();
     };
     const option = (row: KeyViews['views'][number], i: number): HTMLElement => {
-      const why = i === 0 ? 'proposed' : row.saves !== null ? `next best: a second photo would save ${row.saves.toFixed(1)}` : '';
+      const saves = row.saves ?? 0;
+      const why = i === 0 ? 'proposed' : saves < 0.05 ? 'would add little' : `as well: error down by ${saves.toFixed(1)}`;
       return h('li', {}, h('button', { type: 'button', 'data-view': row.name, 'aria-pressed': 'false', class: 'key-option', onclick: () => choose(row.name) },
         found.photos.length > 0 && h('img', { src: photoUrl(set, row.name, 240), alt: '' }),
         h('span', { class: 'name' }, row.name), h('span', { class: 'small soft' }, why)));
@@ -148,12 +157,12 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
       }
     };
     replace(body,
-      h('p', { class: 'lead' }, views.description),
+      h('p', { class: 'lead' }, reason(views)),
       h('div', { class: 'key-layout' },
-        h('div', { class: 'key-main' }, name, stage),
-        h('div', { class: 'key-side' },
+        h('div', { class: 'key-main' }, name, stage,
           h('section', { 'aria-labelledby': 'which' }, h('h2', { id: 'which' }, 'Which photo'), options,
-            found.photos.length > 1 && h('p', {}, h('label', { for: 'other-view', class: 'said' }, 'Another photo'), others)),
+            found.photos.length > 1 && h('p', {}, h('label', { for: 'other-view', class: 'said' }, 'Another photo'), others))),
+        h('div', { class: 'key-side panel' },
           wayChoice, detail, problems,
           h('p', { class: 'row' }, h('label', { for: 'preset' }, 'Quality'), preset),
           h('p', {}, start))));

@@ -26,7 +26,7 @@ const showSteps = (step: number, kind: string, id: string): void => {
   const link = (name: string, number: number): HTMLElement => {
     const target = number === 1 ? `#set/${setOfSteps}` : number === 2 ? `#key/${setOfSteps}` : '';
     const current = number === step ? { 'aria-current': 'step' } : {};
-    const text = [h('span', { class: 'number' }, String(number)), ` ${name}`];
+    const text = [h('span', { class: 'number' }, String(number)), h('span', { class: 'step' }, name)];
     return h('li', current, setOfSteps && target && number !== step && number < 3
       ? h('a', { href: target }, ...text) : h('span', {}, ...text));
   };

@@ -5,7 +5,7 @@ import { bytes, kindName, seconds, stageName } from './words';
 
 const shownAtFirst = 24;
 
-const fact = (name: string, value: string): HTMLElement[] => [h('dt', {}, name), h('dd', {}, value)];
+const fact = (name: string, value: string): HTMLElement => h('div', {}, h('dt', {}, name), h('dd', {}, value));
 
 const sizes = (photos: FoundPhoto[]): string => {
   const known = photos.filter((photo) => photo.width);
@@ -18,9 +18,9 @@ const facts = (found: Found): HTMLElement => {
   const color = found.in_color === null ? 'cannot tell' : found.in_color
     ? 'in colour: their own colours are not used' : 'monochrome';
   const rows = found.kind === 'photos'
-    ? [...fact('Found', `${found.photos.length} photos, ${bytes(found.bytes)}`), ...fact('Size', sizes(found.photos)),
-      ...fact('Colour', color), ...fact('Camera positions', found.has_poses ? 'in the folder' : 'will be found')]
-    : [...fact('Found', `${kindName(found.kind)}, ${bytes(found.bytes)}`)];
+    ? [fact('Found', `${found.photos.length} photos, ${bytes(found.bytes)}`), fact('Size', sizes(found.photos)),
+      fact('Colour', color), fact('Camera positions', found.has_poses ? 'in the folder' : 'will be found')]
+    : [fact('Found', `${kindName(found.kind)}, ${bytes(found.bytes)}`)];
   return h('dl', { class: 'facts' }, ...rows);
 };
 
