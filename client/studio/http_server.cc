@@ -178,6 +178,14 @@ HttpServer::HttpServer(const HttpLimits& limits) : limits_(limits) {
   });
 }
 
+int HttpServer::Bind(int port) {
+  constexpr char kHost[] = "127.0.0.1";
+  const int bound = port == 0 ? bind_to_any_port(kHost) : bind_to_port(kHost, port) ? port : -1;
+  // httplib lets only five connections wait to be accepted.
+  if (bound > 0) ::listen(svr_sock_, limits_.waiting);
+  return bound;
+}
+
 void HttpServer::Stop() {
   stopping_ = true;
   stop();

@@ -22,6 +22,8 @@ class HttpServer : public httplib::Server {
  public:
   explicit HttpServer(const HttpLimits& limits);
 
+  // Listens on 127.0.0.1; 0: any free port. Returns the port, or -1 if it is in use.
+  int Bind(int port);
   // Ends waiting reads and writes; event streams look at it.
   void Stop();
   bool is_stopping() const { return stopping_; }

@@ -68,7 +68,7 @@ class Studio::Parts {
   const StudioOptions options_;
   const CancellationToken& cancel_;
   HttpServer http_;
-  int port_ = 0;
+  const int port_;
   std::optional<StudioGuard> guard_;
   PhotoSets sets_;
   StudioCalls calls_;
@@ -101,16 +101,14 @@ Studio::Parts::Parts(const StudioOptions& options, const CancellationToken& canc
     : options_(options),
       cancel_(cancel),
       http_(options.http),
+      port_(http_.Bind(options.port)),
       sets_(options.folder),
       calls_(options.server, cancel) {
-  const bool is_bound = options.port > 0 ? http_.bind_to_port("127.0.0.1", options.port)
-                                         : (port_ = http_.bind_to_any_port("127.0.0.1")) > 0;
-  if (!is_bound) {
+  if (port_ < 0) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot listen on port {} of this machine; name another with --port",
                 options.port);
   }
-  if (options.port > 0) port_ = options.port;
   guard_.emplace(port_);
   http_.set_pre_routing_handler([this](const Request& request, Response& response) {
     StudioGuard::Verdict verdict = guard_->CheckOrigin(request);
