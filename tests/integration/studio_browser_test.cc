@@ -64,6 +64,7 @@ TEST_F(StudioTest, FolderBecomesColoredScene) {
   EXPECT_THAT(text("key"), HasSubstr("Expected colour error"));
   EXPECT_THAT(text("running"), HasSubstr("First colours"));
   EXPECT_THAT(text("again"), HasSubstr("room"));
+  EXPECT_THAT(text("again"), HasSubstr("being coloured"));
   EXPECT_THAT(text("done"), HasSubstr("view.html"));
   // The same job as on the command line.
   EXPECT_EQ(NewestJob("colorize_scene").state(), v1::Job::STATE_SUCCEEDED);

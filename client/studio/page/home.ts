@@ -35,8 +35,10 @@ const thumbnails = (drop: Drop): HTMLElement => {
 const card = (set: PhotoSet | undefined, job: Job | undefined): HTMLElement => {
   const name = set?.name ?? `Scene ${job!.scene.slice(-6)}`;
   const target = job ? `#job/${job.id}` : `#set/${set!.id}`;
-  const state = job ? (job.queue_position > 0 && !isFinished(job.state)
-    ? `place ${job.queue_position} in the queue` : stateName(job.state)) : 'not coloured yet';
+  // A run is BLOCKED, as the service calls it, while its stages work.
+  const goesOn = job && !isFinished(job.state);
+  const state = !job ? 'not coloured yet' : !goesOn ? (job.state === 'SUCCEEDED' ? 'coloured' : stateName(job.state))
+    : job.queue_position > 0 ? `place ${job.queue_position} in the queue` : 'being coloured';
   const picture = h('div', { class: 'card-picture', 'aria-hidden': true });
   if (set) {
     void describeSet(set.id).then(({ found }) => {
@@ -46,7 +48,7 @@ const card = (set: PhotoSet | undefined, job: Job | undefined): HTMLElement => {
   }
   return h('li', {}, h('a', { class: 'card', href: target }, picture,
     h('span', { class: 'card-name' }, name),
-    h('span', { class: `chip state-${(job?.state ?? 'NONE').toLowerCase()}` }, state),
+    h('span', { class: `chip state-${goesOn ? 'running' : (job?.state ?? 'NONE').toLowerCase()}` }, state),
     h('span', { class: 'soft' }, day(job?.created_s ?? set!.created_s))));
 };
 
