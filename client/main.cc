@@ -8,6 +8,7 @@
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/lib/command_trace.h"
+#include "client/lib/local_server.h"
 #include "core/base/files.h"
 
 namespace color3d::client {
@@ -54,6 +55,20 @@ std::string NameOfCommand(const CLI::App& app) {
   return name;
 }
 
+// Finds a server of this machine when a command connects, and starts one if it may.
+std::function<std::string()> OwnServer(const Context& context, bool may_start) {
+  return [&context, may_start]() -> std::string {
+    LocalServerOptions options;
+    options.program = ServerProgram();
+    options.data_folder = UserDataFolder();
+    const std::string running = FindServer(options.data_folder);
+    if (!running.empty()) return running;
+    if (!may_start) return kDefaultServer;
+    const auto say = [&context](const std::string& line) { PrintNote(context, line); };
+    return FindOrStartServer(options, say, *context.interrupt);
+  };
+}
+
 // Runs the requested command; its errors are reported.
 ExitCode RunCommand(const std::filesystem::path& token_file, Context* context) {
   try {
@@ -81,11 +96,13 @@ int Main(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done, 1 the job failed or was cancelled, 2 wrong usage or input, 3 no server, "
       "4 no room, 130 detached.");
-  app.add_option("--server",
-                 context.server.address,
-                 "Address of the server: HOST:PORT, unix:PATH, or https://HOST:PORT for TLS")
-      ->envname("COLOR3D_SERVER")
-      ->capture_default_str();
+  const CLI::Option* server =
+      app.add_option("--server",
+                     context.server.address,
+                     "Address of the server: HOST:PORT, unix:PATH, or https://HOST:PORT for TLS. "
+                     "Default: a server of your own, started when it is needed; else " +
+                         std::string(kDefaultServer))
+          ->envname("COLOR3D_SERVER");
   app.add_option("--ca", context.server.ca, "PEM file of the certificate authority of the server")
       ->envname("COLOR3D_CA");
   app.add_option("--client-cert", context.server.certificate, "PEM file of the client certificate")
@@ -97,6 +114,9 @@ int Main(int argc, char** argv) {
   app.add_option("--token-file", token_file, "File with the token; or set COLOR3D_TOKEN")
       ->envname("COLOR3D_TOKEN_FILE");
   app.add_flag("--json", context.json, "Print one JSON object instead of text");
+#if defined(COLOR3D_STUDIO)
+  AddStudioCommand(app, context);
+#endif
   AddColorizeCommand(app, context);
   AddPlanCommand(app, context);
   AddInspectCommand(app, context);
@@ -120,6 +140,9 @@ int Main(int argc, char** argv) {
     return static_cast<int>(ExitCode::kBadInput);
   }
   HandleInterrupt();
+  if (server->count() == 0 && !context.server.UsesTls()) {
+    context.server.own_server = OwnServer(context, !app.got_subcommand("server"));
+  }
   CommandTrace trace(COLOR3D_VERSION,
                      [&context](const std::string& line) { PrintNote(context, line); });
   context.server.traceparent = trace.traceparent();

@@ -13,7 +13,7 @@ packages=(
   libgrpc++-dev protobuf-compiler protobuf-compiler-grpc libprotobuf-dev libabsl-dev
   libopencv-dev libeigen3-dev colmap
   libsqlite3-dev libpqxx-dev libssl-dev libspdlog-dev libfmt-dev libcli11-dev nlohmann-json3-dev libhwy-dev
-  prometheus-cpp-dev libcurl4-openssl-dev
+  prometheus-cpp-dev libcurl4-openssl-dev libcpp-httplib-dev
   libicu-dev libnanoflann-dev zlib1g-dev libwebp-dev liblcms2-dev libzstd-dev libseccomp-dev
   libavcodec-dev libavformat-dev libavutil-dev libswscale-dev # film
 )
@@ -34,7 +34,7 @@ if ! command -v apt-get >/dev/null 2>&1; then
   exit 1
 fi
 
-# Optional: without npm the build omits the page for viewing scenes in a browser, without
+# Optional: without npm the build omits the studio and the page for viewing scenes, without
 # libheif HEIC photos are refused.
 wished=()
 command -v npm >/dev/null 2>&1 || wished=(npm)
@@ -70,5 +70,5 @@ if [ "${#missing[@]}" -gt 0 ]; then
 fi
 for package in ${wished[@]+"${wished[@]}"}; do
   install "$package" ||
-    echo "install-deps: cannot install $package; building without it (npm: no scene viewer page; libheif-dev: no HEIC photos)" >&2
+    echo "install-deps: cannot install $package; building without it (npm: no studio, no scene viewer page; libheif-dev: no HEIC photos)" >&2
 done

@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <sstream>
 
@@ -236,6 +237,14 @@ void AddServe(CLI::App* serve, ServeOptions* options) {
       ->check(CLI::Range(1.0, 86'400.0))
       ->capture_default_str()
       ->needs(scale);
+  serve
+      ->add_option("--idle-exit",
+                   options->idle_exit_seconds,
+                   "End after this time without calls and jobs, e.g. 90s, 30m, 2h; 0: never")
+      ->transform(CLI::AsNumberWithUnit(
+          std::map<std::string, double>{{"s", 1.0}, {"m", 60.0}, {"h", 3600.0}},
+          CLI::AsNumberWithUnit::UNIT_OPTIONAL,
+          "TIME"));
   serve->add_option("--drain-seconds", options->drain_seconds, "Maximum time to stop after SIGTERM")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();

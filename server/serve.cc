@@ -23,6 +23,7 @@
 #include "server/access/tokens.h"
 #include "server/backends/backend_address.h"
 #include "server/backends/backend_prober.h"
+#include "server/idle_exit.h"
 #include "server/maintenance.h"
 #include "server/metrics/server_metrics.h"
 #include "server/net/descriptors.h"
@@ -353,8 +354,10 @@ void Serve(const ServeOptions& options) {
   }
 
   ServerMetrics metrics(COLOR3D_VERSION);
-  rpc.on_call = [&metrics](const std::string& method, grpc::StatusCode code, double seconds) {
+  std::atomic<IdleWatch*> idle_watch{nullptr};
+  rpc.on_call = [&](const std::string& method, grpc::StatusCode code, double seconds) {
     metrics.CountCall(method, StatusName(code), seconds);
+    if (IdleWatch* const watch = idle_watch) watch->NoteCall(method);
   };
   RpcServer server(rpc, store, blobs, uploads, clock);
   std::atomic<bool> draining{false};
@@ -412,6 +415,8 @@ void Serve(const ServeOptions& options) {
                kept.name,
                options.workers);
 
+  const auto idle = ExitWhenIdle(Milliseconds(options.idle_exit_seconds), store, server);
+  idle_watch = idle.get();
   NotifyServiceManager("READY=1");
 
   signals.Wait([] {

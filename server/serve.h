@@ -36,7 +36,8 @@ struct ServeOptions {
   // half of it for the inference worker.
   int64_t worker_memory_mib = 0;
   double drain_seconds = 20.0;
-  int64_t low_space_mib = 512;  // no job starts below this free space; 0: no limit
+  double idle_exit_seconds = 0.0;  // ends after this time without use; 0: never
+  int64_t low_space_mib = 512;     // no job starts below this free space; 0: no limit
   int max_unfinished_jobs = 2'000;
   // Limits of each project; 0: none.
   int project_jobs = 0, project_streams = 0;

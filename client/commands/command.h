@@ -59,6 +59,7 @@ void AddMovieCommands(CLI::App& app, Context& context);
 void AddColorizerCommands(CLI::App& app, Context& context);
 void AddJobCommands(CLI::App& app, Context& context);
 void AddArtifactCommands(CLI::App& app, Context& context);
+void AddStudioCommand(CLI::App& app, Context& context);  // unless it was left out of the build
 void AddServerCommands(CLI::App& app, Context& context);
 void AddQueueCommands(CLI::App& server, Context& context);
 

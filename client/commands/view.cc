@@ -1,19 +1,13 @@
 // `color3d view`: shows a coloured scene in the browser.
-#include <fcntl.h>
 #include <fmt/core.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <chrono>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "client/commands/colored_scene.h"
 #include "client/commands/command.h"
 #include "client/commands/console.h"
+#include "client/commands/open_browser.h"
 #include "client/commands/results.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
@@ -95,49 +89,10 @@ fs::path Download(const Context& context, const ViewOptions& options) {
               kPageRemedy);
 }
 
-// Starts `program` on a file in a session of its own, because it may become the browser and must
-// outlive this process. Returns false if it is missing or fails within two seconds.
-bool StartDetached(const char* program, const fs::path& file) {
-  posix_spawnattr_t attributes;
-  posix_spawn_file_actions_t actions;
-  posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  for (const int output : {1, 2}) {
-    posix_spawn_file_actions_addopen(&actions, output, "/dev/null", O_WRONLY, 0);
-  }
-  std::string name = program, path = file.string();
-  char* arguments[] = {name.data(), path.data(), nullptr};
-  pid_t child = 0;
-  const int error = posix_spawnp(&child, program, &actions, &attributes, arguments, environ);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
-  if (error != 0) return false;
-  for (int tenths = 0; tenths < 20; ++tenths) {
-    int status = 0;
-    if (waitpid(child, &status, WNOHANG) == child) {
-      return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  }
-  return true;
-}
-
-// Opens the page in the default browser. Returns false if there is no desktop or it fails.
-bool OpenInBrowser(const fs::path& page) {
-#if defined(__APPLE__)
-  return StartDetached("open", page);
-#else
-  if (std::getenv("DISPLAY") == nullptr && std::getenv("WAYLAND_DISPLAY") == nullptr) return false;
-  return StartDetached("xdg-open", page);
-#endif
-}
-
 ExitCode RunView(const Context& context, const ViewOptions& options) {
   const fs::path page = fs::absolute(IsOnServer(options.target) ? Download(context, options)
                                                                 : FindPage(options.target));
-  const bool opened = options.open && OpenInBrowser(page);
+  const bool opened = options.open && OpenInBrowser(page.string());
   if (context.json) {
     PrintJson({{"page", page.string()}, {"opened", opened}});
     return ExitCode::kOk;

@@ -59,6 +59,11 @@ std::string ReadPem(const std::filesystem::path& file) {
   return file.empty() ? std::string() : ReadFile(file);
 }
 
+ServerTarget WithAddress(ServerTarget server) {
+  if (server.own_server) server.address = server.own_server();
+  return server;
+}
+
 std::shared_ptr<grpc::ChannelCredentials> CredentialsFor(const ServerTarget& server) {
   if (!server.UsesTls()) return grpc::InsecureChannelCredentials();
   return grpc::SslCredentials(
@@ -164,6 +169,9 @@ std::string ServerTarget::HostPort() const {
 }
 
 Connection::Connection(const ServerTarget& server, const CancellationToken& cancel)
+    : Connection(cancel, WithAddress(server)) {}
+
+Connection::Connection(const CancellationToken& cancel, const ServerTarget& server)
     : address_(server.address),
       on_wait_(server.on_wait),
       patience_(server.patience),

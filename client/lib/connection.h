@@ -53,6 +53,9 @@ struct ServerTarget {
   std::function<void(const std::string&)> on_wait = {};
   // Maximum time to wait for an unreachable server.
   std::chrono::milliseconds patience = std::chrono::seconds(30);
+  // Set if no address was given: returns that of a server of this machine, which it may start.
+  // Replaces `address` when a connection is made.
+  std::function<std::string()> own_server = {};
 
   bool UsesTls() const;
   // Without the scheme.
@@ -64,7 +67,7 @@ class Connection {
   // Waits at most 4 s for the server. `cancel` must outlive the connection; it ends retries and
   // transfers. Throws Error{kUnavailable} that says how to start a server. Throws
   // Error{kInvalidArgument} for a malformed address, for a token that would travel unencrypted to
-  // another machine, and for files that cannot be read.
+  // another machine, and for files that cannot be read. Throws what `own_server` throws.
   Connection(const ServerTarget& server, const CancellationToken& cancel);
 
   const std::string& address() const { return address_; }
@@ -101,6 +104,7 @@ class Connection {
   }
 
  private:
+  Connection(const CancellationToken& cancel, const ServerTarget& found);
   void Retry(const std::function<grpc::Status(grpc::ClientContext*)>& call,
              std::chrono::seconds time_limit);
 

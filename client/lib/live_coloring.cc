@@ -55,6 +55,7 @@ v1::ColorizeImagesRequest LiveRound::RequestFor(const LivePicture& picture, size
   request.set_colorizer(source_.colorizer);
   request.set_scene(source_.scene);
   if (source_.example) *request.mutable_example() = *source_.example;
+  request.set_points(source_.points);
   request.set_max_side_px(options_.max_side_px);
   if (picture.stored) {
     *request.mutable_image_digest() = *picture.stored;

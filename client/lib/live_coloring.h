@@ -12,11 +12,12 @@
 
 namespace color3d::client {
 
-// Source of the colours. Requires: exactly one is set.
+// Source of the colours. Requires: exactly one is set, not empty.
 struct LiveSource {
   std::string colorizer;              // "colorizers/..."
   std::string scene;                  // "scenes/...", by its newest colorizer
   std::optional<v1::Digest> example;  // a blob: a coloured picture of the same things
+  std::string points = {};            // JSON: strokes, px of the picture
 };
 
 struct LivePicture {

@@ -42,9 +42,10 @@ export const openBrowser = (chromium, flags, isError = () => true) => {
     buffer = messages.pop();
     for (const text of messages) receive(JSON.parse(text));
   });
-  const send = (method, params = {}) => new Promise((done, failed) => {
+  // `to`: the session of another target; null: the browser.
+  const send = (method, params = {}, to = session) => new Promise((done, failed) => {
     waiting.set(next, { done, failed });
-    process_.stdio[3].write(JSON.stringify({ id: next++, method, params, sessionId: session }) + '\0');
+    process_.stdio[3].write(JSON.stringify({ id: next++, method, params, sessionId: to ?? undefined }) + '\0');
   });
   // Opens an empty page, the target of all commands that follow.
   const open = async () => {

@@ -10,6 +10,7 @@ namespace color3d {
 namespace {
 
 constexpr size_t kMaxImageBytes = 3 << 20;
+constexpr size_t kMaxPointsBytes = 1 << 20;
 constexpr size_t kMaxRequestIdBytes = 128;
 constexpr int kMinSidePx = 16;
 constexpr int kMaxSidePx = 8192;
@@ -104,10 +105,19 @@ void ResolveColorizeRequest(const RpcParts& parts,
   }
   response->set_request_id(request->request_id());
   const bool trained = !request->colorizer().empty() || !request->scene().empty();
-  if (trained == request->has_example()) {
-    throw InvalidArgument("set one of colorizer, scene and example");
+  const bool has_points = !request->points().empty();
+  if (int{trained} + int{request->has_example()} + int{has_points} != 1) {
+    throw InvalidArgument("set one of colorizer, scene, example and points");
   }
   TakePicture(parts, store, request, call);
+  if (has_points) {
+    if (request->points().size() > kMaxPointsBytes) {
+      throw InvalidArgument("points has {} bytes; at most 1 MiB is allowed; merge strokes",
+                            request->points().size());
+    }
+    call->mutable_points()->swap(*request->mutable_points());
+    return;
+  }
   if (request->has_example()) {
     call->set_example_sha256(RequireBlob(parts, store, request->example(), "example"));
     return;

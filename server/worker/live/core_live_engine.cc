@@ -1,4 +1,5 @@
 // Live colorization of pictures with the method library.
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -11,6 +12,8 @@
 #include "core/colorizer/personal/train_colorizer.h"
 #include "core/encoder/encoder.h"
 #include "core/image/codec.h"
+#include "core/keycolor/automatic/automatic.h"
+#include "core/keycolor/hints/hints.h"
 #include "core/keycolor/picture_checks.h"
 #include "server/base/service_error.h"
 #include "server/worker/live/colorizer_cache.h"
@@ -49,9 +52,12 @@ class CoreLiveEngine : public LiveEngine {
   Picture Prepare(const Request& request);
   // Colours pictures of any scenes; pictures of equal size share a pass of the encoder.
   static std::vector<Image> ColorizeBatch(const std::vector<Picture>& group);
+  // Answers a picture with strokes.
+  void Spread(const Request& request, internal::v1::ColorizeImageResponse* answer);
   // Colours and answers the group, then empties it.
   void Finish(std::vector<Picture>& group);
-  void Answer(const Picture& picture, const Image& ab, internal::v1::ColorizeImageResponse* answer);
+  void Answer(const Image& luminance, const Image& ab, internal::v1::ColorizeImageResponse* answer);
+  Image ReadLuminance(const Request& request);
   std::string KeyOf(const Request& request);
   std::shared_ptr<const Encoder> FindEncoder(const std::string& name);
   LoadedColorizer Load(const Request& request);
@@ -135,27 +141,52 @@ std::string CoreLiveEngine::KeyOf(const Request& request) {
          (file == setup_.models.files.end() ? request.encoder() : digests_.Of(file->second).sha256);
 }
 
-CoreLiveEngine::Picture CoreLiveEngine::Prepare(const Request& request) {
+Image CoreLiveEngine::ReadLuminance(const Request& request) {
   const std::string blob = request.image_sha256().empty() ? "" : ReadBlob(request.image_sha256());
   const std::string& bytes = request.image_sha256().empty() ? request.image() : blob;
   ProbeImage(bytes, "the picture", kLimits);
+  return LuminanceFromSrgb(DecodeImage(bytes, "the picture"));
+}
+
+CoreLiveEngine::Picture CoreLiveEngine::Prepare(const Request& request) {
   Picture picture;
   picture.key = KeyOf(request);
   picture.loaded = cache_.Get(picture.key, [&] {
     return request.example_sha256().empty() ? Load(request) : FromExample(request);
   });
-  picture.luminance = LuminanceFromSrgb(DecodeImage(bytes, "the picture"));
+  picture.luminance = ReadLuminance(request);
   if (request.max_side_px() > 0) {
     picture.luminance = FitWithin(picture.luminance, request.max_side_px());
   }
   return picture;
 }
 
-void CoreLiveEngine::Answer(const Picture& picture,
+// As colorize_key_view does with points.
+void CoreLiveEngine::Spread(const Request& request, internal::v1::ColorizeImageResponse* answer) {
+  const std::vector<ColorHint> hints = ParseHintsJson(request.points());
+  const Image luminance = ReadLuminance(request);
+  const bool asks_automatic = std::ranges::any_of(
+      hints, [](const ColorHint& hint) { return hint.fill == ColorHint::Fill::kAutomatic; });
+  Image automatic;
+  HintPictures pictures;
+  if (asks_automatic) {
+    automatic = AutomaticColorizer::Embedded()->Colorize(luminance).ab;
+    pictures.automatic_ab = &automatic;
+  }
+  ThreadPool pool(setup_.threads);
+  NoCheckpoints checkpoints;
+  NullObserver progress;
+  const CancellationToken never;
+  const HintSolution solution =
+      KeyColorFromHints(luminance, hints, {}, {pool, checkpoints, progress, never}, pictures);
+  const int side = request.max_side_px() > 0 ? request.max_side_px() : 0;
+  Answer(FitWithin(luminance, side), FitWithin(solution.ab, side), answer);
+}
+
+void CoreLiveEngine::Answer(const Image& luminance,
                             const Image& ab,
                             internal::v1::ColorizeImageResponse* answer) {
-  std::string png = EncodePng8(SrgbFromLab(JoinLab(picture.luminance, ab)));
-  answer->set_encoder_digest(picture.loaded->encoder->digest());
+  std::string png = EncodePng8(SrgbFromLab(JoinLab(luminance, ab)));
   if (png.size() <= kMaxMessageImageBytes) {
     answer->mutable_image()->swap(png);
     return;
@@ -186,7 +217,8 @@ void CoreLiveEngine::Finish(std::vector<Picture>& group) {
     Picture& picture = group[i];
     try {
       if (ab[i].Empty()) ab[i] = picture.loaded->colorizer->Colorize(picture.luminance);
-      Answer(picture, ab[i], picture.task->response);
+      Answer(picture.luminance, ab[i], picture.task->response);
+      picture.task->response->set_encoder_digest(picture.loaded->encoder->digest());
     } catch (const std::exception&) {
       picture.task->error = std::current_exception();
     }
@@ -199,6 +231,10 @@ void CoreLiveEngine::Colorize(std::vector<LiveTask>& tasks) {
   int64_t pixels = 0;
   for (LiveTask& task : tasks) {
     try {
+      if (!task.request->points().empty()) {
+        Spread(*task.request, task.response);
+        continue;
+      }
       Picture picture = Prepare(*task.request);
       picture.task = &task;
       pixels += static_cast<int64_t>(picture.luminance.PlaneSize());

@@ -127,6 +127,26 @@ TEST_F(CoreLiveEngineTest, AcceptsColorAnd16BitPicturesAndSizes) {
   EXPECT_EQ(LabOf(2).height, 40);
 }
 
+TEST_F(CoreLiveEngineTest, SpreadsStrokes) {
+  Request strokes;
+  strokes.set_image(GrayPng());
+  strokes.set_points(R"([{"x": 20, "y": 20, "radius": 3, "color": "#c04030"}])");
+  Request bad = strokes;
+  bad.set_points(R"([{"x": 20}])");
+  Request automatic = strokes;
+  automatic.set_points(R"([{"x": 20, "y": 20, "keep": "auto"}])");
+  Request small = strokes;
+  small.set_max_side_px(48);
+  const auto errors = Run({strokes, bad, automatic, small});
+  EXPECT_EQ(errors[0], "");
+  EXPECT_GT(MeanOf(LabOf(0)).a, 10);
+  EXPECT_THAT(errors[1], HasSubstr("INVALID_ARGUMENT"));
+  EXPECT_EQ(errors[2], "");
+  EXPECT_EQ(errors[3], "");
+  EXPECT_EQ(LabOf(3).width, 48);
+  EXPECT_EQ(responses_[0].encoder_digest(), "");
+}
+
 TEST_F(CoreLiveEngineTest, BadPictureFailsAlone) {
   const std::string red = Example(40, 15), grey = Put(GrayPng());
   const std::string huge = EncodePng8(Image(6000, 4300, 1));

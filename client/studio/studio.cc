@@ -1,0 +1,399 @@
+#include "client/studio/studio.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdlib>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "client/lib/names.h"
+#include "client/lib/out_folder.h"
+#include "client/lib/photos/photo_folder.h"
+#include "client/studio/found_photos.h"
+#include "client/studio/page_files.h"
+#include "client/studio/photo_sets.h"
+#include "client/studio/run_progress.h"
+#include "client/studio/studio_answers.h"
+#include "client/studio/studio_calls.h"
+#include "client/studio/studio_guard.h"
+#include "client/studio/studio_requests.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+#include "core/base/text/lower_case.h"
+#include "core/image/probe/probe.h"
+
+namespace color3d::client {
+namespace fs = std::filesystem;
+namespace {
+
+using httplib::ContentReader;
+using httplib::Request;
+using httplib::Response;
+using Json = nlohmann::ordered_json;
+
+constexpr int64_t kMaxPictureBytes = 256 << 20;
+constexpr int kMaxEventStreams = 8;
+std::string Pattern(const std::string& before, const std::string& after) {
+  return "/api/" + before + "/([0-9a-f-]{1,64})" + after;
+}
+
+// Counts event streams, so that they leave threads for other requests.
+class StreamPlace {
+ public:
+  explicit StreamPlace(std::atomic<int>* count) : count_(count) {
+    if (++*count_ <= kMaxEventStreams) return;
+    --*count_;
+    throw Error(ErrorCode::kUnavailable, "too many pages of the studio are open; close one");
+  }
+  ~StreamPlace() { --*count_; }
+  StreamPlace(const StreamPlace&) = delete;
+  StreamPlace& operator=(const StreamPlace&) = delete;
+
+ private:
+  std::atomic<int>* count_;
+};
+
+}  // namespace
+
+class Studio::Parts {
+ public:
+  Parts(const StudioOptions& options, const CancellationToken& cancel);
+
+  void AddRoutes();
+  void Serve();
+
+  const StudioOptions options_;
+  const CancellationToken& cancel_;
+  HttpServer http_;
+  const int port_;
+  std::optional<StudioGuard> guard_;
+  PhotoSets sets_;
+  StudioCalls calls_;
+  const ScratchFolder downloads_;
+  std::atomic<int> streams_{0};
+
+ private:
+  using Handler = std::function<void(const Request&, Response&)>;
+  using BodyHandler = std::function<void(const Request&, Response&, const ContentReader&)>;
+
+  void Get(const std::string& pattern, Handler handler);
+  void Post(const std::string& pattern, BodyHandler handler);
+  void AddPageRoutes();
+  void AddSetRoutes();
+  void AddJobRoutes();
+
+  void Open(const Request& request, Response& response);
+  void Receive(const Request& request, Response& response, const ContentReader& reader);
+  void KeepPicture(const Request& request, Response& response, const ContentReader& reader);
+  void Colorize(const Request& request, Response& response, const ContentReader& reader);
+  void StreamEvents(const Request& request, Response& response);
+  void SendArtifact(const Request& request, Response& response);
+
+  PhotoFolder FolderOf(const std::string& id) const { return CollectPhotos(sets_.Get(id).folder); }
+  // "scenes/..." of the set, uploaded if it is not there yet.
+  std::string SceneOf(const std::string& id);
+};
+
+Studio::Parts::Parts(const StudioOptions& options, const CancellationToken& cancel)
+    : options_(options),
+      cancel_(cancel),
+      http_(options.http),
+      port_(http_.Bind(options.port)),
+      sets_(options.folder),
+      calls_(options.server, cancel) {
+  if (port_ < 0) {
+    throw Error(ErrorCode::kFailedPrecondition,
+                "cannot listen on port {} of this machine; name another with --port",
+                options.port);
+  }
+  guard_.emplace(port_);
+  http_.set_pre_routing_handler([this](const Request& request, Response& response) {
+    StudioGuard::Verdict verdict = guard_->CheckOrigin(request);
+    if (verdict.status == 200 && request.path != "/open") verdict = guard_->CheckCookie(request);
+    if (verdict.status == 200) return httplib::Server::HandlerResponse::Unhandled;
+    AnswerError(verdict.status, "PERMISSION_DENIED", verdict.reason, response);
+    return httplib::Server::HandlerResponse::Handled;
+  });
+  http_.set_post_routing_handler(
+      [](const Request&, Response& response) { AddSafetyHeaders(response); });
+  http_.set_error_handler([](const Request&, Response& response) {
+    if (response.body.empty()) {
+      AnswerError(response.status, "NOT_FOUND", "the studio has nothing at this address", response);
+    }
+  });
+}
+
+void Studio::Parts::Get(const std::string& pattern, Handler handler) {
+  http_.Get(pattern, [handler = std::move(handler)](const Request& request, Response& response) {
+    try {
+      handler(request, response);
+    } catch (const std::exception& e) {
+      AnswerException(e, response);
+    }
+  });
+}
+
+void Studio::Parts::Post(const std::string& pattern, BodyHandler handler) {
+  http_.Post(pattern,
+             [handler = std::move(handler)](
+                 const Request& request, Response& response, const ContentReader& reader) {
+               try {
+                 handler(request, response, reader);
+               } catch (const std::exception& e) {
+                 AnswerException(e, response);
+               }
+             });
+}
+
+void Studio::Parts::AddRoutes() {
+  http_.set_payload_max_length(static_cast<size_t>(options_.max_file_bytes));
+  AddPageRoutes();
+  AddSetRoutes();
+  AddJobRoutes();
+}
+
+void Studio::Parts::AddPageRoutes() {
+  Get("/open", [this](const Request& request, Response& response) { Open(request, response); });
+  Get("/(studio\\.css|studio\\.js)?", [](const Request& request, Response& response) {
+    const PageFile* file = FindPageFile(request.path);
+    response.set_content(file->bytes.data(), file->bytes.size(), file->media_type);
+  });
+  Get("/api/state", [this](const Request&, Response& response) {
+    Json sets = Json::array();
+    for (const PhotoSet& set : sets_.List()) sets.push_back(SetJson(set));
+    AnswerJson({{"server", calls_.ServerFacts()}, {"sets", sets}, {"jobs", calls_.Jobs()}},
+               response);
+  });
+}
+
+void Studio::Parts::AddSetRoutes() {
+  Post("/api/sets", [this](const Request& request, Response& response, const ContentReader& body) {
+    AnswerJson(SetJson(sets_.Create(TextOf(ReadJsonBody(request, body), "name"))), response);
+  });
+  Get(Pattern("sets", ""), [this](const Request& request, Response& response) {
+    const PhotoSet set = sets_.Get(request.matches[1]);
+    Json json = SetJson(set);
+    json["found"] = DescribePhotos(CollectPhotos(set.folder), cancel_);
+    AnswerJson(json, response);
+  });
+  Get(Pattern("sets", "/photo"), [this](const Request& request, Response& response) {
+    const PhotoFolder folder = FolderOf(request.matches[1]);
+    const LocalFile& photo = PhotoOfView(folder, request.get_param_value("name"));
+    const bool gray = request.get_param_value("gray") == "1";
+    response.set_content(PhotoJpeg(photo, SideOf(request), gray), "image/jpeg");
+  });
+  Post(Pattern("sets", "/files"),
+       [this](const Request& request, Response& response, const ContentReader& body) {
+         Receive(request, response, body);
+       });
+  Post(Pattern("sets", "/pictures"),
+       [this](const Request& request, Response& response, const ContentReader& body) {
+         KeepPicture(request, response, body);
+       });
+  Post(Pattern("sets", "/plan"),
+       [this](const Request& request, Response& response, const ContentReader& body) {
+         const std::string id = request.matches[1];
+         const RunChoices choices = ReadChoices(ReadJsonBody(request, body), id, sets_);
+         AnswerJson(calls_.Plan(FolderOf(id), choices), response);
+       });
+  Post(Pattern("sets", "/key"),
+       [this](const Request& request, Response& response, const ContentReader& body) {
+         const int count = ReadJsonBody(request, body).value("count", 1);
+         const std::string id = request.matches[1];
+         const PhotoFolder folder = FolderOf(id);
+         const int most = std::max<int>(1, static_cast<int>(folder.photos.size()));
+         const v1::Job job =
+             calls_.SelectKeyView(SceneOf(id), std::clamp(count, 1, std::min(most, 5)));
+         AnswerJson(JobFacts(job), response);
+       });
+  Post(Pattern("sets", "/preview"),
+       [this](const Request& request, Response& response, const ContentReader& body) {
+         const auto json = ReadJsonBody(request, body);
+         const PhotoFolder folder = FolderOf(request.matches[1]);
+         const int side = std::clamp(json.value("max_side", 1000), 16, 2000);
+         const auto strokes = json.find("strokes");
+         if (strokes == json.end()) throw InvalidArgument("strokes are missing");
+         response.set_content(
+             calls_.PreviewOfStrokes(
+                 PhotoOfView(folder, TextOf(json, "photo")), strokes->dump(), side),
+             "image/png");
+       });
+  Post(Pattern("sets", "/colorize"),
+       [this](const Request& request, Response& response, const ContentReader& body) {
+         Colorize(request, response, body);
+       });
+}
+
+void Studio::Parts::AddJobRoutes() {
+  Get("/api/jobs", [this](const Request&, Response& response) {
+    AnswerJson({{"jobs", calls_.Jobs()}}, response);
+  });
+  Get(Pattern("jobs", ""), [this](const Request& request, Response& response) {
+    AnswerJson(JobFacts(calls_.Job(request.matches[1])), response);
+  });
+  Get(Pattern("jobs", "/key-views"), [this](const Request& request, Response& response) {
+    AnswerJson(calls_.KeyViews(request.matches[1]), response);
+  });
+  const auto change = [this](const char* what,
+                             v1::Job (StudioCalls::*call)(const std::string&) const) {
+    Post(Pattern("jobs", what),
+         [this, call](const Request& request, Response& response, const ContentReader& body) {
+           ReadJsonBody(request, body);
+           AnswerJson(JobFacts((calls_.*call)(request.matches[1])), response);
+         });
+  };
+  change("/cancel", &StudioCalls::Cancel);
+  change("/retry", &StudioCalls::Retry);
+  Get(Pattern("jobs", "/events"),
+      [this](const Request& request, Response& response) { StreamEvents(request, response); });
+  Get(Pattern("jobs", "/artifact"),
+      [this](const Request& request, Response& response) { SendArtifact(request, response); });
+  Get(Pattern("jobs", "/preview"), [this](const Request& request, Response& response) {
+    const PhotoFolder folder = FolderOf(request.get_param_value("set"));
+    const LocalFile& photo = PhotoOfView(folder, request.get_param_value("name"));
+    response.set_content(calls_.PreviewOfRun(request.matches[1], photo, SideOf(request)),
+                         "image/png");
+  });
+}
+
+void Studio::Parts::Open(const Request& request, Response& response) {
+  const std::string cookie = guard_->Exchange(request.get_param_value("token"));
+  // A browser that is in already may open the address again.
+  if (cookie.empty() && guard_->CheckCookie(request).status != 200) {
+    return AnswerError(403, "PERMISSION_DENIED", guard_->CheckCookie(request).reason, response);
+  }
+  if (!cookie.empty()) response.set_header("Set-Cookie", cookie);
+  // By a page in place of a redirection: after the latter, browsers that come from another program
+  // leave out cookies of SameSite=Strict.
+  std::string page = request.get_param_value("page");
+  if (page.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789/-") != page.npos) page.clear();
+  response.set_header("Refresh", "0; url=/#" + page);
+  response.set_content("<!doctype html><title>Color3D</title>", "text/html; charset=utf-8");
+}
+
+void Studio::Parts::Receive(const Request& request,
+                            Response& response,
+                            const ContentReader& reader) {
+  RequireLength(request, options_.max_file_bytes);
+  const std::string name = request.get_param_value("name");
+  int64_t received = 0;  // not announced in pieces, and more than announced where compressed
+  const int64_t bytes = sets_.Receive(request.matches[1], name, [&](const PhotoSets::Sink& sink) {
+    return reader([&](const char* piece, size_t count) {
+      received += static_cast<int64_t>(count);
+      return received <= options_.max_file_bytes && sink(piece, count);
+    });
+  });
+  AnswerJson({{"name", name}, {"bytes", bytes}}, response);
+}
+
+void Studio::Parts::KeepPicture(const Request& request,
+                                Response& response,
+                                const ContentReader& reader) {
+  const std::string name = request.get_param_value("name");
+  const std::string ending = LowerCase(fs::path(name).extension().string());
+  if (!HasImageExtension(name)) {
+    throw InvalidArgument("{} is not a picture: {} are read", name, ReadableImageFormats());
+  }
+  const std::string bytes = ReadBody(request, reader, kMaxPictureBytes);
+  const ImageInfo info = ProbeImage(bytes, name);
+  const fs::path file = sets_.KeepPicture(request.matches[1], ending, bytes);
+  AnswerJson({{"picture", file.filename()}, {"width", info.width}, {"height", info.height}},
+             response);
+}
+
+std::string Studio::Parts::SceneOf(const std::string& id) {
+  // Uploaded again each time: what is there already is not sent, and a changed folder is another
+  // scene.
+  std::string scene = calls_.Upload(FolderOf(id));
+  sets_.SetScene(id, scene);
+  return scene;
+}
+
+void Studio::Parts::Colorize(const Request& request,
+                             Response& response,
+                             const ContentReader& reader) {
+  const std::string id = request.matches[1];
+  const RunChoices choices = ReadChoices(ReadJsonBody(request, reader), id, sets_);
+  AnswerJson(JobFacts(calls_.Colorize(SceneOf(id), choices)), response);
+}
+
+void Studio::Parts::StreamEvents(const Request& request, Response& response) {
+  const auto place = std::make_shared<StreamPlace>(&streams_);
+  const std::string job = request.matches[1];
+  calls_.Job(job);  // an unknown one is refused while the status can still be sent
+  response.set_header("X-Accel-Buffering", "no");
+  response.set_chunked_content_provider(
+      "text/event-stream", [this, job, place](size_t, httplib::DataSink& sink) {
+        const auto send = [&](const std::string& text) {
+          const std::string event = text.empty() ? ": still here\n\n" : "data: " + text + "\n\n";
+          return !http_.is_stopping() && sink.is_writable() &&
+                 sink.write(event.data(), event.size());
+        };
+        try {
+          calls_.Watch(job, send);
+          const std::string end = "event: end\ndata: {}\n\n";
+          sink.write(end.data(), end.size());
+        } catch (const std::exception& e) {
+          const std::string problem = "event: problem\ndata: " + Json(e.what()).dump() + "\n\n";
+          sink.write(problem.data(), problem.size());
+        }
+        sink.done();
+        return true;
+      });
+}
+
+void Studio::Parts::SendArtifact(const Request& request, Response& response) {
+  const std::string job = request.matches[1], name = request.get_param_value("name");
+  if (!IsSafeRelativePath(name)) throw InvalidArgument("the name of the file is not possible");
+  const fs::path file = SafePathBelow(downloads_.path() / job, name);
+  const std::string type = calls_.Fetch(job, name, file);
+  if (request.has_param("download")) {
+    std::string plain = fs::path(name).filename().string();
+    std::erase_if(plain, [](char c) { return c == '"' || c == '\\' || c < ' ' || c > '~'; });
+    response.set_header("Content-Disposition", "attachment; filename=\"" + plain + "\"");
+  } else if (type == "text/html") {
+    return AnswerSandboxed(ReadFile(file), response);
+  }
+  response.set_content(ReadFile(file), type);
+}
+
+void Studio::Parts::Serve() {
+  std::thread listener([this] { http_.listen_after_bind(); });
+  while (!cancel_.IsCancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  // stop() before listen_after_bind() has begun would be lost.
+  while (!http_.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  http_.Stop();
+  listener.join();
+}
+
+Studio::Studio(const StudioOptions& options, const CancellationToken& cancel)
+    : parts_(std::make_unique<Parts>(options, cancel)) {
+  parts_->AddRoutes();
+}
+
+Studio::~Studio() = default;
+
+std::string Studio::OfferPhotos(const fs::path& path) {
+  const PhotoSet set = parts_->sets_.Adopt(path);
+  CollectPhotos(set.folder);  // what cannot be used is said before the browser opens
+  return "set/" + set.id;
+}
+
+std::string Studio::PageOfJob(const std::string& job) { return "job/" + IdOf(job); }
+
+std::string Studio::Address(const std::string& page) const {
+  return fmt::format("http://127.0.0.1:{}/open?token={}{}{}",
+                     parts_->port_,
+                     parts_->guard_->token(),
+                     page.empty() ? "" : "&page=",
+                     page);
+}
+
+int Studio::port() const { return parts_->port_; }
+
+void Studio::Serve() { parts_->Serve(); }
+
+}  // namespace color3d::client

@@ -1,0 +1,25 @@
+// What requests of the page say. Functions of requests and files; thread-safe as PhotoSets.
+#pragma once
+
+#include <httplib.h>
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "client/studio/photo_sets.h"
+#include "client/studio/studio_calls.h"
+
+namespace color3d::client {
+
+// Returns "" if the field is missing. Throws Error{kInvalidArgument} if it is no text.
+std::string TextOf(const nlohmann::json& body, const char* field);
+
+// Longer side of a picture, px; 0 if it is not given. Throws Error{kInvalidArgument}.
+int SideOf(const httplib::Request& request);
+
+nlohmann::ordered_json SetJson(const PhotoSet& set);
+
+// Choices for a run of the set; strokes are kept beside it. Throws Error{kInvalidArgument}.
+RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, PhotoSets& sets);
+
+}  // namespace color3d::client

@@ -1,0 +1,274 @@
+// The studio over HTTP, as a hostile page, user or program would reach it. No service runs.
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <httplib.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+
+#include "client/studio/studio.h"
+#include "core/base/error.h"
+#include "core/base/files.h"
+
+namespace color3d::client {
+namespace {
+using httplib::Headers;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using Steady = std::chrono::steady_clock;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+class StudioSecurityTest : public ::testing::Test {
+ protected:
+  StudioSecurityTest() {
+    StudioOptions options;
+    options.server.address = "127.0.0.1:1";
+    options.folder = scratch_.path() / "studio";
+    options.max_file_bytes = 1 << 20;
+    options.http.threads = 4;
+    options.http.waiting = 8;
+    options.http.patience = milliseconds(3000);
+    options.http.least_bytes_per_s = 100'000;
+    studio_.emplace(options, cancel_);
+    thread_ = std::thread([this] { studio_->Serve(); });
+    here_ = "127.0.0.1:" + std::to_string(studio_->port());
+  }
+  ~StudioSecurityTest() override {
+    cancel_.Cancel();
+    thread_.join();
+  }
+
+  httplib::Client Client() const {
+    httplib::Client client("127.0.0.1", studio_->port());
+    client.set_read_timeout(10, 0);
+    return client;
+  }
+  // Headers of the studio's own page.
+  Headers Own() {
+    if (cookie_.empty()) {
+      const std::string address = studio_->Address("");
+      const auto opened = Client().Get(address.substr(address.find("/open")));
+      cookie_ = opened->get_header_value("Set-Cookie");
+      cookie_.resize(cookie_.find(';'));
+    }
+    return {{"Cookie", cookie_}, {"Origin", "http://" + here_}};
+  }
+  // Sends bytes as they are, in `pieces` with pauses, and returns the answer, read to its end.
+  std::string Raw(const std::vector<std::string>& pieces, milliseconds pause = milliseconds(0)) {
+    const int socket = Connect();
+    for (const std::string& piece : pieces) {
+      if (::send(socket, piece.data(), piece.size(), MSG_NOSIGNAL) < 0) break;
+      std::this_thread::sleep_for(pause);
+    }
+    std::string answer;
+    char buffer[4096];
+    for (ssize_t count; (count = ::recv(socket, buffer, sizeof(buffer), 0)) > 0;) {
+      answer.append(buffer, static_cast<size_t>(count));
+    }
+    ::close(socket);
+    return answer;
+  }
+  int Connect() const {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<uint16_t>(studio_->port()));
+    ::inet_pton(AF_INET, "127.0.0.1", &address.sin_addr);
+    const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    ::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof(address));
+    const timeval limit{15, 0};
+    ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
+    return socket;
+  }
+  std::string OwnHead(const std::string& request, const std::string& more = "") {
+    std::string head = request + " HTTP/1.1\r\nHost: " + here_ + "\r\n";
+    for (const auto& [name, value] : Own()) head += name + ": " + value + "\r\n";
+    return head + more + "\r\n";
+  }
+  std::string NewSet() {
+    const auto made = Client().Post("/api/sets", Own(), "{\"name\": \"a\"}", "application/json");
+    const std::string body = made->body;
+    const size_t at = body.find("\"id\":\"") + 6;
+    return body.substr(at, body.find('"', at) - at);
+  }
+  size_t Files() const { return ListFiles(scratch_.path()).size(); }
+
+  const ScratchFolder scratch_;
+  CancellationToken cancel_;
+  std::optional<Studio> studio_;
+  std::thread thread_;
+  std::string here_, cookie_;
+};
+
+TEST_F(StudioSecurityTest, AddressLetsOneBrowserIn) {
+  const std::string address = studio_->Address("");
+  const std::string path = address.substr(address.find("/open"));
+  EXPECT_EQ(Client().Get("/open?token=" + std::string(64, '0'))->status, 403);
+  EXPECT_EQ(Client().Get("/open")->status, 403);
+  const auto opened = Client().Get(path);
+  EXPECT_EQ(opened->status, 200);
+  EXPECT_THAT(opened->get_header_value("Set-Cookie"), HasSubstr("HttpOnly; SameSite=Strict"));
+  EXPECT_EQ(Client().Get(path)->status, 403) << "used";
+  for (const char* page : {"/", "/studio.js", "/studio.css", "/api/state"}) {
+    EXPECT_EQ(Client().Get(page)->status, 403) << page;
+  }
+}
+
+TEST_F(StudioSecurityTest, OwnPageMayAndIsProtected) {
+  const auto page = Client().Get("/", Own());
+  EXPECT_EQ(page->status, 200);
+  EXPECT_THAT(page->get_header_value("Content-Security-Policy"),
+              testing::AllOf(HasSubstr("default-src 'none'"), HasSubstr("frame-ancestors 'none'")));
+  EXPECT_EQ(page->get_header_value("Cache-Control"), "no-store");
+  EXPECT_EQ(page->get_header_value("X-Content-Type-Options"), "nosniff");
+  EXPECT_EQ(page->get_header_value("Referrer-Policy"), "no-referrer");
+  EXPECT_EQ(page->get_header_value("Access-Control-Allow-Origin"), "");
+  const auto state = Client().Get("/api/state", Own());
+  EXPECT_EQ(state->status, 503) << "no service";
+  EXPECT_THAT(state->body, HasSubstr("cannot reach a server"));
+  EXPECT_EQ(Client().Get("/nothing", Own())->status, 404);
+}
+
+TEST_F(StudioSecurityTest, RefusesForeignHostAndOrigin) {
+  Headers foreign = Own();
+  foreign.erase("Origin");
+  foreign.emplace("Origin", "http://evil.example");
+  EXPECT_EQ(Client().Get("/api/jobs", foreign)->status, 403);
+  EXPECT_EQ(Client().Post("/api/sets", foreign, "{}", "application/json")->status, 403);
+  const std::string rebound =
+      Raw({"GET / HTTP/1.1\r\nHost: evil.example:" + std::to_string(studio_->port()) +
+           "\r\nCookie: " + cookie_ + "\r\n\r\n"});
+  EXPECT_THAT(rebound, StartsWith("HTTP/1.1 421"));
+  // A form of another page sends cookies, too, where a browser knows no SameSite.
+  Headers silent = Own();
+  silent.erase("Origin");
+  EXPECT_EQ(Client().Post("/api/sets", silent, "{}", "text/plain")->status, 403);
+}
+
+TEST_F(StudioSecurityTest, ListensOnLoopbackAlone) {
+  EXPECT_THAT(studio_->Address(""), StartsWith("http://127.0.0.1:"));
+  StudioOptions options;
+  options.folder = scratch_.path();
+  options.port = studio_->port();
+  EXPECT_THROW(Studio(options, cancel_), Error) << "a second one takes no part of its requests";
+}
+
+TEST_F(StudioSecurityTest, PathsStayInside) {
+  const std::string id = NewSet();
+  const size_t before = Files();
+  for (const char* name :
+       {"../../x", "%2e%2e/x", "/etc/x", "a/%2e%2e/%2e%2e/x", "..%5cx", "a%00b"}) {
+    const auto answer = Client().Post(
+        "/api/sets/" + id + "/files?name=" + name, Own(), "bytes", "application/octet-stream");
+    EXPECT_EQ(answer->status, 400) << name;
+  }
+  EXPECT_EQ(Files(), before);
+  for (const char* path : {"/../../etc/passwd",
+                           "/%2e%2e/%2e%2e/etc/passwd",
+                           "/api/sets/..",
+                           "/api/sets/%2e%2e/photo"}) {
+    EXPECT_THAT(Client().Get(path, Own())->status, AnyOf(400, 404)) << path;
+  }
+  EXPECT_EQ(Client().Get("/api/jobs/1/artifact?name=../../etc/passwd", Own())->status, 400);
+  const auto picture =
+      Client().Post("/api/sets/" + id + "/colorize",
+                    Own(),
+                    R"({"color": "picture", "key_view": "a", "picture": "../set.json"})",
+                    "application/json");
+  EXPECT_EQ(picture->status, 400);
+  // A preset is a name, never a file.
+  EXPECT_EQ(Client()
+                .Post("/api/sets/" + id + "/plan",
+                      Own(),
+                      R"({"preset": "/etc/passwd"})",
+                      "application/json")
+                ->status,
+            400);
+}
+
+TEST_F(StudioSecurityTest, BoundsBodies) {
+  const std::string id = NewSet();
+  const size_t before = Files();
+  // Announced: refused before it is read.
+  const std::string announced = Raw(
+      {OwnHead("POST /api/sets/" + id + "/files?name=a.jpg", "Content-Length: 2147483648\r\n")});
+  EXPECT_THAT(announced, AnyOf(StartsWith("HTTP/1.1 413"), StartsWith("HTTP/1.1 507")));
+  // Not announced: cut off.
+  std::vector<std::string> chunks = {
+      OwnHead("POST /api/sets/" + id + "/files?name=a.jpg", "Transfer-Encoding: chunked\r\n")};
+  for (int i = 0; i < 40; ++i) chunks.push_back("10000\r\n" + std::string(65536, 'x') + "\r\n");
+  chunks.emplace_back("0\r\n\r\n");
+  const std::string answer = Raw(chunks);
+  EXPECT_THAT(answer, testing::Not(StartsWith("HTTP/1.1 200")));
+  const std::string large(4 << 20, ' ');
+  const auto json = Client().Post("/api/sets", Own(), large, "application/json");
+  if (json) {
+    EXPECT_THAT(json->status, AnyOf(413, 507));
+  }
+  EXPECT_EQ(Files(), before);
+}
+
+TEST_F(StudioSecurityTest, EndsSlowRequests) {
+  const std::string id = NewSet();
+  const size_t before = Files();
+  const auto begun = Steady::now();
+  Raw({"GET / HTTP/1.1\r\n", "Host: ", "a", "b", "c", "d", "e", "f", "g", "h"}, milliseconds(300));
+  EXPECT_LT(Steady::now() - begun, seconds(6));
+  std::vector<std::string> drops = {
+      OwnHead("POST /api/sets/" + id + "/files?name=a.jpg", "Content-Length: 1000\r\n")};
+  drops.insert(drops.end(), 20, "x");
+  const auto slow_begun = Steady::now();
+  const std::string answer = Raw(drops, milliseconds(200));
+  EXPECT_LT(Steady::now() - slow_begun, seconds(8));
+  EXPECT_THAT(answer, testing::Not(StartsWith("HTTP/1.1 200")));
+  EXPECT_EQ(Files(), before);
+}
+
+TEST_F(StudioSecurityTest, SilentConnectionsAreTurnedAway) {
+  std::vector<int> silent(4 + 8);
+  for (int& socket : silent) socket = Connect();
+  std::this_thread::sleep_for(milliseconds(100));
+  std::vector<int> more(20);
+  for (int& socket : more) socket = Connect();
+  int busy = 0;
+  for (const int socket : more) {
+    pollfd answer{socket, POLLIN, 0};
+    char first = 0;
+    busy +=
+        ::poll(&answer, 1, 300) == 1 && ::recv(socket, &first, 1, 0) == 1 && first == 'H' ? 1 : 0;
+  }
+  EXPECT_GE(busy, 15) << "answered 503 at once";
+  for (const int socket : silent) ::close(socket);
+  for (const int socket : more) ::close(socket);
+  // It answers again.
+  for (int i = 0; i < 50; ++i) {
+    const auto page = Client().Get("/", Own());
+    if (page && page->status == 200) return;
+    std::this_thread::sleep_for(milliseconds(100));
+  }
+  FAIL();
+}
+
+TEST_F(StudioSecurityTest, AnswersTenThousandRequests) {
+  const Headers own = Own();
+  std::atomic<int> answered{0};
+  std::vector<std::thread> clients;
+  for (int i = 0; i < 4; ++i) {
+    clients.emplace_back([&] {
+      for (int k = 0; k < 2500; ++k) {
+        const auto page = Client().Get("/studio.css", k % 10 == 0 ? own : Headers());
+        if (page && page->status == (k % 10 == 0 ? 200 : 403)) ++answered;
+      }
+    });
+  }
+  for (std::thread& client : clients) client.join();
+  EXPECT_EQ(answered, 10'000);
+}
+
+}  // namespace
+}  // namespace color3d::client

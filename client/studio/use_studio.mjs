@@ -1,0 +1,166 @@
+// Uses the studio in headless Chromium as a person would, and tells what was seen, as JSON on stdout.
+//   node use_studio.mjs CHROMIUM ADDRESS FOLDER [SCREENSHOTS]
+// ADDRESS: as `color3d studio` printed it; FOLDER: photos to choose. errors: of the console; requests: beyond
+// the studio; texts: of the pages; wide: pages that are wider than a screen of 360 px; faint: texts with a
+// contrast below 4.5; shades: whether the page of the finished scene is ready. With a fourth argument every page leaves a
+// PNG there, wide, dark and narrow.
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { join, resolve } from 'node:path';
+
+import { openBrowser, pause } from '../../tests/support/browser.mjs';
+
+const [chromium, address, folder, screenshots] = process.argv.slice(2);
+if (screenshots) mkdirSync(screenshots, { recursive: true });
+const flags = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--window-size=1280,900'];
+const { send, open, evaluate, close, errors, requests } =
+    openBrowser(chromium, flags, (type) => ['error', 'assert'].includes(type));
+const origin = new URL(address).origin;
+const seen = { texts: {}, wide: [], faint: [], shades: false };
+
+const waitFor = async (expression, limit = 60000) => {
+  const end = Date.now() + limit;
+  while (Date.now() < end) {
+    const value = await evaluate(expression);
+    if (value) return value;
+    const problem = await evaluate('document.querySelector(".problem p")?.textContent');
+    if (problem) throw new Error('the page says: ' + problem);
+    await pause(100);
+  }
+  throw new Error('waited in vain for ' + expression + ' at ' + await evaluate('location.href + document.body.innerText'));
+};
+const click = async (selector) => {
+  await waitFor(`!!document.querySelector(${JSON.stringify(selector)})`);
+  const { x, y } = await evaluate(`(() => {
+    const element = document.querySelector(${JSON.stringify(selector)});
+    element.scrollIntoView({ block: 'center' });
+    const box = element.getBoundingClientRect();
+    return { x: box.x + box.width / 2, y: box.y + box.height / 2 };
+  })()`);
+  for (const type of ['mousePressed', 'mouseReleased']) {
+    await send('Input.dispatchMouseEvent', { type, x, y, button: 'left', clickCount: 1 });
+  }
+};
+const press = async (key, code) => {
+  const text = key === 'Enter' ? { text: '\r' } : {};
+  for (const type of ['keyDown', 'keyUp']) {
+    await send('Input.dispatchKeyEvent', { type, key, code: key, windowsVirtualKeyCode: code, ...(type === 'keyDown' ? text : {}) });
+  }
+};
+
+// Texts whose contrast with their ground is below 4.5 (WCAG AA).
+const faintTexts = `(() => {
+  const parse = (color) => (color.match(/[0-9.]+/g) ?? []).map(Number);
+  const light = ([r, g, b]) => {
+    const [x, y, z] = [r, g, b].map((v) => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * x + 0.7152 * y + 0.0722 * z;
+  };
+  const ground = (element) => {
+    for (let at = element; at; at = at.parentElement) {
+      const color = parse(getComputedStyle(at).backgroundColor);
+      if (color.length === 3 || color[3] > 0.99) return color;
+    }
+    return [255, 255, 255];
+  };
+  const faint = [];
+  for (const element of document.querySelectorAll('body *')) {
+    const own = [...element.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
+    if (!own || !element.checkVisibility() || element.closest('.said,.skip,:disabled')) continue;
+    const a = light(parse(getComputedStyle(element).color)), b = light(ground(element));
+    const contrast = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+    if (contrast < 4.5) faint.push(element.textContent.trim().slice(0, 40) + ' ' + contrast.toFixed(2));
+  }
+  return faint;
+})()`;
+
+// The page of the scene is sandboxed, a target of its own.
+const stateOfScene = async (limit) => {
+  const end = Date.now() + limit;
+  let state = 'missing';
+  while (Date.now() < end && state !== 'ready' && state !== 'failed') {
+    await pause(500);
+    const { targetInfos } = await send('Target.getTargets', {}, null);
+    const scene = targetInfos.find(({ url, type }) => type === 'iframe' && url.includes('view.html'));
+    if (!scene) continue;
+    const { sessionId } = await send('Target.attachToTarget', { targetId: scene.targetId, flatten: true }, null);
+    const { result } = await send('Runtime.evaluate', { expression: 'document.body?.dataset.state ?? "loading"' }, sessionId);
+    await send('Target.detachFromTarget', { sessionId }, null);
+    state = result.value;
+  }
+  return state;
+};
+
+const keep = async (name) => {
+  if (!screenshots) return;
+  const { data } = await send('Page.captureScreenshot', { format: 'png' });
+  writeFileSync(join(screenshots, name + '.png'), Buffer.from(data, 'base64'));
+};
+const look = async (name) => {
+  await pause(600);
+  seen.texts[name] = await evaluate('document.body.innerText');
+  for (const scheme of ['light', 'dark']) {
+    await send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: scheme }] });
+    await pause(150);
+    for (const text of await evaluate(faintTexts)) seen.faint.push(`${name} ${scheme}: ${text}`);
+    await keep(`${name}_${scheme}`);
+  }
+  await send('Emulation.setEmulatedMedia', { features: [] });
+  await send('Emulation.setDeviceMetricsOverride', { width: 360, height: 740, deviceScaleFactor: 1, mobile: true });
+  await pause(250);
+  if (await evaluate('document.documentElement.scrollWidth') > 360) seen.wide.push(name);
+  await keep(`${name}_narrow`);
+  await send('Emulation.clearDeviceMetricsOverride');
+};
+
+const use = async () => {
+  await open();
+  await send('Page.navigate', { url: address });
+  await waitFor('!!document.querySelector(".drop-area")');
+  await look('home');
+
+  await send('DOM.enable');
+  const { root } = await send('DOM.getDocument');
+  const { nodeId } = await send('DOM.querySelector', { nodeId: root.nodeId, selector: '#choose-folder' });
+  await send('DOM.setFileInputFiles', { nodeId, files: [resolve(folder)] });
+  await waitFor('location.hash.startsWith("#set/") && !!document.querySelector("#go-on")');
+  await waitFor('!!document.querySelector(".plan")');
+  await look('photos');
+
+  // By keyboard alone.
+  await evaluate('document.querySelector("#go-on").focus()');
+  await press('Enter', 13);
+  await waitFor('location.hash.startsWith("#key/")');
+  await waitFor('!!document.querySelector("#start")', 120000);
+  await waitFor('document.querySelector("#key-photo")?.complete');
+  await look('key');
+  await click('input[value=picture]');
+  await waitFor('!!document.querySelector("#colored-picture")');
+  await look('picture');
+  await click('input[value=automatic]');
+  await click('#start');
+  await waitFor('location.hash.startsWith("#job/") && !!document.querySelector(".stage")');
+  await waitFor('!!document.querySelector(".gallery img")', 90000);
+  await look('running');
+
+  // The page is closed and opened again.
+  await send('Page.navigate', { url: 'about:blank' });
+  await send('Page.navigate', { url: origin + '/' });
+  await waitFor('!!document.querySelector(".card")');
+  await look('again');
+  await click('.card');
+  await waitFor('document.querySelector("main").dataset.state === "done"', 240000);
+  await waitFor('!!document.querySelector("#scene")');
+  seen.shades = await stateOfScene(90000) === 'ready';
+  await look('done');
+  return { ...seen, errors, requests: requests.filter((url) => !url.startsWith(origin + '/')) };
+};
+
+let failed = 0;
+try {
+  console.log(JSON.stringify(await use(), null, 1));
+} catch (error) {
+  console.error(error.stack, JSON.stringify({ errors, requests }));
+  await keep('failed').catch(() => undefined);
+  failed = 1;
+}
+await close();
+process.exit(failed);
