@@ -150,7 +150,8 @@ void ServiceTest::StartServer(const std::vector<std::string>& flags, const std::
 
 std::vector<std::string> ServiceTest::ClientCommand(
     const std::vector<std::string>& arguments) const {
-  const std::string address = server_ != nullptr ? server_->address() : "";
+  // Without a server of the test none is started for the user.
+  const std::string address = server_ != nullptr ? server_->address() : "127.0.0.1:1";
   return std::vector<std::string>{"env", "COLOR3D_SERVER=" + address, ClientProgram()} + arguments;
 }
 
