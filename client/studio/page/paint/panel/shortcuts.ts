@@ -1,7 +1,6 @@
 // Keys, and the list of them. They count while the focus is in the painter and not in a field.
 import type { Texts } from '../texts';
 import { button, element } from './dom';
-import { icons } from './icons';
 import { toolKeys } from './tool_panel';
 
 export interface KeyPress {
@@ -27,9 +26,9 @@ export const commandOfKey = (press: KeyPress): KeyCommand | undefined => {
   if (press.altKey) return undefined;
   if (press.ctrlKey || press.metaKey) {
     if (key === 'z') return press.shiftKey ? 'redo' : 'undo';
-    return withControl[key];
+    return Object.hasOwn(withControl, key) ? withControl[key] : undefined;
   }
-  return plain[key];
+  return Object.hasOwn(plain, key) ? plain[key] : undefined;
 };
 
 // Whether keys belong to the element: a field to type in, or a slider or list for its arrows.
@@ -66,5 +65,3 @@ export const shortcutDialog = (texts: Texts): HTMLDialogElement => {
   });
   return dialog;
 };
-
-export const shortcutIcon = icons.shortcuts;
