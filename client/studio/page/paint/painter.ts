@@ -101,7 +101,7 @@ export class Painter {
       this.stage.root,
       element('div', { class: 'paint-side' }, toolPanel(this.store, longerSide, texts), colorPanel(this.store, texts),
         palettePanel(this.store, texts, (text) => this.say(text)), this.layers.root));
-    this.root = element('div', { class: 'paint' }, grid, this.dialog, this.fileInput);
+    this.root = element('div', { class: 'paint', lang: texts.language }, grid, this.dialog, this.fileInput);
     this.root.dataset.preview = 'none';
     this.input = new CanvasInput(this.root, this.stage, {
       begin: (sample, isPen, isByKeys) => this.begin(sample, isPen, isByKeys),
@@ -146,6 +146,10 @@ export class Painter {
     this.stage.layers.setAutomatic(picture);
     this.layers.setAvailable('automatic', picture !== null);
     this.stage.redraw();
+  }
+  // Gives the canvas the keys. The keys count while the focus is anywhere in the painter.
+  focus(): void {
+    this.stage.canvas.focus({ preventScroll: true });
   }
   destroy(): void {
     this.previews.stop();

@@ -1,5 +1,6 @@
 // All words of the painter. A page in another language hands over its own.
 export const english = {
+  language: 'en', // for hyphens and voices
   actions: 'Actions',
   tools: 'Tools',
   brush: 'Brush',
@@ -41,7 +42,7 @@ export const english = {
   colorHere: 'As it looks here',
   hue: 'Hue',
   chroma: 'Strength',
-  hex: 'Colour code',
+  hex: 'Code',
   neutral: 'Keep grey',
   automatic: 'Keep automatic',
   recent: 'Recent colours',

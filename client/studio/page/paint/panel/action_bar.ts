@@ -28,12 +28,13 @@ export interface ActionBar {
 }
 
 export const actionBar = (actions: BarActions, texts: Texts): ActionBar => {
-  const named = (label: string, key: string | undefined, shortcut: string | undefined, path: string, run: () => void) =>
-    button({ label, key, shortcut, icon: path }, run);
+  const named = (label: string, key: string | undefined, shortcut: string | undefined, path: string, run: () => void,
+    className?: string) =>
+    button({ label, key, shortcut, icon: path, className }, run);
   const undo = named(texts.undo, 'Ctrl+Z', 'Control+Z', icons.undo, actions.undo);
   const redo = named(texts.redo, 'Ctrl+Y', 'Control+Y', icons.redo, actions.redo);
-  const zoomOut = named(texts.zoomOut, '−', '-', icons.zoomOut, () => actions.zoom(1 / 1.25));
-  const zoomIn = named(texts.zoomIn, '+', '+', icons.zoomIn, () => actions.zoom(1.25));
+  const zoomOut = named(texts.zoomOut, '−', '-', icons.zoomOut, () => actions.zoom(1 / 1.25), 'paint-wide');
+  const zoomIn = named(texts.zoomIn, '+', '+', icons.zoomIn, () => actions.zoom(1.25), 'paint-wide');
   const fit = named(texts.fit, '0', '0', icons.fit, actions.fit);
   const share = button({ label: texts.fullSize, key: '1', shortcut: '1', className: 'paint-zoom' }, actions.fullSize);
   const compare = button(

@@ -82,7 +82,8 @@ export const slider = (options: SliderOptions, onInput: (value: number) => void)
     onInput(Number(input.value));
   });
   set(options.value);
-  const root = element('label', { class: 'paint-slider' }, element('span', {}, options.label), output, input);
+  // The first control in a label is what it names.
+  const root = element('label', { class: 'paint-slider' }, element('span', {}, options.label), input, output);
   return { root, input, set };
 };
 

@@ -3,7 +3,7 @@ import { readFileSync } from 'node:fs';
 import test from 'node:test';
 
 import { edgeWeight, smoothed, type Luminance } from './edge_weights';
-import { regionWithin, resistanceFrom } from './grow';
+import { regionSigma, regionWithin, resistanceFrom, toll } from './grow';
 
 // paint_format_test.cc checks the same file against core/grid/edge_weights.cc.
 test('edge weights are those of the service', () => {
@@ -51,22 +51,28 @@ test('resistance is the shortest way, and more reach is more area', () => {
   const picture = scene(side, (x, y) => 50 + 8 * Math.sin(x / 4) + 5 * Math.cos(y / 3));
   const far = resistanceFrom(picture, 7, 9, 1e6);
   const smooth = smoothed(picture).data;
+  const seed = far.indexOf(0);
+  assert.ok(Math.hypot((seed % side) - 7, Math.floor(seed / side) - 9) < 6);
   // Every pixel but the seed is reached by its best neighbour's way and one step.
   for (let y = 1; y < side - 1; ++y) {
     for (let x = 1; x < side - 1; ++x) {
       const i = y * side + x;
-      if (x === 7 && y === 9) continue;
+      if (i === seed) continue;
       let best = Infinity;
       for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]]) {
         const j = i + dy * side + dx;
-        best = Math.min(best, far[j] + Math.hypot(dx, dy) * (1 / edgeWeight(smooth[i], smooth[j], 3) - 1 + 0.004));
+        best = Math.min(best, far[j] + Math.hypot(dx, dy) * (1 / edgeWeight(smooth[i], smooth[j], regionSigma) - 1 + toll));
       }
       assert.ok(Math.abs(best - far[i]) < 1e-3 * (1 + far[i]));
     }
   }
   const area = (reach: number) => regionWithin(far, side, side, reach).data.reduce((sum, v) => sum + v, 0);
   assert.ok(area(0.2) <= area(1) && area(1) <= area(10));
-  assert.equal(far[9 * side + 7], 0);
+});
+
+test('a click beside a line means the surface', () => {
+  const far = resistanceFrom(scene(30, (x) => (x === 15 ? 20 : 80)), 16, 12, 5);
+  assert.ok(far[12 * 30 + 25] < 1);
 });
 
 test('a limited reach stops the search', () => {

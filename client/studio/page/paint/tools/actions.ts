@@ -8,7 +8,7 @@ import type { Luminance } from '../region/edge_weights';
 import { regionWithin, resistanceFrom } from '../region/grow';
 import type { Texts } from '../texts';
 import { entriesOfPath, linesOfEraser, snapped, type Sample } from './path';
-import { largestResistance, resistanceOfReach, type Settings } from './settings';
+import { resistanceOfReach, type Settings } from './settings';
 
 export interface ActionInput {
   readonly document: StrokeDocument;
@@ -95,15 +95,20 @@ const region = (input: ActionInput, first: Sample): Action => {
   const luminance = input.luminance();
   const isInside = first.x >= 0 && first.y >= 0 && first.x < size.width && first.y < size.height;
   const sx = size.width / luminance.width, sy = size.height / luminance.height;
-  const far = isInside
-    ? resistanceFrom(luminance, Math.floor(first.x / sx), Math.floor(first.y / sy), largestResistance)
-    : undefined;
+  let known = 0; // reach up to which the distances are
+  let distances: Float32Array | undefined;
+  const far = (needed: number): Float32Array => {
+    if (distances && needed <= known) return distances;
+    known = Math.min(100, needed + 10);
+    return (distances = resistanceFrom(
+      luminance, Math.floor(first.x / sx), Math.floor(first.y / sy), resistanceOfReach(known)));
+  };
   let wanted = reach;
   let grown: { reach: number; entries: StrokeEntry[] } | undefined;
   const entries = (): StrokeEntry[] => {
-    if (!far) return [];
+    if (!isInside) return [];
     if (grown?.reach === wanted) return grown.entries;
-    const mask = regionWithin(far, luminance.width, luminance.height, resistanceOfReach(wanted));
+    const mask = regionWithin(far(wanted), luminance.width, luminance.height, resistanceOfReach(wanted));
     const rounded = (v: number, side: number) => Math.min(side, Math.round(v * 10) / 10);
     const made = polygonsOfMask(mask, tolerance, leastArea)
       .map((polygon): StrokeEntry => ({
@@ -123,7 +128,7 @@ const region = (input: ActionInput, first: Sample): Action => {
       wanted = Math.round(Math.min(100, Math.max(1, reach + reachPerPx * moved)));
     },
     end: () => {
-      if (!far) return input.texts.nothingThere;
+      if (!isInside) return input.texts.nothingThere;
       // Each entry of the format must cover a pixel.
       const made = entries().filter((entry) => !isEmpty(maskOf(entry, size)));
       input.document.add(input.texts.region, made);

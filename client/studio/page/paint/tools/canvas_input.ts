@@ -39,6 +39,10 @@ export class CanvasInput {
     canvas.addEventListener('pointerup', (event) => this.gestures.up(event.pointerId), { signal });
     canvas.addEventListener('pointercancel', (event) => this.gestures.lost(event.pointerId), { signal });
     canvas.addEventListener('pointerleave', () => this.setCursor(undefined), { signal });
+    // Who comes with the mouse has the keys at hand, unless they belong to something else.
+    canvas.addEventListener('pointerenter', () => {
+      if (document.activeElement === document.body) canvas.focus({ preventScroll: true });
+    }, { signal });
     canvas.addEventListener('contextmenu', (event) => event.preventDefault(), { signal });
     canvas.addEventListener('wheel', (event) => {
       event.preventDefault();

@@ -33,7 +33,7 @@ export const firstSettings = (longerSide: number): Settings => ({
   tool: 'brush',
   width: Math.max(2, Math.round(longerSide * firstWidth)),
   withPressure: true,
-  reach: 40,
+  reach: 45,
   fill: { color: '#b5654a' },
   recent: [],
   pickFrom: 'seen',
@@ -78,5 +78,4 @@ export const widthOfSlider = (value: number, largest: number): number => {
   return width < 10 ? Math.round(width * 2) / 2 : Math.round(width);
 };
 // The resistance that the region tool overcomes at a reach of 1..100.
-export const resistanceOfReach = (reach: number): number => 0.25 * 400 ** (reach / 100);
-export const largestResistance = resistanceOfReach(100);
+export const resistanceOfReach = (reach: number): number => 0.2 * 500 ** (reach / 100);

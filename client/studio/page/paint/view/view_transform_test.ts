@@ -7,7 +7,7 @@ const photo = { width: 400, height: 300 };
 const canvas = { width: 824, height: 524 };
 
 test('a photo that fits is in the middle', () => {
-  assert.deepEqual(fitted(photo, canvas), { scale: 500 / 300, x: (824 - (400 * 500) / 300) / 2, y: 12 });
+  assert.deepEqual(fitted(photo, canvas), { scale: 500 / 300, x: (824 - (500 / 300) * 400) / 2, y: 12 });
 });
 
 test('what is under the pointer stays there', () => {
