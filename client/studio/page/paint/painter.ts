@@ -163,7 +163,8 @@ export class Painter {
 
   private changed(isLoad: boolean): void {
     const strokes = this.document.entries;
-    this.previews.changed(strokes, previewSide);
+    const { width, height } = this.stage.layers.size;
+    this.previews.changed(strokes, Math.min(previewSide, Math.max(width, height)));
     this.stage.redraw();
     this.showState();
     if (!isLoad) this.options.onChange?.(strokes);

@@ -99,8 +99,9 @@ box-shadow:inset 0 0 0 1px var(--p-soft)}
 .paint-code input{padding:.2rem .4rem;font-variant-numeric:tabular-nums}
 .paint-row{display:flex;flex-wrap:wrap;gap:.4rem;margin-top:.5rem}
 .paint-row>*{flex:1 1 7rem;display:flex}
-.paint-row button,.paint-list button{border-color:var(--p-line);flex:1;overflow-wrap:anywhere;hyphens:auto}
-.paint-swatches{display:grid;grid-template-columns:repeat(auto-fill,minmax(1.9rem,1fr));gap:.3rem}
+.paint-row button,.paint-list button{border-color:var(--p-line);overflow-wrap:anywhere;hyphens:auto}
+.paint-file button{flex:1}
+.paint-swatches{display:grid;grid-template-columns:repeat(auto-fill,minmax(2.2rem,1fr));gap:.3rem}
 .paint button.paint-swatch{min-width:0;min-height:1.9rem;height:1.9rem;padding:0;border:1px solid #0003;border-radius:7px}
 .paint button.paint-swatch[aria-pressed=true]{box-shadow:0 0 0 2px var(--p-card),0 0 0 4px var(--p-accent)}
 .paint-list{display:grid;gap:.4rem;margin-top:.5rem}

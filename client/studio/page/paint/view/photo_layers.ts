@@ -8,6 +8,7 @@ import { drawEntries, pathOfLine, strokeLine, type Paints } from './stroke_drawi
 import { toPhoto, type View } from './view_transform';
 
 const smallSide = 2048; // px of the photo's smaller copy, enough for most windows
+const slowDrawing = 8; // ms
 const luminanceSide = 1024; // px of the luminance that the region tool grows on
 
 // What the tool in use adds to the strokes.
@@ -49,7 +50,7 @@ export class PhotoLayers {
   private hasColor_ = false;
   private strokes = canvasOf(1, 1);
   private work = canvasOf(1, 1);
-  private drawn: { entries: StrokeFile; key: string } | undefined;
+  private drawn: { entries: StrokeFile; key: string; view: View; ms: number } | undefined;
 
   constructor(private readonly photo: ImageBitmap) {
     this.size = { width: photo.width, height: photo.height };
@@ -111,9 +112,10 @@ export class PhotoLayers {
     return context.getImageData(0, 0, 1, 1).data;
   }
 
-  // `ratio`: device px a CSS px.
+  // `ratio`: device px a CSS px. While the view moves, many strokes are shown as they were drawn before, moved along;
+  // returns whether they were, and are to be drawn again when it rests.
   draw(context: CanvasRenderingContext2D, view: View, ratio: number, entries: StrokeFile, live: Live | undefined,
-    settings: Settings): void {
+    settings: Settings, isMoving = false): boolean {
     const { width, height } = context.canvas;
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.clearRect(0, 0, width, height);
@@ -121,7 +123,7 @@ export class PhotoLayers {
     context.imageSmoothingEnabled = ratio * view.scale < 4; // pixels are seen as such when they are large
     context.imageSmoothingQuality = ratio * view.scale < 1 ? 'medium' : 'low';
     this.drawPhoto(context, view, ratio, settings);
-    if (settings.isComparing) return;
+    if (settings.isComparing) return false;
     for (const [layer, bitmap] of [['automatic', this.automatic_], ['preview', this.preview]] as const) {
       const { isShown, opacity } = settings.layers[layer];
       if (!isShown || !bitmap) continue;
@@ -130,17 +132,24 @@ export class PhotoLayers {
       context.globalAlpha = 1;
     }
     const { isShown, opacity } = settings.layers.strokes;
-    if (!isShown) return;
-    const strokes = this.strokesAsSeen(context, view, ratio, entries, live, settings);
+    if (!isShown) return false;
+    const key = [ratio, width, height, settings.isSolid].join();
+    const before = this.drawn;
+    const isRough = isMoving && !live && before?.key === key && before.entries === entries &&
+      before.view !== view && before.ms > slowDrawing;
+    const strokes = isRough ? this.strokes[0] : this.strokesAsSeen(context, view, ratio, entries, live, settings, key);
     context.save();
     context.beginPath(); // nothing counts beyond the photo
     context.rect(0, 0, this.size.width, this.size.height);
     context.clip();
-    context.setTransform(1, 0, 0, 1, 0, 0);
+    const grown = isRough ? view.scale / before.view.scale : 1;
+    const shift = (now: number, then: number) => (isRough ? ratio * (now - grown * then) : 0);
+    context.setTransform(grown, 0, 0, grown, shift(view.x, before?.view.x ?? 0), shift(view.y, before?.view.y ?? 0));
     context.globalAlpha = opacity;
     context.globalCompositeOperation = settings.isSolid ? 'source-over' : 'color';
     context.drawImage(strokes, 0, 0);
     context.restore();
+    return isRough;
   }
 
   private drawPhoto(context: CanvasRenderingContext2D, view: View, ratio: number, settings: Settings): void {
@@ -162,18 +171,19 @@ export class PhotoLayers {
 
   // The strokes on a canvas of the size of the screen; drawn anew where the view or the list has changed.
   private strokesAsSeen(screen: CanvasRenderingContext2D, view: View, ratio: number, entries: StrokeFile,
-    live: Live | undefined, settings: Settings): HTMLCanvasElement {
+    live: Live | undefined, settings: Settings, key: string): HTMLCanvasElement {
     const { width, height } = screen.canvas;
     const place = (context: CanvasRenderingContext2D) =>
       context.setTransform(ratio * view.scale, 0, 0, ratio * view.scale, ratio * view.x, ratio * view.y);
     const [left, top] = toPhoto(view, 0, 0);
     const [right, bottom] = toPhoto(view, width / ratio, height / ratio);
     const seen = { left, top, right, bottom };
-    const key = [view.scale, view.x, view.y, ratio, width, height, settings.isSolid].join();
     const [strokes, context] = this.strokes;
     const paints = this.paints(context, settings);
-    if (this.drawn?.key !== key || this.drawn.entries !== entries) {
-      const grown = this.drawn?.key === key && this.isBeginning(this.drawn.entries, entries);
+    if (this.drawn?.key !== key || this.drawn.view !== view || this.drawn.entries !== entries) {
+      const began = performance.now();
+      const grown = this.drawn?.key === key && this.drawn.view === view &&
+        this.isBeginning(this.drawn.entries, entries);
       if (strokes.width !== width || strokes.height !== height) {
         strokes.width = width;
         strokes.height = height;
@@ -184,7 +194,8 @@ export class PhotoLayers {
       }
       place(context);
       drawEntries(context, grown ? entries.slice(this.drawn!.entries.length) : entries, seen, paints);
-      this.drawn = { entries, key };
+      const ms = grown ? this.drawn!.ms : performance.now() - began;
+      this.drawn = { entries, key, view, ms };
     }
     if (!live) return strokes;
     const [work, both] = this.work;

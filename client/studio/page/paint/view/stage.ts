@@ -5,6 +5,7 @@ import type { StrokeFile } from '../model/stroke_file';
 import { PhotoLayers, type Live } from './photo_layers';
 import { clamped, fitted, panned, toPhoto, toScreen, zoomed, type View } from './view_transform';
 
+const restTime = 120; // ms without a new view after which it rests
 const panDuringKeys = 0.1; // of the canvas
 
 export interface StageContent {
@@ -29,6 +30,8 @@ export class Stage {
   private isFitted = true;
   private frame = 0;
   private pictureIsOld = true;
+  private movedAt = -Infinity; // ms
+  private restTimer: ReturnType<typeof setTimeout> | undefined;
   private readonly observer = new ResizeObserver(() => this.resized());
 
   constructor(photo: ImageBitmap, private readonly content: StageContent, private readonly onView: () => void) {
@@ -84,11 +87,13 @@ export class Stage {
   destroy(): void {
     this.observer.disconnect();
     cancelAnimationFrame(this.frame);
+    clearTimeout(this.restTimer);
     this.root.remove();
   }
 
   private setView(view: View): void {
     this.view_ = view;
+    this.movedAt = performance.now();
     this.isFitted = false;
     this.redraw();
     this.onView();
@@ -110,8 +115,11 @@ export class Stage {
     if (this.pictureIsOld) {
       const { settings, entries, live } = this.content;
       const context = this.canvas.getContext('2d')!;
-      this.layers.draw(context, this.view_, this.ratio, entries(), live(), settings());
+      const isMoving = performance.now() - this.movedAt < restTime;
+      const isRough = this.layers.draw(context, this.view_, this.ratio, entries(), live(), settings(), isMoving);
       this.pictureIsOld = false;
+      clearTimeout(this.restTimer);
+      if (isRough) this.restTimer = setTimeout(() => this.redraw(), restTime);
     }
     this.drawCursor();
   }
