@@ -38,6 +38,9 @@ export const onRealPhoto = async (browser, hand, photo, screenshots) => {
     `${strokes.filter((entry) => 'region' in entry).map(({ region }) => region.length)} points`);
   const bytes = await hand.bytes();
   await shot('desk-painted');
+  const box = await hand.box('[data-layer=preview] input');
+  await hand.clickScreen(box.x + box.width / 2, box.y + box.height / 2);
+  await shot('desk-strokes');
   await hand.window(1280, 800, 'dark');
   await shot('desk-dark');
   await hand.key('?', ['shift']);

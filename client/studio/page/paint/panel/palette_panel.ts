@@ -2,7 +2,7 @@
 import { colorsOfText, paletteOfPicture } from '../color/palette';
 import { filled, type Texts } from '../texts';
 import type { SettingsStore } from '../tools/settings';
-import { canvasOf } from '../view/photo_layers';
+import { canvasOf } from '../view/canvas';
 import { button, element, fileButton, section } from './dom';
 import { swatch } from './swatch';
 

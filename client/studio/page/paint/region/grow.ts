@@ -64,25 +64,30 @@ export const resistanceFrom = (luminance: Luminance, x: number, y: number, limit
   return far;
 };
 
-// The pixels within `reach`, without specks: a pixel follows the majority of its 3x3 neighbourhood, and the border
-// steps back by one pixel, since what lies there belongs to two things.
-export const regionWithin = (far: Float32Array, width: number, height: number, reach: number): Mask => {
-  const raw = new Uint8Array(width * height);
-  for (let i = 0; i < raw.length; ++i) raw[i] = far[i] <= reach ? 1 : 0;
-  const counted = (source: Uint8Array, least: number): Uint8Array => {
-    const out = new Uint8Array(source.length);
-    for (let y = 0; y < height; ++y) {
-      const above = Math.max(y - 1, 0) * width, here = y * width, below = Math.min(y + 1, height - 1) * width;
-      for (let x = 0; x < width; ++x) {
-        const l = Math.max(x - 1, 0), r = Math.min(x + 1, width - 1);
-        const sum = source[above + l] + source[above + x] + source[above + r] + source[here + l] + source[here + x] +
-          source[here + r] + source[below + l] + source[below + x] + source[below + r];
-        out[here + x] = sum >= least ? 1 : 0;
-      }
+// For each pixel whether at least `least` of the nine around and under it are set.
+const counted = (source: Uint8Array, width: number, height: number, least: number): Uint8Array => {
+  const out = new Uint8Array(source.length);
+  for (let y = 0; y < height; ++y) {
+    const above = Math.max(y - 1, 0) * width, here = y * width, below = Math.min(y + 1, height - 1) * width;
+    for (let x = 0; x < width; ++x) {
+      const l = Math.max(x - 1, 0), r = Math.min(x + 1, width - 1);
+      const sum = source[above + l] + source[above + x] + source[above + r] + source[here + l] + source[here + x] +
+        source[here + r] + source[below + l] + source[below + x] + source[below + r];
+      out[here + x] = sum >= least ? 1 : 0;
     }
-    return out;
-  };
-  const closed = counted(counted(counted(raw, 5), 4), 5);
-  const inner = counted(closed, 8);
-  return { x: 0, y: 0, width, height, data: inner.includes(1) ? inner : raw };
+  }
+  return out;
+};
+const area = (source: Uint8Array): number => source.reduce((sum, v) => sum + v, 0);
+
+// The pixels within `reach`, without specks, small holes and threads into the surroundings; the border steps back by a
+// pixel, since what lies there belongs to two things.
+export const regionWithin = (far: Float32Array, width: number, height: number, reach: number): Mask => {
+  const next = (source: Uint8Array, least: number) => counted(source, width, height, least);
+  const raw = Uint8Array.from(far, (d) => (d <= reach ? 1 : 0));
+  const closed = next(next(next(raw, 5), 4), 5);
+  const stepped = next(closed, 8);
+  const opened = next(next(next(closed, 9), 9), 1);
+  const data = 2 * area(opened) > area(stepped) ? opened : area(stepped) > 0 ? stepped : raw; // thin things stay
+  return { x: 0, y: 0, width, height, data };
 };

@@ -1,30 +1,16 @@
 // The pictures of the canvas from bottom to top: the photo in grey, automatic colours, the preview, the strokes.
 import type { Luminance } from '../region/edge_weights';
 import { luminanceFromBytes } from '../color/lab';
-import { isDisc, isLine, isRegion, type Line, type StrokeEntry, type StrokeFile } from '../model/stroke_file';
+import { isDisc, isLine, isRegion, type StrokeEntry, type StrokeFile } from '../model/stroke_file';
 import type { Size } from '../raster/mask';
 import type { Settings } from '../tools/settings';
-import { drawEntries, pathOfLine, strokeLine, type Paints } from './stroke_drawing';
+import { canvasOf } from './canvas';
+import type { Paints } from './stroke_drawing';
+import { StrokeLayer, type Live } from './stroke_layer';
 import { toPhoto, type View } from './view_transform';
 
 const smallSide = 2048; // px of the photo's smaller copy, enough for most windows
-const slowDrawing = 8; // ms
 const luminanceSide = 1024; // px of the luminance that the region tool grows on
-
-// What the tool in use adds to the strokes.
-export interface Live {
-  readonly entries: StrokeFile;
-  readonly eraser: readonly Line[];
-}
-
-export const canvasOf = (width: number, height: number): [HTMLCanvasElement, CanvasRenderingContext2D] => {
-  const canvas = document.createElement('canvas');
-  canvas.width = Math.max(1, Math.round(width));
-  canvas.height = Math.max(1, Math.round(height));
-  const context = canvas.getContext('2d');
-  if (!context) throw new Error('the browser gives no 2D canvas; close other pages and load this one anew');
-  return [canvas, context];
-};
 
 const withoutColor = (context: CanvasRenderingContext2D, x: number, y: number, w: number, h: number): void => {
   context.globalCompositeOperation = 'saturation';
@@ -48,9 +34,7 @@ export class PhotoLayers {
   private readonly small: { gray: HTMLCanvasElement; own: HTMLCanvasElement };
   private luminance_: Luminance | undefined;
   private hasColor_ = false;
-  private strokes = canvasOf(1, 1);
-  private work = canvasOf(1, 1);
-  private drawn: { entries: StrokeFile; key: string; view: View; ms: number } | undefined;
+  private readonly strokes = new StrokeLayer();
 
   constructor(private readonly photo: ImageBitmap) {
     this.size = { width: photo.width, height: photo.height };
@@ -66,7 +50,7 @@ export class PhotoLayers {
   }
   setAutomatic(bitmap: ImageBitmap | null): void {
     this.automatic_ = bitmap;
-    this.drawn = undefined;
+    this.strokes.forget();
   }
 
   // L of the photo at a smaller size.
@@ -133,23 +117,22 @@ export class PhotoLayers {
     }
     const { isShown, opacity } = settings.layers.strokes;
     if (!isShown) return false;
-    const key = [ratio, width, height, settings.isSolid].join();
-    const before = this.drawn;
-    const isRough = isMoving && !live && before?.key === key && before.entries === entries &&
-      before.view !== view && before.ms > slowDrawing;
-    const strokes = isRough ? this.strokes[0] : this.strokesAsSeen(context, view, ratio, entries, live, settings, key);
+    const picture = this.strokes.picture({
+      view, ratio, canvas: { width, height }, entries, live, isSolid: settings.isSolid, isMoving,
+      paints: (on) => this.paints(on, settings),
+    });
     context.save();
     context.beginPath(); // nothing counts beyond the photo
     context.rect(0, 0, this.size.width, this.size.height);
     context.clip();
-    const grown = isRough ? view.scale / before.view.scale : 1;
-    const shift = (now: number, then: number) => (isRough ? ratio * (now - grown * then) : 0);
-    context.setTransform(grown, 0, 0, grown, shift(view.x, before?.view.x ?? 0), shift(view.y, before?.view.y ?? 0));
+    const grown = view.scale / picture.view.scale;
+    context.setTransform(grown, 0, 0, grown, ratio * (view.x - grown * picture.view.x),
+      ratio * (view.y - grown * picture.view.y));
     context.globalAlpha = opacity;
     context.globalCompositeOperation = settings.isSolid ? 'source-over' : 'color';
-    context.drawImage(strokes, 0, 0);
+    context.drawImage(picture.canvas, 0, 0);
     context.restore();
-    return isRough;
+    return picture.view !== view;
   }
 
   private drawPhoto(context: CanvasRenderingContext2D, view: View, ratio: number, settings: Settings): void {
@@ -167,56 +150,6 @@ export class PhotoLayers {
     if (w <= 0 || h <= 0) return;
     context.drawImage(this.photo, x, y, w, h, x, y, w, h);
     if (!settings.hasPhotoColors) withoutColor(context, x, y, w, h);
-  }
-
-  // The strokes on a canvas of the size of the screen; drawn anew where the view or the list has changed.
-  private strokesAsSeen(screen: CanvasRenderingContext2D, view: View, ratio: number, entries: StrokeFile,
-    live: Live | undefined, settings: Settings, key: string): HTMLCanvasElement {
-    const { width, height } = screen.canvas;
-    const place = (context: CanvasRenderingContext2D) =>
-      context.setTransform(ratio * view.scale, 0, 0, ratio * view.scale, ratio * view.x, ratio * view.y);
-    const [left, top] = toPhoto(view, 0, 0);
-    const [right, bottom] = toPhoto(view, width / ratio, height / ratio);
-    const seen = { left, top, right, bottom };
-    const [strokes, context] = this.strokes;
-    const paints = this.paints(context, settings);
-    if (this.drawn?.key !== key || this.drawn.view !== view || this.drawn.entries !== entries) {
-      const began = performance.now();
-      const grown = this.drawn?.key === key && this.drawn.view === view &&
-        this.isBeginning(this.drawn.entries, entries);
-      if (strokes.width !== width || strokes.height !== height) {
-        strokes.width = width;
-        strokes.height = height;
-      }
-      if (!grown) {
-        context.setTransform(1, 0, 0, 1, 0, 0);
-        context.clearRect(0, 0, width, height);
-      }
-      place(context);
-      drawEntries(context, grown ? entries.slice(this.drawn!.entries.length) : entries, seen, paints);
-      const ms = grown ? this.drawn!.ms : performance.now() - began;
-      this.drawn = { entries, key, view, ms };
-    }
-    if (!live) return strokes;
-    const [work, both] = this.work;
-    if (work.width !== width || work.height !== height) {
-      work.width = width;
-      work.height = height;
-    }
-    both.setTransform(1, 0, 0, 1, 0, 0);
-    both.clearRect(0, 0, width, height);
-    both.drawImage(strokes, 0, 0);
-    place(both);
-    drawEntries(both, live.entries, seen, paints);
-    both.globalCompositeOperation = 'destination-out';
-    both.strokeStyle = '#000';
-    for (const line of live.eraser) strokeLine(both, pathOfLine(line), line.width ?? 1);
-    both.globalCompositeOperation = 'source-over';
-    return work;
-  }
-
-  private isBeginning(before: StrokeFile, now: StrokeFile): boolean {
-    return before.length <= now.length && before.every((entry, i) => entry === now[i]);
   }
 
   private paints(context: CanvasRenderingContext2D, settings: Settings): Paints {

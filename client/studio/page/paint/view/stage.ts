@@ -2,7 +2,8 @@
 import type { Settings } from '../tools/settings';
 import { element } from '../panel/dom';
 import type { StrokeFile } from '../model/stroke_file';
-import { PhotoLayers, type Live } from './photo_layers';
+import { PhotoLayers } from './photo_layers';
+import type { Live } from './stroke_layer';
 import { clamped, fitted, panned, toPhoto, toScreen, zoomed, type View } from './view_transform';
 
 const restTime = 120; // ms without a new view after which it rests
