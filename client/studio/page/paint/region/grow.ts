@@ -10,6 +10,7 @@ export const regionSigma = 2;
 export const toll = 0.004;
 const seedRadius = 4; // px around the seed, of which the calmest counts
 const buckets = 1024;
+const largestHole = 80; // px that are filled, as spots on a surface are
 
 // The pixel near (x, y) that is most like those around it: who clicks beside a line means the surface.
 const calmest = (smooth: Float32Array, w: number, h: number, x: number, y: number): number => {
@@ -78,16 +79,46 @@ const counted = (source: Uint8Array, width: number, height: number, least: numbe
   }
   return out;
 };
-const area = (source: Uint8Array): number => source.reduce((sum, v) => sum + v, 0);
+// Sets the parts that are not set and smaller than `limit` px.
+const withoutHoles = (source: Uint8Array, width: number, limit: number): Uint8Array => {
+  const out = source.slice();
+  const seen = source.slice();
+  const part = new Int32Array(source.length);
+  let count = 0;
+  const take = (i: number) => {
+    if (seen[i]) return;
+    seen[i] = 1;
+    part[count++] = i;
+  };
+  for (let start = 0; start < seen.length; ++start) {
+    count = 0;
+    take(start);
+    for (let n = 0; n < count; ++n) {
+      const i = part[n], x = i % width;
+      if (x > 0) take(i - 1);
+      if (x + 1 < width) take(i + 1);
+      if (i >= width) take(i - width);
+      if (i + width < seen.length) take(i + width);
+    }
+    if (count < limit) for (let n = 0; n < count; ++n) out[part[n]] = 1;
+  }
+  return out;
+};
+const area = (source: Uint8Array): number => {
+  let sum = 0;
+  for (const v of source) sum += v;
+  return sum;
+};
 
 // The pixels within `reach`, without specks, small holes and threads into the surroundings; the border steps back by a
 // pixel, since what lies there belongs to two things.
 export const regionWithin = (far: Float32Array, width: number, height: number, reach: number): Mask => {
   const next = (source: Uint8Array, least: number) => counted(source, width, height, least);
-  const raw = Uint8Array.from(far, (d) => (d <= reach ? 1 : 0));
-  const closed = next(next(next(raw, 5), 4), 5);
+  const raw = new Uint8Array(far.length);
+  for (let i = 0; i < raw.length; ++i) raw[i] = far[i] <= reach ? 1 : 0;
+  const closed = withoutHoles(next(next(next(raw, 5), 4), 5), width, largestHole);
   const stepped = next(closed, 8);
-  const opened = next(next(next(closed, 9), 9), 1);
+  const opened = next(next(next(next(next(closed, 9), 9), 9), 1), 1);
   const data = 2 * area(opened) > area(stepped) ? opened : area(stepped) > 0 ? stepped : raw; // thin things stay
   return { x: 0, y: 0, width, height, data };
 };

@@ -85,7 +85,7 @@ const eraser = (input: ActionInput, samples: Sample[]): Action => {
 };
 
 const tolerance = 0.75; // px of the reduced photo that a region's border may move
-const leastArea = 12; // px of the reduced photo
+const leastArea = 40; // px of the reduced photo
 const reachPerPx = 0.25;
 
 // Grows from the first place; the way to the right or left sets how far.

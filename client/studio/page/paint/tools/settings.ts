@@ -33,7 +33,7 @@ export const firstSettings = (longerSide: number): Settings => ({
   tool: 'brush',
   width: Math.max(2, Math.round(longerSide * firstWidth)),
   withPressure: true,
-  reach: 45,
+  reach: 38,
   fill: { color: '#b5654a' },
   recent: [],
   pickFrom: 'seen',
