@@ -18,7 +18,7 @@ import { toolPanel, toolRow } from './panel/tool_panel';
 import { covers } from './raster/mask';
 import { english, filled, type Texts } from './texts';
 import { beginAction, type Action, type ActionInput } from './tools/actions';
-import { CanvasInput } from './tools/canvas_input';
+import { CanvasInput, type Device } from './tools/canvas_input';
 import type { Sample } from './tools/path';
 import { firstSettings, largestWidth, recentLimit, SettingsStore, sliderOfWidth, widthOfSlider } from './tools/settings';
 import { PreviewLoop, type PreviewSource } from './view/preview';
@@ -104,7 +104,7 @@ export class Painter {
     this.root = element('div', { class: 'paint', lang: texts.language }, grid, this.dialog, this.fileInput);
     this.root.dataset.preview = 'none';
     this.input = new CanvasInput(this.root, this.stage, {
-      begin: (sample, isPen, isByKeys) => this.begin(sample, isPen, isByKeys),
+      begin: (sample, device) => this.begin(sample, device),
       extend: (samples, holdsAngle) => {
         this.action?.extend(samples, holdsAngle);
         this.stage.redraw();
@@ -193,8 +193,9 @@ export class Painter {
     this.noteTimer = setTimeout(() => (this.note.textContent = ''), noteTime);
   }
 
-  private begin(sample: Sample, isPen: boolean, isByKeys: boolean): boolean {
-    const { tool, fill, recent } = this.store.now;
+  private begin(sample: Sample, device: Device): boolean {
+    const { fill, recent } = this.store.now;
+    const tool = device === 'eraser of pen' ? 'eraser' : this.store.now.tool;
     if (tool === 'picker') {
       this.pick(sample.x, sample.y);
       return false;
@@ -203,16 +204,16 @@ export class Painter {
       document: this.document,
       size: this.stage.layers.size,
       texts: this.texts,
-      settings: () => this.store.now,
+      settings: () => ({ ...this.store.now, tool }),
       scale: () => this.stage.view.scale,
       luminance: () => this.stage.layers.luminance,
     };
-    this.action = beginAction(input, sample, isPen);
+    this.action = beginAction(input, sample, device === 'pen');
     if (tool !== 'eraser' && fill.color !== undefined && recent[0] !== fill.color) {
       this.store.set({ recent: withRecent(recent, fill.color, recentLimit) });
     }
     this.stage.redraw();
-    if (tool !== 'region' || !isByKeys) return true;
+    if (tool !== 'region' || device !== 'keys') return true;
     this.end(); // the reach is set by its slider
     return false;
   }

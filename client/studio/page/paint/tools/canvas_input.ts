@@ -1,11 +1,12 @@
 // Pointer, wheel and key events of the canvas, as samples of the photo and commands.
 import { commandOfKey, takesKeys, type KeyCommand } from '../panel/shortcuts';
 import type { Stage } from '../view/stage';
-import { Gestures, wheelFactor, type PointerSample } from './gestures';
+import { Gestures, penEraser, wheelFactor, type PointerSample } from './gestures';
 import type { Sample } from './path';
 
+export type Device = 'pointer' | 'pen' | 'eraser of pen' | 'keys';
 export interface CanvasTarget {
-  begin(sample: Sample, isPen: boolean, isByKeys: boolean): boolean; // whether it goes on
+  begin(sample: Sample, device: Device): boolean; // whether it goes on
   extend(samples: readonly Sample[], holdsAngle: boolean): void;
   end(): void;
   cancel(): void;
@@ -24,7 +25,8 @@ export class CanvasInput {
 
   constructor(root: HTMLElement, private readonly stage: Stage, private readonly target: CanvasTarget) {
     this.gestures = new Gestures({
-      begin: (sample) => void target.begin(this.onPhoto(sample), sample.type === 'pen', false),
+      begin: (sample) => void target.begin(this.onPhoto(sample),
+        sample.button === penEraser ? 'eraser of pen' : sample.type === 'pen' ? 'pen' : 'pointer'),
       extend: (samples) => target.extend(samples.map((sample) => this.onPhoto(sample)), this.holdsAngle),
       end: () => target.end(),
       cancel: () => target.cancel(),
@@ -143,7 +145,7 @@ export class CanvasInput {
     if (this.paintsByKeys) {
       this.stopKeys();
     } else {
-      this.paintsByKeys = this.target.begin(place, false, true);
+      this.paintsByKeys = this.target.begin(place, 'keys');
     }
     return true;
   }

@@ -5,7 +5,7 @@
 export interface PointerSample {
   readonly id: number;
   readonly type: string; // "mouse", "pen", "touch"
-  readonly button: number; // of pointerdown: 0 first, 1 middle, 2 second
+  readonly button: number; // of pointerdown: 0 first, 1 middle, 2 second, 5 the eraser of a pen
   readonly x: number; // CSS px of the canvas
   readonly y: number;
   readonly pressure: number;
@@ -20,6 +20,7 @@ export interface GestureTarget {
   zoom(factor: number, x: number, y: number): void;
 }
 
+export const penEraser = 5;
 const earlyDistance = 12; // px that a finger may have painted when the second comes
 const earlyTime = 250; // ms
 
@@ -52,7 +53,7 @@ export class Gestures {
     } else if (sample.button === 2 || this.pickKey) {
       this.mode = 'wait';
       this.target.pick(sample);
-    } else if (sample.button === 0) {
+    } else if (sample.button === 0 || sample.button === penEraser) {
       this.mode = 'paint';
       this.began = { sample, time, moved: 0 };
       this.target.begin(sample);

@@ -86,6 +86,16 @@ test('with a pen, a resting hand leaves no marks', () => {
   assert.deepEqual(log, ['begin 5 5', 'end', 'pan 5 0']);
 });
 
+test('the eraser of a pen paints as what it is', () => {
+  const begun: number[] = [];
+  const { gestures } = setUp();
+  const target = { begin: ({ button }: PointerSample) => begun.push(button) };
+  Object.assign((gestures as unknown as { target: object }).target, target);
+  gestures.down(pointer(1, 5, 5, 'pen', 5), 0);
+  gestures.up(1);
+  assert.deepEqual(begun, [5]);
+});
+
 test('a lost pointer takes its stroke with it', () => {
   const { log, gestures } = setUp();
   gestures.down(pointer(1, 5, 5, 'touch'), 0);
