@@ -51,7 +51,6 @@ export class Painter {
   private readonly fileInput = element('input', { type: 'file', accept: '.json,application/json', hidden: true });
   private readonly dialog: HTMLDialogElement;
   private action: Action | undefined;
-  private lastFill: Fill = { color: '#5b7fa6' };
   private noteTimer: ReturnType<typeof setTimeout> | undefined;
   private luminanceTimer: ReturnType<typeof setTimeout> | undefined;
 
@@ -120,7 +119,6 @@ export class Painter {
     });
     this.fileInput.addEventListener('change', () => void this.openFile());
     this.store.onChange((now, before) => {
-      if (now.fill !== before.fill) this.lastFill = before.fill;
       if (now.luminance !== before.luminance) return;
       this.stage.root.dataset.tool = now.tool;
       this.stage.redraw();
@@ -208,6 +206,8 @@ export class Painter {
       scale: () => this.stage.view.scale,
       luminance: () => this.stage.layers.luminance,
     };
+    if (this.store.now.isComparing) this.store.set({ isComparing: false });
+    if (!this.store.now.layers.strokes.isShown) this.store.setLayer('strokes', { isShown: true });
     this.action = beginAction(input, sample, device === 'pen');
     if (tool !== 'eraser' && fill.color !== undefined && recent[0] !== fill.color) {
       this.store.set({ recent: withRecent(recent, fill.color, recentLimit) });
@@ -286,7 +286,7 @@ export class Painter {
         return store.set({ width: widthOfSlider(Math.min(100, Math.max(0, at)), largest) });
       }
       case 'swap':
-        return store.set({ fill: this.lastFill });
+        return this.swap();
       case 'compare':
         return store.set({ isComparing: !store.now.isComparing });
       case 'shortcuts':
@@ -300,6 +300,12 @@ export class Painter {
     }
   }
 
+  // Back to the colour of the stroke before.
+  private swap(): void {
+    const { fill, recent } = this.store.now;
+    const color = recent.find((one) => one !== fill.color);
+    if (color) this.store.set({ fill: { color } });
+  }
   private saveFile(): void {
     if (this.document.entries.length === 0) return this.say(this.texts.noStrokes);
     const url = URL.createObjectURL(new Blob([serializeStrokes(this.document.entries)], { type: 'application/json' }));

@@ -262,7 +262,13 @@ test('what is painted looks like its colour in the light of the photo', async ()
   await hand.key('c');
   const gray = await hand.pixel([100, 150]);
   assert.ok(Math.max(...gray.slice(0, 3)) - Math.min(...gray.slice(0, 3)) < 3);
-  await hand.key('c');
+  await hand.drag([40, 100], [160, 100]); // who paints sees it
+  assert.equal(await browser.evaluate('document.querySelector("[aria-label=\\"Show photo only\\"]").ariaPressed'), 'false');
+  await hand.press('Sky, #86b2d9');
+  await hand.click(200, 40);
+  await hand.key('x');
+  await hand.click(240, 40);
+  assert.deepEqual((await hand.strokes()).slice(2).map(({ color }) => color), ['#86b2d9', '#b5654a']);
 });
 
 test('every control has a name, and one can walk through all of them', async () => {
@@ -290,6 +296,16 @@ test('nothing breaks at 360 px with long words, and texts have contrast', async 
       }
     }
   }
+  await hand.window(360, 740, 'light', true);
+  await browser.evaluate('harness.mount()');
+  const before = await hand.box('.paint-stage');
+  await hand.tap('.paint-opener');
+  const after = await hand.box('.paint-stage');
+  assert.ok(after.height > before.height + 150, 'without the colours there is more of the photo');
+  await hand.tap('.paint-opener');
+  await hand.tap('[data-tool=line]');
+  const ends = await hand.touchDrag([[100, 80]], [[300, 200]]);
+  assert.deepEqual((await hand.strokes()).map(({ line }) => line), [ends]);
   await hand.window(1280, 800, 'light');
 });
 

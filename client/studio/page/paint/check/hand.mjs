@@ -152,6 +152,14 @@ export class Hand {
     return result;
   }
 
+  async tap(selector) {
+    const { x, y, width, height } = await this.box(selector);
+    const touch = (type, touchPoints) => this.browser.send('Input.dispatchTouchEvent', { type, touchPoints });
+    await touch('touchStart', [{ id: 0, x: x + width / 2, y: y + height / 2 }]);
+    await touch('touchEnd', []);
+    await this.frame();
+  }
+
   // Keys.
   async keyEvent(type, key, modifiers) {
     const code = { ' ': 32, Enter: 13, Escape: 27, Tab: 9, Home: 36, ArrowLeft: 37, ArrowUp: 38, ArrowRight: 39,

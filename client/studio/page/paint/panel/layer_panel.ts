@@ -20,6 +20,7 @@ export const layerPanel = (store: SettingsStore, photoHasColor: boolean, texts: 
   const rows = new Map(names.map(([layer, name]) => {
     const { box, row } = check(name, true, (isShown) => store.setLayer(layer, { isShown }));
     box.setAttribute('aria-label', filled(texts.shown, name));
+    store.onChange((now) => (box.checked = now.layers[layer].isShown));
     const opacity = slider(
       { label: name, min: 0, max: 100, value: 100 * store.now.layers[layer].opacity, text: (v) => `${v} %` },
       (v) => store.setLayer(layer, { opacity: v / 100 }));

@@ -50,7 +50,7 @@ export class CanvasInput {
       event.preventDefault();
       if (event.shiftKey) return stage.pan(-(event.deltaX || event.deltaY), 0);
       const { x, y } = this.sample(event, undefined);
-      stage.zoom(wheelFactor(event.deltaY, event.deltaMode), x, y);
+      stage.zoom(wheelFactor(event.deltaY, event.deltaMode, event.ctrlKey), x, y);
     }, { signal, passive: false });
     root.addEventListener('keydown', (event) => this.keyDown(event), { signal });
     root.addEventListener('keyup', (event) => this.keyUp(event), { signal });

@@ -114,8 +114,9 @@ export class Gestures {
   }
 }
 
-// The factor of a turn of the wheel: lines and pages of old mice count as px.
-export const wheelFactor = (deltaY: number, deltaMode: number): number => {
-  const px = deltaY * (deltaMode === 1 ? 16 : deltaMode === 2 ? 400 : 1);
+// The factor of a turn of the wheel: lines and pages of old mice count as px. A pinch on a touchpad comes as a wheel
+// with Ctrl, in smaller steps.
+export const wheelFactor = (deltaY: number, deltaMode: number, isPinch = false): number => {
+  const px = deltaY * (deltaMode === 1 ? 16 : deltaMode === 2 ? 400 : 1) * (isPinch ? 5 : 1);
   return Math.exp(-Math.max(-300, Math.min(300, px)) / 500);
 };
