@@ -1,5 +1,5 @@
-// The painter's files and formulas against the code of the service: the strokes that it writes, the pixels that they
-// cover, Lab, edge weights. Its own tests (*_test.ts) read the same fixtures.
+// The painter's files and formulas against the code of the service: the strokes that it writes, the
+// pixels that they cover, Lab, edge weights. Its own tests (*_test.ts) read the same fixtures.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -31,8 +31,7 @@ std::vector<std::string> Coverage(const std::vector<ColorHint>& hints) {
   std::vector<std::string> rows(kHeight, std::string(kWidth, '.'));
   NullObserver progress;
   for (size_t k = 0; k < hints.size(); ++k) {
-    const HintMap map =
-        DrawHints({hints[k]}, {}, kWidth, kHeight, progress, CancellationToken());
+    const HintMap map = DrawHints({hints[k]}, {}, kWidth, kHeight, progress, CancellationToken());
     for (int i = 0; i < kWidth * kHeight; ++i) {
       if (map.hinted[i]) rows[i / kWidth][i % kWidth] = "0123456789abcdefghijklmnopqrstuvwxyz"[k];
     }
@@ -46,6 +45,12 @@ Image EdgePhoto() {
     luminance.data[i] = static_cast<float>((i * 37) % 101) * (i % 3 == 0 ? 1.0f : 0.25f);
   }
   return luminance;
+}
+
+std::vector<float> Weights(const GridPlane& plane) {
+  std::vector<float> weights;
+  for (int i = 0; i < kEdgeWidth * kEdgeHeight; ++i) weights.push_back(plane[i]);
+  return weights;
 }
 
 nlohmann::json OfService() {
@@ -69,8 +74,8 @@ nlohmann::json OfService() {
             {"height", kEdgeHeight},
             {"sigma", kEdgeSigma},
             {"luminance", photo.data},
-            {"right", system.right},
-            {"down", system.down}}}};
+            {"right", Weights(system.right)},
+            {"down", Weights(system.down)}}}};
 }
 
 // Numbers agree to 1e-6, all else exactly.
