@@ -20,11 +20,11 @@
 namespace color3d {
 namespace {
 
-constexpr int kPosterPx = 900;     // longer side of the picture that is shown first
-constexpr int kPhotoPx = 480;      // longer side of the photos
-constexpr double kFramesPerSecond = 25.0;  // of scenes whose times are not seconds
+constexpr int kPosterPx = 900;              // longer side of the picture that is shown first
+constexpr int kPhotoPx = 480;               // longer side of the photos
+constexpr double kFramesPerSecond = 25.0;   // of scenes whose times are not seconds
 constexpr size_t kLargeBytes = 25'000'000;  // of a page that plays
-constexpr int kPhotoQuality = 80;  // of their JPEG
+constexpr int kPhotoQuality = 80;           // of their JPEG
 constexpr size_t kMaxPictures =
     48;  // photos with a picture; the others have a name and a camera only
 
@@ -57,7 +57,10 @@ void SetPlayable(const PlayableScene& playable, const ExportFrame& frame, ViewPa
   page->motion.emplace().file = playable.motion;
 }
 
-void SetTimes(const Scene& scene, int key_view, const StageContext& context, ViewPageMotion* motion) {
+void SetTimes(const Scene& scene,
+              int key_view,
+              const StageContext& context,
+              ViewPageMotion* motion) {
   const std::vector<double> times = scene.Times();
   motion->shown_s = scene.views[key_view].time_s();
   motion->steps = static_cast<int>(times.size());

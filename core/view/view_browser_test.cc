@@ -92,8 +92,7 @@ class BrowserTest : public BrowserFixture {
  protected:
   nlohmann::json Look(const std::string& file_name,
                       const std::vector<std::string>& environment = {}) {
-    return RunInBrowser(
-        COLOR3D_LOOK_AT_PAGE, PageOfWall(scratch_, file_name), {}, environment);
+    return RunInBrowser(COLOR3D_LOOK_AT_PAGE, PageOfWall(scratch_, file_name), {}, environment);
   }
 };
 

@@ -146,8 +146,7 @@ class ViewMotionTest : public BrowserFixture {
   // From the key view, with the browser's own share of the difference left out: colours of SOG.
   Image Ours(double time_s) {
     const View& key = scene_.views[0];
-    return SrgbFromLab(
-        RenderView(model_, key.camera, key.cam_from_world, pool_, 0.0f, time_s).lab);
+    return SrgbFromLab(RenderView(model_, key.camera, key.cam_from_world, pool_, 0.0f, time_s).lab);
   }
 
   const GaussianModel model_ = MovingThings();
@@ -196,7 +195,8 @@ TEST_F(ViewMotionTest, PlaysAsOurRendererDraws) {
   const GaussianModel still = ModelAt(model_, TimeOfStep(2), pool_);
   ViewPage still_page = PageAt(0.0);
   still_page.motion.reset();
-  still_page.file_bytes = EncodeSog(ForViewers(still, FitRgbHarmonics(still, pool_), {}, pool_), pool_);
+  still_page.file_bytes =
+      EncodeSog(ForViewers(still, FitRgbHarmonics(still, pool_), {}, pool_), pool_);
   const nlohmann::json looked = Play(Write(still_page), {});
   ASSERT_EQ(looked.at("state"), "ready");
   const double standing = PsnrOf(Seen("still"), Ours(TimeOfStep(2)));

@@ -57,7 +57,8 @@ ordered_json FilmJson(const Scene& scene,
     return pose_of(view).translation != pose_of(film[0]).translation ||
            !pose_of(view).rotation.isApprox(pose_of(film[0]).rotation, 1e-12);
   });
-  const size_t count = moves ? std::min(film.size(), kMaxFilmCameras) : std::min<size_t>(film.size(), 1);
+  const size_t count =
+      moves ? std::min(film.size(), kMaxFilmCameras) : std::min<size_t>(film.size(), 1);
   ordered_json cameras = ordered_json::array();
   for (size_t i = 0; i < count; ++i) {
     const size_t at = count > 1 ? i * (film.size() - 1) / (count - 1) : 0;
@@ -120,24 +121,22 @@ std::string Facts(const Scene& scene, const ViewPage& page) {
   // page = placement of ((file - offset) / scale).
   const double scale = placement.scale / page.file_scale;
   const Eigen::Vector3d center = page.file_scale * placement.center + page.file_offset;
-  ordered_json facts = {{"scene", page.file_name},
-                 {"packed", !page.file_is_compressed},
-                 {"frame",
-                  {{"rotation", Numbers(placement.rotation)},
-                   {"scale", scale},
-                   {"position", Numbers(Eigen::Vector3d(-scale * (placement.rotation * center)))}}},
-                 {"confidence",
-                  page.confidence.empty() ? "" : Base64(Gzip(ConfidenceBytes(page.confidence)))},
-                 {"key", key},
-                 {"turn", TurnJson(TurnOf(scene, page.key_view, placement))},
-                 {"poster", Base64(page.poster)},
-                 {"about", fmt::format(kAbout, ViewerName(), ViewerLicense())},
-                 {"photos", std::move(photos)}};
+  ordered_json facts = {
+      {"scene", page.file_name},
+      {"packed", !page.file_is_compressed},
+      {"frame",
+       {{"rotation", Numbers(placement.rotation)},
+        {"scale", scale},
+        {"position", Numbers(Eigen::Vector3d(-scale * (placement.rotation * center)))}}},
+      {"confidence", page.confidence.empty() ? "" : Base64(Gzip(ConfidenceBytes(page.confidence)))},
+      {"key", key},
+      {"turn", TurnJson(TurnOf(scene, page.key_view, placement))},
+      {"poster", Base64(page.poster)},
+      {"about", fmt::format(kAbout, ViewerName(), ViewerLicense())},
+      {"photos", std::move(photos)}};
   if (page.motion) facts["motion"] = MotionJson(scene, placement, *page.motion);
   return InHtml(facts);
 }
-
-
 
 }  // namespace
 

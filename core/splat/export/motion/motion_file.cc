@@ -234,8 +234,7 @@ MovingGaussians DecodeMotion(std::string_view bytes) {
   m.end_s = in.Double();
   Span centers, widths;
   float path = 0.0f, bend = 0.0f, turn = 0.0f;
-  for (float* v :
-       {&centers.low, &centers.high, &widths.low, &widths.high, &path, &bend, &turn}) {
+  for (float* v : {&centers.low, &centers.high, &widths.low, &widths.high, &path, &bend, &turn}) {
     *v = in.Float();
     if (!std::isfinite(*v)) throw RefuseMotion("its header has a number that is not finite");
   }

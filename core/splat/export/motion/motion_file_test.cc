@@ -24,9 +24,7 @@ MovingGaussians SomeMovers(size_t count) {
   m.begin_s = 0.5;
   m.end_s = 4.5;
   m.total = static_cast<uint32_t>(3 * count + 2);
-  const auto number = [&](double size) {
-    return static_cast<float>(size * random.NextNormal());
-  };
+  const auto number = [&](double size) { return static_cast<float>(size * random.NextNormal()); };
   for (size_t i = 0; i < count; ++i) {
     m.index.push_back(static_cast<uint32_t>(3 * i + 1));
     m.center.push_back(number(0.6));
@@ -52,8 +50,7 @@ void ExpectWithinBound(const std::vector<float>& got,
                        double steps,
                        const MovingGaussians& decoded) {
   const auto scaled = [&](const std::vector<float>& values, size_t i) {
-    const double reach =
-        MotionReach(decoded.center[i / width], decoded.log_width[i / width]);
+    const double reach = MotionReach(decoded.center[i / width], decoded.log_width[i / width]);
     return values[i] * std::pow(reach, power);
   };
   double most = 0.0;
@@ -187,8 +184,7 @@ TEST(PlayableSceneTest, MovesAsTheModelDoes) {
   ASSERT_TRUE(IsPlayable(model));
   EXPECT_FALSE(IsPlayable(ModelAt(model, 2.0, pool)));
   const ExportFrame frame{2.0, {1.0, -2.0, 3.0}};
-  const PlayableScene scene =
-      EncodePlayable(model, FitRgbHarmonics(model, pool), frame, pool);
+  const PlayableScene scene = EncodePlayable(model, FitRgbHarmonics(model, pool), frame, pool);
   const MovingGaussians m = DecodeMotion(scene.motion);
   ASSERT_EQ(m.size(), model.motion.size());
   ASSERT_EQ(m.total, model.size());
@@ -240,8 +236,8 @@ TEST(PlayableSceneTest, LeavesOutWhatNoTimeShows) {
   EXPECT_LE(seen.size(), model.size() - 2);
   EXPECT_LE(seen.motion.size(), model.motion.size() - 1);
   EXPECT_EQ(std::count(seen.position.begin(), seen.position.end(), model.position[0]), 0);
-  EXPECT_EQ(
-      std::count(seen.position.begin(), seen.position.end(), model.position[3 * (first + 1)]), 0);
+  EXPECT_EQ(std::count(seen.position.begin(), seen.position.end(), model.position[3 * (first + 1)]),
+            0);
   const Camera camera{64, 48, 60.0, 60.0, 32.0, 24.0};
   Pose pose;
   pose.translation = {0.0, 0.0, 6.0};
