@@ -29,7 +29,7 @@ class BrowserFixture : public ::testing::Test {
                               const std::string& page,
                               const std::vector<std::string>& arguments,
                               const std::vector<std::string>& environment = {}) {
-    const std::string log = scratch_.path() / "log";
+    const std::string log = scratch_.path() / ("log" + std::to_string(++runs_));
     std::vector<std::string> command = {"node", script, chromium_, page};
     command.insert(command.end(), arguments.begin(), arguments.end());
     const SubprocessResult result = RunSubprocess({.arguments = command,
@@ -59,6 +59,7 @@ class BrowserFixture : public ::testing::Test {
   }
 
   std::string chromium_;
+  int runs_ = 0;
 };
 
 }  // namespace color3d

@@ -28,10 +28,22 @@ const key = async (name) => {
   await send('Input.dispatchKeyEvent', { type: text ? 'keyDown' : 'rawKeyDown', text, ...event });
   await send('Input.dispatchKeyEvent', { type: 'keyUp', ...event });
 };
-const shoot = async (name) => {
+const picture = async () => {
   const { data } = await send('Page.captureScreenshot', {
     format: 'png', clip: { x: 0, y: 0, width: Number(width), height: Number(height), scale: 1 } });
-  writeFileSync(join(folder, name + '.png'), Buffer.from(data, 'base64'));
+  return data;
+};
+const save = (name, data) => writeFileSync(join(folder, name + '.png'), Buffer.from(data, 'base64'));
+// Once the viewer has sorted and drawn: when three pictures in a row are the same.
+const shoot = async (name) => {
+  let same = 0, before = '';
+  for (let i = 0; i < 40 && same < 2; ++i) {
+    await pause(500);
+    const now = await picture();
+    same = now === before ? same + 1 : 0;
+    before = now;
+  }
+  save(name, before);
 };
 const clock = () => evaluate('document.getElementById("clock").textContent');
 const position = () => evaluate('Number(document.getElementById("moment").value)');
@@ -76,7 +88,6 @@ const look = async () => {
   for (const stop of stops) {
     await key('Home');
     for (let i = await position(); i < Number(stop); ++i) await key('ArrowRight');
-    await pause(2500);
     result.clocks.push(await clock());
     await shoot(stop);
   }
@@ -92,7 +103,7 @@ const look = async () => {
   const before = await heap();
   result.loops = await playLoops(8);
   result.heap = [before, await heap()];
-  await shoot('playing');
+  save('playing', await picture());
   await key(' ');
   result.keys.space_pauses = await evaluate('document.getElementById("play").getAttribute("aria-pressed")');
   const stopped = await position();

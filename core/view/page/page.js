@@ -354,6 +354,7 @@ const start = async () => {
     if (entity.gsplat) prepare(entity, confidence);
   });
   viewer.app.on('update', placeCamera);
+  if (player) viewer.app.scene.on('gsplat:sorted', player.onSorted);
   viewer.events.on('loaded:changed', () => {
     viewer.state.cameraMode = 'orbit';
     wireButtons();

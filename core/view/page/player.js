@@ -7,11 +7,13 @@ const press = (button, on) => button.setAttribute('aria-pressed', String(on));
 const pressed = (button) => button.getAttribute('aria-pressed') === 'true';
 const span = motion.end - motion.begin || 1;
 const kSortMs = 100;  // at most so often the sorter is told where Gaussians are
+const kMaxResends = 6;
 const kFine = 10;     // stops of the slider between two time steps
 
 let share = 0;        // of the time, 0..1
 let playing = false, last = 0;
 let follow = null, resource = null, sortedAt = -Infinity, sortedShare = NaN;
+let resends = 0, again = 0;
 
 const slider = $('moment');
 slider.max = String(kFine * (facts.steps - 1));
@@ -37,7 +39,8 @@ const showShare = (value, fromSlider = false) => {
   const text = label();
   $('clock').textContent = text;
   slider.setAttribute('aria-valuetext', text.replace('/', 'of'));
-  hooks.show(2 * share - 1);
+  resends = 0;
+  again = 1;
 };
 
 const play = (on) => {
@@ -46,6 +49,14 @@ const play = (on) => {
   last = performance.now();
   press($('play'), on);
   $('play').textContent = on ? 'Pause' : 'Play';
+};
+
+// The viewer forgets a change of time that meets a new order of Gaussians, so the time is sent again
+// after an order has come; a few times for each change, because sending it asks for another order.
+const onSorted = () => {
+  if (resends >= kMaxResends) return;
+  ++resends;
+  again = 2;
 };
 
 // Once for each frame of the browser.
@@ -65,6 +76,10 @@ const tick = () => {
   }
   last = now;
   sort(now);
+  if (again > 0) {
+    --again;
+    hooks.show(2 * share - 1);
+  }
 };
 
 // One time step, or a tenth of one, on.
@@ -143,5 +158,5 @@ const attach = (gsplat, sortedByWorker) => {
   if (sortedByWorker) follow = places;
 };
 
-return { attach, wire, tick, camera, showShown };
+return { attach, wire, tick, onSorted, camera, showShown };
 };
