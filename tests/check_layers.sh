@@ -173,7 +173,7 @@ public core/scene camera frame_numbers frame_times import_options key_photo phot
   masks/masked_points masks/still_regions
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/geometry_in_time raster/render \
   geometry/geometry_options geometry/geometry_trainer geometry/warm_up chroma/chroma_adjustment chroma/chroma_fit chroma/chroma_options \
-  export/export export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene \
+  export/export export/motion/playable_scene export/glb/glb export/rgb_refine export/sog/sog export/splat4d/splat4d export/spz/spz import/splat_scene \
   training/hexplane_training
 public core/stage idle_stages run_stages film_import/import_film formats/artifact_io options/[a-z_]+
 public core/trace span trace_context trace_settings tracer

@@ -9,6 +9,7 @@
 
 #include "core/base/range_check.h"
 #include "core/splat/export/glb/glb.h"
+#include "core/splat/export/motion/playable_scene.h"
 #include "core/splat/export/rgb_refine.h"
 #include "core/splat/export/sog/sog.h"
 #include "core/splat/export/splat4d/splat4d.h"
@@ -17,6 +18,7 @@
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
 #include "core/stage/write_view_page.h"
+#include "core/view/view_page.h"
 
 namespace color3d {
 namespace {
@@ -30,7 +32,8 @@ std::vector<RgbView> ViewsToCompare(const Scene& scene, std::vector<std::string>
   const size_t wanted = std::min(count, kMaxViews);
   for (size_t i = 0; i < wanted; ++i) {
     const View& view = scene.views[i * count / wanted];
-    views.push_back({view.camera.FitWithin(kSidePx), view.cam_from_world, !view.held_out});
+    views.push_back(
+        {view.camera.FitWithin(kSidePx), view.cam_from_world, !view.held_out, view.time_s()});
     names->push_back(view.name);
   }
   return views;
@@ -80,12 +83,32 @@ class Exporter {
       }
     }
     if (context_.HasInput(artifact::kKeyView)) {
-      WriteViewPage(scene_, shown_, model_, in_time_.IsDynamic(), page_file_, context_);
+      WritePage();
     }
     context_.WriteOutput(artifact::kExportScores, scores_.dump(1) + "\n");
   }
 
  private:
+  void WritePage() {
+    std::optional<PlayableScene> playable;
+    if (IsPlayable(in_time_) && HasViewer() && !page_file_.name.empty()) {
+      const GaussianModel seen = EverSeen(in_time_);
+      const RgbRefinement rgb = Refine(seen, FitRgbHarmonics(seen, context_.pool()));
+      scores_["page"] = ScoresOf(rgb, view_names_);
+      playable = EncodePlayable(seen, rgb.harmonics, frame_, context_.pool());
+    } else if (in_time_.IsDynamic() && HasViewer() && !page_file_.name.empty()) {
+      context_.Warn("the deformation of this scene is a field: {} shows the time of the key view",
+                    artifact::kViewPage);
+    }
+    WriteViewPage(scene_,
+                  shown_,
+                  model_,
+                  in_time_.IsDynamic(),
+                  page_file_,
+                  playable ? &*playable : nullptr,
+                  context_);
+  }
+
   // The one list of writers.
   void Write(ExportFormat format) {
     switch (format) {
@@ -121,10 +144,10 @@ class Exporter {
     page_file_ = {name, std::move(bytes)};
   }
 
-  RgbRefinement Refine(RgbHarmonics start) {
+  RgbRefinement Refine(const GaussianModel& model, RgbHarmonics start) {
     RgbRefineOptions options;
     options.seed = context_.seed();
-    return RefineRgbHarmonics(model_, std::move(start), views_, options, context_.control());
+    return RefineRgbHarmonics(model, std::move(start), views_, options, context_.control());
   }
 
   const RgbHarmonics& Fitted() {
@@ -135,7 +158,7 @@ class Exporter {
   // With view dependence, refined against our own renders.
   const RgbHarmonics& Harmonics() {
     if (!harmonics_) {
-      RgbRefinement rgb = Refine(Fitted());
+      RgbRefinement rgb = Refine(model_, Fitted());
       context_.progress().OnError(0, "ply_psnr_db", rgb.before.mean_psnr_db);
       context_.progress().OnError(RgbRefineOptions().epochs, "ply_psnr_db", rgb.after.mean_psnr_db);
       scores_["ply"] = ScoresOf(rgb, view_names_);
@@ -150,7 +173,7 @@ class Exporter {
   }
 
   std::string Splat() {
-    const RgbRefinement rgb = Refine(DegreeZero(Fitted()));
+    const RgbRefinement rgb = Refine(model_, DegreeZero(Fitted()));
     scores_["splat"] = ScoresOf(rgb, view_names_);
     return EncodeSplat(model_, rgb.harmonics, frame_, context_.pool());
   }

@@ -4,8 +4,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/base/text/base64.h"
+#include "core/splat/export/motion/playable_scene.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
+#include "core/view/view_page.h"
+#include "core/zip/gzip.h"
 #include "tests/support/formats/splat4d_reader.h"
 #include "tests/support/formats/viewer_files.h"
 #include "tests/support/stages/stage_fixture.h"
@@ -97,6 +101,29 @@ TEST_F(ExportDynamicTest, WritesAPlyForEachTime) {
   EXPECT_EQ(one.outputs(), (std::vector<std::string>{"moments/00001.ply", "export.json"}));
   const ViewerGaussians middle = ReadPly(ReadFile(scratch_.path() / "out/moments/00001.ply"));
   EXPECT_NEAR(BallX({middle.position.begin(), middle.position.end()}), 0.0, 1e-5);
+}
+
+TEST_F(ExportDynamicTest, PagePlaysAllTimes) {
+  if (!HasViewer())
+    GTEST_SKIP() << "skipped, because the viewer was left out of this build (no npm)";
+  StageContext context = MakeContext();
+  RunExport({.formats = {ExportFormat::kSog}}, context);
+  const std::string html = ReadFile(scratch_.path() / "out/view.html");
+  const auto between = [&](const std::string& begin) {
+    const size_t at = html.find(begin) + begin.size();
+    return html.substr(at, html.find("</script>", at) - at);
+  };
+  const auto facts = nlohmann::json::parse(between("id=\"facts\">")).at("motion");
+  EXPECT_EQ(facts.at("shown"), 1.0);
+  EXPECT_EQ(facts.at("steps"), 3);
+  EXPECT_EQ(facts.at("film").size(), 3u);  // the camera moves
+  EXPECT_EQ(facts.at("film").at(2).at("time"), 2.0);
+  const GaussianModel seen = EverSeen(BallBeforeWall(0.0, 2.0));
+  const std::string motion =
+      EncodePlayable(seen, FitRgbHarmonics(seen, context.pool()), {}, context.pool()).motion;
+  EXPECT_EQ(between("id=\"motion\">"), Base64(Gzip(motion)));
+  const auto scores = nlohmann::json::parse(ReadFile(scratch_.path() / "out/export.json"));
+  EXPECT_GT(scores.at("page").at("psnr_db_vs_lab"), 30.0);
 }
 
 TEST_F(ExportDynamicTest, Splat4dHasAFrameForEachTime) {

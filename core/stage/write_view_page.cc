@@ -13,15 +13,18 @@
 #include "core/splat/model/gaussian_model.h"
 #include "core/splat/raster/render.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/movie/film_clock.h"
 #include "core/stage/sources/focus.h"
 #include "core/view/view_page.h"
 
 namespace color3d {
 namespace {
 
-constexpr int kPosterPx = 900;     // longer side of the picture that is shown first
-constexpr int kPhotoPx = 480;      // longer side of the photos
-constexpr int kPhotoQuality = 80;  // of their JPEG
+constexpr int kPosterPx = 900;              // longer side of the picture that is shown first
+constexpr int kPhotoPx = 480;               // longer side of the photos
+constexpr double kFramesPerSecond = 25.0;   // of scenes whose times are not seconds
+constexpr size_t kLargeBytes = 25'000'000;  // of a page that plays
+constexpr int kPhotoQuality = 80;           // of their JPEG
 constexpr size_t kMaxPictures =
     48;  // photos with a picture; the others have a name and a camera only
 
@@ -42,6 +45,29 @@ void SetScene(const GaussianModel& model,
   const std::vector<uint32_t> order =
       SogOrder(ForViewers(model, no_colors, frame, context.pool()).position);
   for (size_t i = 0; i < order.size(); ++i) page->confidence[i] = model.confidence[order[i]];
+}
+
+void SetPlayable(const PlayableScene& playable, const ExportFrame& frame, ViewPage* page) {
+  page->file_scale = frame.scale;
+  page->file_offset = frame.offset;
+  page->file_is_compressed = true;
+  page->file_name = artifact::kSog;
+  page->file_bytes = playable.sog;
+  page->confidence = playable.confidence;
+  page->motion.emplace().file = playable.motion;
+}
+
+void SetTimes(const Scene& scene,
+              int key_view,
+              const StageContext& context,
+              ViewPageMotion* motion) {
+  const std::vector<double> times = scene.Times();
+  motion->shown_s = scene.views[key_view].time_s();
+  motion->steps = static_cast<int>(times.size());
+  motion->times_are_known = TimesAreSeconds(scene, FindImportFacts(context));
+  motion->seconds = motion->times_are_known ? times.back() - times.front()
+                                            : static_cast<double>(times.size()) / kFramesPerSecond;
+  motion->film = scene.FramesInShot(key_view);
 }
 
 // The photos; for dynamic scenes those of the time of the key view.
@@ -76,6 +102,7 @@ bool WriteViewPage(const Scene& scene,
                    const GaussianModel& model,
                    bool moves,
                    const ExportedFile& file,
+                   const PlayableScene* playable,
                    StageContext& context) {
   if (file.name.empty()) return false;
   if (!HasViewer()) {
@@ -89,12 +116,23 @@ bool WriteViewPage(const Scene& scene,
   const RenderedView rendered = RenderView(model, camera, key.cam_from_world, context.pool());
 
   ViewPage page;
-  SetScene(model, ExportFrameOf(scene), file, context, &page);
+  if (playable == nullptr) {
+    SetScene(model, ExportFrameOf(scene), file, context, &page);
+  } else {
+    SetPlayable(*playable, ExportFrameOf(scene), &page);
+    SetTimes(scene, key_view, context, &*page.motion);
+  }
   page.key_view = key_view;
   page.focus = FocusOf(key, camera, rendered.median_depth);
   page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);
   page.photos = PhotosOf(scene, key_view, moves, context);
-  context.WriteOutput(artifact::kViewPage, RenderViewPage(scene, page));
+  const std::string html = RenderViewPage(scene, page);
+  if (playable != nullptr && html.size() > kLargeBytes) {
+    context.Warn("{} has {} MB; fewer Gaussians (max_gaussians) make it smaller",
+                 artifact::kViewPage,
+                 html.size() / 1'000'000);
+  }
+  context.WriteOutput(artifact::kViewPage, html);
   return true;
 }
 

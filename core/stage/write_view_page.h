@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/scene/scene.h"
+#include "core/splat/export/motion/playable_scene.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/context/stage_context.h"
 
@@ -15,14 +16,16 @@ struct ExportedFile {
 };
 
 // Writes artifact::kViewPage, which contains `file` and opens at the key view. `moves`: the model
-// is that of the time of the key view, and the page has the photos of this time only. Returns false
-// and writes nothing if there is no file or, with a warning, if this build has no viewer. Throws
+// is that of the time of the key view, and the page has the photos of this time only. `playable`:
+// what a page that plays contains instead of `file`; null: a page of one time. Returns false and
+// writes nothing if there is no file or, with a warning, if this build has no viewer. Throws
 // Error{kCancelled} and the errors of reading the photos.
 bool WriteViewPage(const Scene& scene,
                    int key_view,
                    const GaussianModel& model,
                    bool moves,
                    const ExportedFile& file,
+                   const PlayableScene* playable,
                    StageContext& context);
 
 }  // namespace color3d

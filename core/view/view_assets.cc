@@ -9,6 +9,8 @@
 ASSET(page_template);
 ASSET(page_style);
 ASSET(page_script);
+ASSET(page_motion_script);
+ASSET(page_player_script);
 ASSET(viewer_program);
 ASSET(viewer_license);
 #undef ASSET
@@ -28,6 +30,12 @@ std::string_view PageTemplate() {
 std::string_view PageStyle() { return Between(color3d_page_style_begin, color3d_page_style_end); }
 std::string_view PageScript() {
   return Between(color3d_page_script_begin, color3d_page_script_end);
+}
+std::string_view PageMotionScript() {
+  return Between(color3d_page_motion_script_begin, color3d_page_motion_script_end);
+}
+std::string_view PagePlayerScript() {
+  return Between(color3d_page_player_script_begin, color3d_page_player_script_end);
 }
 std::string_view ViewerProgram() {
   return Between(color3d_viewer_program_begin, color3d_viewer_program_end);

@@ -9,6 +9,10 @@ std::string_view PageTemplate();  // page/page.html
 std::string_view PageStyle();     // page/page.css
 std::string_view PageScript();    // page/page.js
 
+// For scenes that move, before the script of the page.
+std::string_view PageMotionScript();  // page/motion.js
+std::string_view PagePlayerScript();  // page/player.js
+
 // The viewer's module (gzip) and its licence; both empty if left out at build time.
 std::string_view ViewerProgram();
 std::string_view ViewerLicense();

@@ -2,33 +2,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
-#include "core/base/process/subprocess.h"
 #include "core/image/codec.h"
 #include "core/splat/export/export.h"
 #include "core/splat/export/sog/sog.h"
+#include "core/view/browser_fixture.h"
 #include "core/view/view_page.h"
 
 namespace color3d {
 namespace {
 
 constexpr float kShDc = 0.28209479f;
-
-std::string FirstOf(const std::vector<std::string>& programs) {
-  for (const std::string& program : programs) {
-    try {
-      if (RunSubprocess({.arguments = {program, "--version"}}, CancellationToken()).exit_code ==
-          0) {
-        return program;
-      }
-    } catch (const Error&) {  // not installed
-    }
-  }
-  return "";
-}
 
 // A wall that the camera sees as two halves: red and seen on its left, blue and guessed on its
 // right. Its Gaussians are not in the order of any viewer.
@@ -102,31 +88,12 @@ std::string PageOfWall(const ScratchFolder& folder, const std::string& file_name
   return file;
 }
 
-class BrowserTest : public ::testing::Test {
+class BrowserTest : public BrowserFixture {
  protected:
-  void SetUp() override {
-    if (!HasViewer()) GTEST_SKIP() << "skipped, because the viewer was left out of this build";
-    chromium_ = FirstOf({"chromium", "chromium-browser", "google-chrome"});
-    if (chromium_.empty()) GTEST_SKIP() << "skipped, because there is no Chromium";
-    if (FirstOf({"node"}).empty()) GTEST_SKIP() << "skipped, because there is no Node";
-  }
   nlohmann::json Look(const std::string& file_name,
                       const std::vector<std::string>& environment = {}) {
-    const std::string page = PageOfWall(scratch_, file_name);
-    const std::string log = scratch_.path() / "log";
-    const SubprocessResult result =
-        RunSubprocess({.arguments = {"node", COLOR3D_LOOK_AT_PAGE, chromium_, page},
-                       .environment = environment,
-                       .log_path = log,
-                       .timeout = std::chrono::seconds(150)},
-                      CancellationToken());
-    const std::string text = ReadFile(log);
-    EXPECT_EQ(result.exit_code, 0) << text;
-    return nlohmann::json::parse(text);
+    return RunInBrowser(COLOR3D_LOOK_AT_PAGE, PageOfWall(scratch_, file_name), {}, environment);
   }
-
-  std::string chromium_;
-  ScratchFolder scratch_;
 };
 
 // red, green, blue of a half in a step, 0..255.

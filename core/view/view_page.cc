@@ -18,6 +18,7 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int kTurnSeconds = 24;  // one camera position per second
+constexpr size_t kMaxFilmCameras = 600;
 
 constexpr const char* kAbout =
     "A scene of monochrome photos in colour, made by Color3D. All of it is in this file; nothing "
@@ -29,18 +30,54 @@ constexpr const char* kAbout =
 ordered_json Numbers(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 ordered_json Numbers(const Eigen::Quaterniond& q) { return {q.x(), q.y(), q.z(), q.w()}; }
 
-ordered_json PhotoJson(const ScenePlacement& placement, const View& view, const std::string& jpeg) {
+void PutCamera(const ScenePlacement& placement, const View& view, ordered_json* json) {
   const PageCamera pose = PlaceCamera(placement, view);
   const Camera& camera = view.camera;
-  return {{"name", view.name},
-          {"held_out", view.held_out},
-          {"position", Numbers(pose.position)},
-          {"rotation", Numbers(pose.rotation)},
-          {"target", Numbers(pose.target)},
-          {"aspect", static_cast<double>(camera.width) / camera.height},
-          {"tan", 0.5 * camera.height / camera.fy},  // half the vertical field of view
-          {"center", {camera.cx / camera.width, camera.cy / camera.height}},
-          {"jpeg", Base64(jpeg)}};
+  (*json)["position"] = Numbers(pose.position);
+  (*json)["rotation"] = Numbers(pose.rotation);
+  (*json)["target"] = Numbers(pose.target);
+  (*json)["aspect"] = static_cast<double>(camera.width) / camera.height;
+  (*json)["tan"] = 0.5 * camera.height / camera.fy;  // half the vertical field of view
+  (*json)["center"] = {camera.cx / camera.width, camera.cy / camera.height};
+}
+
+ordered_json PhotoJson(const ScenePlacement& placement, const View& view, const std::string& jpeg) {
+  ordered_json photo = {{"name", view.name}, {"held_out", view.held_out}};
+  PutCamera(placement, view, &photo);
+  photo["jpeg"] = Base64(jpeg);
+  return photo;
+}
+
+// Cameras of the film with their times, at most kMaxFilmCameras; one if the camera stands still.
+ordered_json FilmJson(const Scene& scene,
+                      const ScenePlacement& placement,
+                      const std::vector<int>& film) {
+  const auto pose_of = [&](int view) -> const Pose& { return scene.views.at(view).cam_from_world; };
+  const bool moves = std::ranges::any_of(film, [&](int view) {
+    return pose_of(view).translation != pose_of(film[0]).translation ||
+           !pose_of(view).rotation.isApprox(pose_of(film[0]).rotation, 1e-12);
+  });
+  const size_t count =
+      moves ? std::min(film.size(), kMaxFilmCameras) : std::min<size_t>(film.size(), 1);
+  ordered_json cameras = ordered_json::array();
+  for (size_t i = 0; i < count; ++i) {
+    const size_t at = count > 1 ? i * (film.size() - 1) / (count - 1) : 0;
+    const View& view = scene.views.at(film[at]);
+    ordered_json camera = {{"time", view.time_s()}};
+    PutCamera(placement, view, &camera);
+    cameras.push_back(std::move(camera));
+  }
+  return cameras;
+}
+
+ordered_json MotionJson(const Scene& scene,
+                        const ScenePlacement& placement,
+                        const ViewPageMotion& motion) {
+  return {{"shown", motion.shown_s},
+          {"seconds", motion.seconds},
+          {"steps", motion.steps},
+          {"in_seconds", motion.times_are_known},
+          {"film", FilmJson(scene, placement, motion.film)}};
 }
 
 ordered_json TurnJson(const Turn& turn) {
@@ -84,19 +121,21 @@ std::string Facts(const Scene& scene, const ViewPage& page) {
   // page = placement of ((file - offset) / scale).
   const double scale = placement.scale / page.file_scale;
   const Eigen::Vector3d center = page.file_scale * placement.center + page.file_offset;
-  return InHtml({{"scene", page.file_name},
-                 {"packed", !page.file_is_compressed},
-                 {"frame",
-                  {{"rotation", Numbers(placement.rotation)},
-                   {"scale", scale},
-                   {"position", Numbers(Eigen::Vector3d(-scale * (placement.rotation * center)))}}},
-                 {"confidence",
-                  page.confidence.empty() ? "" : Base64(Gzip(ConfidenceBytes(page.confidence)))},
-                 {"key", key},
-                 {"turn", TurnJson(TurnOf(scene, page.key_view, placement))},
-                 {"poster", Base64(page.poster)},
-                 {"about", fmt::format(kAbout, ViewerName(), ViewerLicense())},
-                 {"photos", std::move(photos)}});
+  ordered_json facts = {
+      {"scene", page.file_name},
+      {"packed", !page.file_is_compressed},
+      {"frame",
+       {{"rotation", Numbers(placement.rotation)},
+        {"scale", scale},
+        {"position", Numbers(Eigen::Vector3d(-scale * (placement.rotation * center)))}}},
+      {"confidence", page.confidence.empty() ? "" : Base64(Gzip(ConfidenceBytes(page.confidence)))},
+      {"key", key},
+      {"turn", TurnJson(TurnOf(scene, page.key_view, placement))},
+      {"poster", Base64(page.poster)},
+      {"about", fmt::format(kAbout, ViewerName(), ViewerLicense())},
+      {"photos", std::move(photos)}};
+  if (page.motion) facts["motion"] = MotionJson(scene, placement, *page.motion);
+  return InHtml(facts);
 }
 
 }  // namespace
@@ -112,10 +151,15 @@ std::string RenderViewPage(const Scene& scene, const ViewPage& page) {
       Base64(page.file_is_compressed ? page.file_bytes : Gzip(page.file_bytes));
   const std::string facts = Facts(scene, page);
   const std::string program = Base64(ViewerProgram());
+  const std::string motion = page.motion ? Base64(Gzip(page.motion->file)) : "";
+  const std::string player =
+      page.motion ? fmt::format("{}\n{}", PageMotionScript(), PagePlayerScript()) : "";
   const std::pair<std::string_view, std::string_view> parts[] = {{"@STYLE@", PageStyle()},
                                                                  {"@FACTS@", facts},
                                                                  {"@SCENE@", scene_text},
+                                                                 {"@MOTION@", motion},
                                                                  {"@PROGRAM@", program},
+                                                                 {"@PLAYER@", player},
                                                                  {"@SCRIPT@", PageScript()}};
   std::string html;
   std::string_view rest = PageTemplate();

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,16 @@ struct ViewPagePhoto {
   std::string jpeg;  // undistorted, any size; empty: camera without picture
 };
 
+// Motion of the Gaussians, and how it plays.
+struct ViewPageMotion {
+  std::string file;             // core/splat/export/motion/FORMAT.md, of the same Gaussians
+  double shown_s = 0.0;         // time at which the page opens, seconds of the scene
+  double seconds = 1.0;         // duration of one playing, > 0
+  int steps = 2;                // distinct times of the photos, >= 2
+  bool times_are_known = true;  // false: the label counts steps, not seconds
+  std::vector<int> film;        // views of the film of the key view's camera, in order of time
+};
+
 struct ViewPage {
   // The exported file and the transform of its coordinates: file = scale * scene + offset.
   std::string file_name;  // its extension gives the format: .ply, .sog
@@ -34,6 +45,7 @@ struct ViewPage {
   int key_view = 0;                                 // index in the scene; must be among `photos`
   Eigen::Vector3d focus = Eigen::Vector3d::Zero();  // its focus, in the scene's units
   std::string poster;                               // JPEG of the scene from the key view
+  std::optional<ViewPageMotion> motion;             // nullopt: a still scene
   std::vector<ViewPagePhoto> photos;
 };
 

@@ -74,6 +74,32 @@ TEST(ViewPageTest, PageIsSelfContained) {
   EXPECT_LT((scale * (rotation * Eigen::Vector3d(10.0, 0.0, 8.0)) + position).norm(), 1e-9);
 }
 
+TEST(ViewPageTest, StillScenesHaveNoPlayerAndMovingOnesHave) {
+  if (!HasViewer())
+    GTEST_SKIP() << "skipped, because the viewer was left out of this build (no npm)";
+  ViewPage page = SmallPage();
+  const std::string still = RenderViewPage(TwoViews(), page);
+  EXPECT_EQ(Between(still, "id=\"motion\">", "</script>"), "");
+  EXPECT_EQ(still.find("const color3dPlayer"), std::string::npos);
+  EXPECT_EQ(still.find("\"motion\":"), std::string::npos);
+  page.motion =
+      ViewPageMotion{.file = "moves", .shown_s = 0.5, .seconds = 2.0, .steps = 4, .film = {0, 1}};
+  const std::string moving = RenderViewPage(TwoViews(), page);
+  EXPECT_EQ(Between(moving, "id=\"motion\">", "</script>"), Base64(Gzip("moves")));
+  EXPECT_NE(moving.find("const color3dPlayer"), std::string::npos);
+  const auto facts = nlohmann::json::parse(Between(moving, "id=\"facts\">", "</script>"));
+  EXPECT_EQ(facts.at("motion").at("shown"), 0.5);
+  EXPECT_EQ(facts.at("motion").at("steps"), 4);
+  EXPECT_EQ(facts.at("motion").at("film").size(), 2u);
+  page.motion->film = {0, 0, 0};  // a camera that stands
+  const std::string standing = RenderViewPage(TwoViews(), page);
+  EXPECT_EQ(nlohmann::json::parse(Between(standing, "id=\"facts\">", "</script>"))
+                .at("motion")
+                .at("film")
+                .size(),
+            1u);
+}
+
 TEST(ViewPageTest, KeepsCompressedFileAndNeedsKeyView) {
   if (!HasViewer())
     GTEST_SKIP() << "skipped, because the viewer was left out of this build (no npm)";

@@ -9,6 +9,7 @@
 #include "core/color/lab.h"
 #include "core/splat/model/model_parameters.h"
 #include "core/splat/model/spherical_harmonics.h"
+#include "core/splat/motion/geometry_in_time.h"
 #include "core/splat/raster/pipeline.h"
 #include "core/splat/raster/raster_camera.h"
 #include "core/splat/raster/render.h"
@@ -63,7 +64,8 @@ class Refiner {
         options_(options),
         run_(run),
         degree_(start.degree),
-        parameters_(RgbParameters(model, start)) {
+        parameters_(RgbParameters(model, start)),
+        in_time_(model, run.pool) {
     const int coefficients = ShCoefficients(degree_);
     color_.channels = 3;
     for (int c = 0; c < 3; ++c) {
@@ -77,7 +79,8 @@ class Refiner {
   void RenderTargets(const GaussianModel& model) {
     for (const RgbView& view : views_) {
       run_.cancel.ThrowIfCancelled();
-      const RenderedView rendered = RenderView(model, view.camera, view.cam_from_world, run_.pool);
+      const RenderedView rendered =
+          RenderView(model, view.camera, view.cam_from_world, run_.pool, 0.0f, view.time_s);
       targets_.push_back(PlanesFromImage(SrgbFromLab(rendered.lab), 0.0f, 1.0f));
     }
   }
@@ -88,7 +91,7 @@ class Refiner {
     loss.worst_view = 0;
     for (size_t v = 0; v < views_.size(); ++v) {
       run_.cancel.ThrowIfCancelled();
-      pipeline_.Forward({parameters_, color_, cameras_[v]}, kBlack, false, run_.pool);
+      pipeline_.Forward({At(v), color_, cameras_[v]}, kBlack, false, run_.pool);
       const double psnr = Psnr(Residual(v));
       loss.mean_psnr_db += psnr / static_cast<double>(views_.size());
       if (psnr < loss.worst_psnr_db) {
@@ -115,9 +118,10 @@ class Refiner {
       }
       for (const size_t v : order) {
         run_.cancel.ThrowIfCancelled();
-        pipeline_.Forward({parameters_, color_, cameras_[v]}, kBlack, false, run_.pool);
+        const ParameterBlock& at = At(v);
+        pipeline_.Forward({at, color_, cameras_[v]}, kBlack, false, run_.pool);
         if (!std::isfinite(Residual(v))) return false;
-        pipeline_.Backward({parameters_, color_, cameras_[v]},
+        pipeline_.Backward({at, color_, cameras_[v]},
                            residual_,
                            run_.pool,
                            {GradientScope::kColorOnly, gradient_});
@@ -133,6 +137,9 @@ class Refiner {
   RgbHarmonics Result() const { return HarmonicsOf(parameters_, degree_); }
 
  private:
+  // The Gaussians as view `v` sees them; valid until the next call.
+  const ParameterBlock& At(size_t v) { return in_time_.At(parameters_, views_[v].time_s); }
+
   std::vector<float> Rates(double done) const {
     const double rate = options_.learning_rate * std::pow(kLastRate, done);
     std::vector<float> rates(parameters_.rows(), 0.0f);
@@ -174,6 +181,7 @@ class Refiner {
   const RunControl& run_;
   int degree_;
   ParameterBlock parameters_;
+  GeometryInTime in_time_;
   ColorSpec color_;
   std::vector<RasterCamera> cameras_;
   std::vector<PlaneBuffer> targets_;

@@ -14,7 +14,8 @@ namespace color3d {
 struct RgbView {
   Camera camera;
   Pose cam_from_world;
-  bool fitted = true;  // false: measured only
+  bool fitted = true;   // false: measured only
+  double time_s = 0.0;  // used for models that move only
 };
 
 // PSNR (peak 1, at most 99 dB) over all pixels and channels of the sRGB picture that the reference

@@ -9,16 +9,15 @@ const say = (text) => { $('note').textContent = text; };
 const press = (button, on) => button.setAttribute('aria-pressed', String(on));
 
 // Lightness that people see, as sRGB; shades for where a colour comes from, over the grey picture.
-const glsl = `
+const glsl = (moved) => `
 uniform float uShades;
 uniform vec3 uGuessed;
 uniform vec3 uInferred;
 uniform vec3 uSeen;
-void modifySplatCenter(inout vec3 center) {
-}
-void modifySplatRotationScale(vec3 before, vec3 after, inout vec4 rotation, inout vec3 scale) {
-}
-void modifySplatColor(vec3 center, inout vec4 color) {
+${moved.declare}
+void modifySplatCenter(inout vec3 center) {${moved.center}}
+void modifySplatRotationScale(vec3 before, vec3 after, inout vec4 rotation, inout vec3 scale) {${moved.rotation}}
+void modifySplatColor(vec3 center, inout vec4 color) {${moved.color}
   if (uShades < 0.5) return;
   vec3 linear = pow(clamp(color.rgb, 0.0, 1.0), vec3(2.2));
   float gray = pow(dot(linear, vec3(0.2126, 0.7152, 0.0722)), 1.0 / 2.2);
@@ -32,16 +31,15 @@ void modifySplatColor(vec3 center, inout vec4 color) {
   color.rgb = shade * (0.15 + 0.95 * gray);
 }
 `;
-const wgsl = `
+const wgsl = (moved) => `
 uniform uShades: f32;
 uniform uGuessed: vec3f;
 uniform uInferred: vec3f;
 uniform uSeen: vec3f;
-fn modifySplatCenter(center: ptr<function, vec3f>) {
-}
-fn modifySplatRotationScale(before: vec3f, after: vec3f, rotation: ptr<function, vec4f>, scale: ptr<function, vec3f>) {
-}
-fn modifySplatColor(center: vec3f, color: ptr<function, vec4f>) {
+${moved.declare}
+fn modifySplatCenter(center: ptr<function, vec3f>) {${moved.center}}
+fn modifySplatRotationScale(before: vec3f, after: vec3f, rotation: ptr<function, vec4f>, scale: ptr<function, vec3f>) {${moved.rotation}}
+fn modifySplatColor(center: vec3f, color: ptr<function, vec4f>) {${moved.color}
   if (uniform.uShades < 0.5) { return; }
   let linear = pow(clamp((*color).rgb, vec3f(0.0), vec3f(1.0)), vec3f(2.2));
   let gray = pow(dot(linear, vec3f(0.2126, 0.7152, 0.0722)), 1.0 / 2.2);
@@ -132,6 +130,7 @@ const cameraOf = (photo) =>
 
 // ---- the page ---------------------------------------------------------------------------------
 let viewer = null, splats = null;
+let player = null;  // of a scene that moves
 let held = null;  // {photo, from, since}: the camera stands where this photo was taken
 
 const showShades = (mode) => {
@@ -158,14 +157,17 @@ const layOut = () => {
     top: frame.top + 'px', height: frame.height + 'px' });
 };
 
-const goTo = (index, glide = true) => {
+// A photo belongs to the time at which it was taken.
+const goTo = (index, { glide = true, keepTime = false } = {}) => {
   const photo = photos[index];
   const camera = viewer.app.root.findByName('camera');
   held = { photo, since: glide ? performance.now() : -Infinity,
            from: { position: camera.getPosition().clone(), rotation: camera.getRotation().clone(),
                    fov: camera.camera.fov, long: camera.camera.horizontalFov } };
-  viewer.annotations[index].camera.initial.fov = longFov(fovOf(photo));
+  Object.assign(viewer.annotations[index].camera.initial, cameraOf(photo));
   viewer.selectAnnotation(index);  // where one goes on from when one lets go of the photo
+  if (player && !keepTime) player.showShown();
+  press($('film'), false);
   press($('turn'), false);
   viewer.state.animationPaused = true;
   $('photo').src = pictureOf(photo);
@@ -177,6 +179,11 @@ const goTo = (index, glide = true) => {
 
 const letGo = () => {
   if (!held) return;
+  if (held.film) {  // the viewer goes on from here
+    Object.assign(viewer.annotations[facts.key].camera.initial, cameraOf(held.photo));
+    viewer.selectAnnotation(facts.key);
+    press($('film'), false);
+  }
   held = null;
   press($('compare'), false);
   for (const button of $('photos').children) press(button, false);
@@ -184,9 +191,22 @@ const letGo = () => {
   layOut();
 };
 
+// Holds the camera of the film, which moves with the time.
+const followFilm = (on) => {
+  if (!on) return letGo();
+  goTo(facts.key, { keepTime: true });
+  for (const button of $('photos').children) press(button, false);
+  Object.assign(held, { film: true, photo: player.camera() });
+  press($('film'), true);
+  say('The camera of the film');
+  layOut();
+};
+
 // After the viewer has placed its camera: while a photo is held, the camera is the photo's.
 const placeCamera = () => {
+  if (player) player.tick();
   if (!held) return;
+  if (held.film) held.photo = player.camera();
   const entity = viewer.app.root.findByName('camera');
   const { photo, from, since } = held;
   const t = Math.min(1, (performance.now() - since) / 700);
@@ -284,7 +304,8 @@ const prepare = (entity, confidence) => {
   entity.setLocalPosition(...position);
   splats = entity.gsplat;
   const resource = splats.resource;
-  resource.format.addExtraStreams([{ name: 'colorSureness', format: 52 /* one byte */ }]);
+  resource.format.addExtraStreams([{ name: 'colorSureness', format: 52 /* one byte */ },
+                                   ...(player ? color3dMotion.streams : [])]);
   resource.streams.syncWithFormat(resource.format);
   const texture = resource.getTexture('colorSureness');
   const texels = texture.lock();
@@ -293,7 +314,10 @@ const prepare = (entity, confidence) => {
   texture.unlock();
   splats.setParameter('uShades', 0);
   for (const [name, [hex]] of Object.entries(shades)) splats.setParameter(name, rgb(hex));
-  splats.setWorkBufferModifier({ glsl, wgsl });
+  if (player) player.attach(splats, !viewer.app.graphicsDevice.isWebGPU);
+  const still = { declare: '', center: '', rotation: '', color: '' };
+  splats.setWorkBufferModifier({ glsl: glsl(player ? color3dMotion.glsl : still),
+                                 wgsl: wgsl(player ? color3dMotion.wgsl : still) });
 };
 
 const start = async () => {
@@ -301,7 +325,8 @@ const start = async () => {
   $('poster').src = 'data:image/jpeg;base64,' + facts.poster;
   if (typeof DecompressionStream === 'undefined' ||
       !document.createElement('canvas').getContext('webgl2')) {
-    throw new Error('This browser has no WebGL 2, which drawing in 3D needs');
+    throw new Error('This browser has no WebGL 2, which drawing in 3D needs; turn on hardware ' +
+      'acceleration in its settings, or open the page in another browser');
   }
   const createViewer = await loadProgram();
   const packed = facts.packed ? unpacked : bytesOf;
@@ -312,6 +337,12 @@ const start = async () => {
     contents, ui: false, noanim: true,
     renderer: new URL(location.href).searchParams.has('webgpu') ? 'webgpu' : 'webgl',
   });
+  if (facts.motion) {
+    const motion = color3dMotion.read(await (await unpacked($('motion').textContent)).arrayBuffer());
+    const draw = () => { viewer.app.renderNextFrame = true; };
+    const show = (t) => { splats.setParameter('uTime', t); draw(); };
+    player = color3dPlayer(facts.motion, motion, { draw, show, followFilm });
+  }
   const confidence = facts.confidence &&
     new Uint8Array(await (await unpacked(facts.confidence)).arrayBuffer());
   // Sureness comes in the file's order, so the viewer has to keep it.
@@ -323,10 +354,12 @@ const start = async () => {
     if (entity.gsplat) prepare(entity, confidence);
   });
   viewer.app.on('update', placeCamera);
+  if (player) viewer.app.scene.on('gsplat:sorted', player.onSorted);
   viewer.events.on('loaded:changed', () => {
     viewer.state.cameraMode = 'orbit';
     wireButtons();
-    goTo(facts.key, false);
+    if (player) player.wire();
+    goTo(facts.key, { glide: false });
     say('Drag to turn, wheel or pinch to come nearer, right drag or two fingers to move');
     document.body.dataset.state = 'ready';
   });

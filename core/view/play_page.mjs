@@ -1,0 +1,124 @@
+// Plays a page of core/view that moves in headless Chromium, by its keys, and tells what happened, as
+// JSON on stdout.
+//   node play_page.mjs CHROMIUM PAGE FOLDER WIDTH HEIGHT STOP...
+// The stage gets WIDTH x HEIGHT px. FOLDER gets the stage at each STOP of the time slider as
+// STOP.png, and once more while the scene plays as playing.png. clocks: the text of the clock at each stop; keys: what keys
+// changed; heap: bytes of JavaScript after the second and after the tenth of ten loops; errors,
+// requests: as look_at_page.mjs. A page of a still scene takes no stops: still.png.
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { join, resolve } from 'node:path';
+
+import { openBrowser, pause } from '../../tests/support/browser.mjs';
+
+const [chromium, page, folder, width, height, ...stops] = process.argv.slice(2);
+mkdirSync(folder, { recursive: true });
+const flags = [
+  '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+  ...(process.env.COLOR3D_BROWSER_FLAGS ?? '').split(' ').filter(Boolean),
+];
+const { send, open, evaluate, close, errors, requests } =
+    openBrowser(chromium, flags, (type) => ['error', 'warning', 'assert'].includes(type));
+
+const codes = { ' ': ['Space', 32], Home: ['Home', 36], ArrowRight: ['ArrowRight', 39],
+                PageUp: ['PageUp', 33], '.': ['Period', 190], ',': ['Comma', 188] };
+const key = async (name) => {
+  const [code, number] = codes[name];
+  const text = name.length === 1 ? name : undefined;
+  const event = { key: name, code, windowsVirtualKeyCode: number };
+  await send('Input.dispatchKeyEvent', { type: text ? 'keyDown' : 'rawKeyDown', text, ...event });
+  await send('Input.dispatchKeyEvent', { type: 'keyUp', ...event });
+};
+const picture = async () => {
+  const { data } = await send('Page.captureScreenshot', {
+    format: 'png', clip: { x: 0, y: 0, width: Number(width), height: Number(height), scale: 1 } });
+  return data;
+};
+const save = (name, data) => writeFileSync(join(folder, name + '.png'), Buffer.from(data, 'base64'));
+// Once the viewer has sorted and drawn: when three pictures in a row are the same.
+const shoot = async (name) => {
+  let same = 0, before = '';
+  for (let i = 0; i < 40 && same < 2; ++i) {
+    await pause(500);
+    const now = await picture();
+    same = now === before ? same + 1 : 0;
+    before = now;
+  }
+  save(name, before);
+};
+const clock = () => evaluate('document.getElementById("clock").textContent');
+const position = () => evaluate('Number(document.getElementById("moment").value)');
+const heap = async () => {
+  await send('HeapProfiler.collectGarbage');
+  const { metrics } = await send('Performance.getMetrics');
+  return metrics.find((metric) => metric.name === 'JSHeapUsedSize').value;
+};
+const size = (bars) => send('Emulation.setDeviceMetricsOverride', {
+  width: Number(width), height: Number(height) + bars, deviceScaleFactor: 1, mobile: false });
+
+const playLoops = async (count) => {
+  await evaluate(`window.seenLoops = 0; window.before = -1; window.watch = setInterval(() => {
+    const now = Number(document.getElementById('moment').value);
+    if (now < window.before) ++window.seenLoops;
+    window.before = now;
+  }, 20)`);
+  const began = Date.now();
+  while (await evaluate('window.seenLoops') < count && Date.now() - began < 60000) await pause(100);
+  await evaluate('clearInterval(window.watch)');
+  return evaluate('window.seenLoops');
+};
+
+const look = async () => {
+  await open();
+  await send('Performance.enable');
+  await size(0);
+  await send('Page.navigate', { url: 'file://' + resolve(page) });
+  const began = Date.now();
+  const state = () => evaluate('document.body?.dataset.state ?? "loading"');
+  while (await state() === 'loading' && Date.now() - began < 60000) await pause(200);
+  const result = { state: await state(), errors, requests, clocks: [], keys: {} };
+  await size(await evaluate('innerHeight - document.getElementById("stage").clientHeight'));
+  await evaluate('document.getElementById("note").style.display = "none"');
+  await pause(2500);
+  if (!stops.length) {
+    await shoot('still');
+    return result;
+  }
+  const seconds = [await clock()];
+  await evaluate('document.getElementById("moment").focus()');
+  for (const stop of stops) {
+    await key('Home');
+    for (let i = await position(); i < Number(stop); ++i) await key('ArrowRight');
+    result.clocks.push(await clock());
+    await shoot(stop);
+  }
+  result.opened_at = seconds[0];
+  await key('Home');
+  for (const name of ['.', '.', ',']) await key(name);
+  result.keys.frame_steps = await position();
+  await evaluate('document.activeElement.blur()');
+  await evaluate('document.getElementById("speed").value = "2"');
+  await key(' ');
+  result.keys.space_plays = await evaluate('document.getElementById("play").getAttribute("aria-pressed")');
+  await playLoops(2);
+  const before = await heap();
+  result.loops = await playLoops(8);
+  result.heap = [before, await heap()];
+  save('playing', await picture());
+  await key(' ');
+  result.keys.space_pauses = await evaluate('document.getElementById("play").getAttribute("aria-pressed")');
+  const stopped = await position();
+  await pause(500);
+  result.keys.pause_holds = await position() === stopped;
+  result.note = await evaluate('document.getElementById("note").textContent');
+  return result;
+};
+
+let failed = 0;
+try {
+  console.log(JSON.stringify(await look(), null, 1));
+} catch (error) {
+  console.error(error.stack);
+  failed = 1;
+}
+await close();
+process.exit(failed);
