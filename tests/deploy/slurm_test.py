@@ -150,7 +150,7 @@ class SlurmTest(unittest.TestCase):
     @classmethod
     def submit(cls, seed):
         answer = cls.client(
-            "colorize", cls.room(seed), "-o", cls.path(f"out-{seed}"), "--benchmark", "--detach", *QUICK)  # fmt: skip
+            "colorize", cls.room(seed), "-o", cls.path(f"out-{seed}"), "--auto", "--detach", *QUICK)  # fmt: skip
         return answer["job"]
 
     @classmethod

@@ -4,7 +4,7 @@ import {
   type Choices, type Found, type KeyViews, type Run,
 } from './api';
 import { bar, button, h, problem, replace, say } from './dom';
-import { painterClass, type PainterOfKeyView, type StrokeFile } from './painter';
+import { Painter, type StrokeFile } from './paint/index';
 import { errorInWords, seconds, stageName } from './words';
 
 type Way = Choices['color'];
@@ -48,7 +48,7 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
   let left = false;
   let view = '', way: Way = 'automatic', picture = '';
   let strokes: StrokeFile = [];
-  let painter: PainterOfKeyView | undefined;
+  let painter: Painter | undefined;
   const waiting = bar('Choosing the photo');
   const doing = h('p', { class: 'soft' }, 'Looking at the photos …');
   const body = h('div', { class: 'stack' }, h('div', { class: 'panel' }, doing, waiting.element));
@@ -68,13 +68,13 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
       const isPhoto = found.photos.some((photo) => photo.name === view);
       const image = h('img', { id: 'key-photo', alt: `The photo ${view}`, ...(isPhoto ? { src: photoUrl(set, view, 1600, way !== 'picture') } : {}) });
       replace(stage, isPhoto ? image : h('p', { class: 'soft' }, view || 'The service chooses it.'));
-      if (way !== 'strokes' || !painterClass || !isPhoto) return;
+      if (way !== 'strokes' || !isPhoto) return;
       const response = await fetch(photoUrl(set, view, 0, true));
       const photo = await createImageBitmap(await response.blob());
       if (left || (way as Way) !== 'strokes') return;
       const host = h('div', { class: 'painter', id: 'painter' });
       replace(stage, host);
-      painter = new painterClass(host, {
+      painter = new Painter(host, {
         photo,
         preview: (now, side, signal) => previewStrokes(set, view, now, side, signal),
         onChange: (now) => { strokes = now; },
@@ -105,7 +105,7 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
 
     const ways: [Way, string, string][] = [
       ['automatic', 'Automatic', 'The program guesses sky, plants, skin and wood. It cannot know the colour of a coat.'],
-      ...(painterClass ? [['strokes', 'Paint', 'Give a few things their colour; it spreads up to their edges.'] as [Way, string, string]] : []),
+      ['strokes', 'Paint', 'Give a few things their colour; it spreads up to their edges.'],
       ['picture', 'A picture I coloured', 'Save the photo, colour it in a paint program, and bring it back in the same size.'],
     ];
     const detail = h('div', { class: 'way-detail' });
