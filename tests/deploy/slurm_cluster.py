@@ -165,9 +165,17 @@ class Cluster:
             return ""  # the controller begins
 
     def job(self, job):
-        """The fields of `scontrol show job`."""
-        text = self.run("scontrol", "--oneliner", "show", "job", job)
-        return dict(word.split("=", 1) for word in text.split() if "=" in word)
+        """The fields of `scontrol show job` of a job or of one task of an array, with its name in `Name`.
+
+        job: as scontrol takes it, or SLURM_JOB_ID; that of one task of an array is the array's own.
+        """
+        for line in self.run("scontrol", "--oneliner", "show", "job", job).splitlines():
+            fields = dict(word.split("=", 1) for word in line.split() if "=" in word)
+            task = fields.get("ArrayTaskId")
+            fields["Name"] = f"{fields['ArrayJobId']}_{task}" if task else fields["JobId"]
+            if job in (fields["JobId"], fields["Name"]):
+                return fields
+        raise AssertionError(f"scontrol shows no job {job}")
 
     def tasks(self, *options):
         """(name as scontrol takes it, state) of the jobs that have not ended."""

@@ -231,7 +231,7 @@ class SlurmTest(unittest.TestCase):
         self.submit_workers(folder, "--array=1-2")
         # A requeue by the operator.
         requeued, job = self.busy_worker()
-        self.cluster.run("scontrol", "requeue", requeued)
+        self.cluster.run("scontrol", "requeue", self.cluster.job(requeued)["Name"])
         self.wait(lambda: self.cluster.job(requeued)["Restarts"] == "1", 60, "the requeue")
         self.assertIn("slurm-" + requeued, self.log_of(requeued))
         # A job of more importance takes the place of one.
