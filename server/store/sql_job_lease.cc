@@ -94,9 +94,12 @@ std::vector<int64_t> FirstInTurn(SqlDatabase& db, const Select& select) {
   const std::string first =
       fmt::format("and project=?4 order by priority, deadline_ms, job_id limit {}", kMaxCandidates);
   std::vector<Candidate> found;
-  SqlStatement projects(db,
-                        "select name, turn from project where exists(select 1 from job where "
-                        "state='QUEUED' and project=project.name)");
+  // Steps from one project with waiting jobs to the next by an index.
+  SqlStatement projects(
+      db,
+      "with recursive waiting(p) as (select min(project) from job where state='QUEUED' union all "
+      "select (select min(project) from job where state='QUEUED' and project>p) from waiting "
+      "where p is not null) select name, turn from waiting join project on name=p");
   const auto waiting =
       projects.All([](const SqlStatement& row) { return std::pair(row.Text(0), row.Int(1)); });
   for (const auto& [project, turn] : waiting) {
