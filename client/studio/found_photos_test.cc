@@ -23,7 +23,7 @@ class FoundPhotosTest : public ::testing::Test {
     for (const char* name : {"a.jpg", "b.jpg"}) Write(name, EncodeJpeg(Image(60, 40, 3, 0.5f)));
   }
   const ScratchFolder scratch_;
-  const CancellationToken cancel_;
+  const CancellationToken cancel_{};
 };
 
 TEST_F(FoundPhotosTest, NamesWhatIsThere) {

@@ -14,7 +14,6 @@
 namespace color3d {
 namespace {
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
 using testing::S3Process;
 
 class S3BlobStoreTest : public ::testing::Test {
