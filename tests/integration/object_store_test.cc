@@ -24,11 +24,12 @@ class ObjectStoreTest : public ServiceTest {
     WriteProceduralScene(Path("room"), SmallRoom());
     StartServer(flags);
     const ProcessResult colored = Client(
-        std::vector<std::string>{"colorize", Path("room"), "-o", Path("first")} + QuickOptions());
+        std::vector<std::string>{"colorize", Path("room"), "-o", Path("first"), "--benchmark"} +
+        QuickOptions());
     ASSERT_EQ(colored.exit_code, 0) << colored.err;
     const v1::Job job = NewestJob("colorize_scene");
     StopServer();
-    EXPECT_GT(fs::remove_all(Path("data") / "blob-cache"), 1u) << "nothing was cached";
+    EXPECT_GT(fs::remove_all(Path("server") / "data" / "blob-cache"), 1u) << "nothing was cached";
     StartServer(flags);
     const ProcessResult fetched =
         Client({"artifact", "download", job.name(), "-o", Path("second")});
@@ -40,7 +41,8 @@ class ObjectStoreTest : public ServiceTest {
     }
     EXPECT_EQ(server().Stop(), 0);
     const ProcessResult fsck = RunProcess(
-        std::vector<std::string>{ServerProgram(), "fsck", "--data-dir", Path("data")} + flags,
+        std::vector<std::string>{ServerProgram(), "fsck", "--data-dir", Path("server") / "data"} +
+            flags,
         Path("fsck"),
         std::chrono::seconds(120));
     EXPECT_EQ(fsck.exit_code, 0) << fsck.out << fsck.err;
