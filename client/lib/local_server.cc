@@ -3,8 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <netdb.h>
-#include <signal.h>
-#include <spawn.h>
 #include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -22,11 +20,11 @@
 #include <vector>
 
 #include "client/lib/connection.h"
+#include "client/lib/detached_program.h"
 #include "core/base/error.h"
+#include "core/base/file_descriptor.h"
 #include "core/base/files.h"
 #include "core/base/text/address.h"
-
-extern char** environ;
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -35,28 +33,14 @@ using std::chrono::steady_clock;
 
 constexpr std::string_view kUnix = "unix:";
 
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
-
 bool AcceptsOnSocket(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   if (path.size() >= sizeof(address.sun_path)) return false;
   std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
-  const Descriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  return socket.fd() >= 0 &&
-         ::connect(socket.fd(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+  const FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  return socket.get() >= 0 &&
+         ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
 }
 
 bool AcceptsOnPort(const HostPort& place) {
@@ -66,8 +50,9 @@ bool AcceptsOnPort(const HostPort& place) {
   if (::getaddrinfo(place.host.c_str(), place.port.c_str(), &hints, &found) != 0) return false;
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, ::freeaddrinfo);
   for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
-    const Descriptor socket(::socket(one->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0));
-    if (socket.fd() >= 0 && ::connect(socket.fd(), one->ai_addr, one->ai_addrlen) == 0) return true;
+    const FileDescriptor socket(::socket(one->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    if (socket.get() >= 0 && ::connect(socket.get(), one->ai_addr, one->ai_addrlen) == 0)
+      return true;
   }
   return false;
 }
@@ -77,13 +62,13 @@ class StartLock {
  public:
   StartLock(const fs::path& folder, steady_clock::time_point end, const CancellationToken& cancel)
       : file_(::open((folder / "start-lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600)) {
-    if (file_.fd() < 0) {
+    if (file_.get() < 0) {
       throw Error(ErrorCode::kFailedPrecondition,
                   "cannot write to {}: {}; free space or set XDG_DATA_HOME to another folder",
                   folder.string(),
                   std::strerror(errno));
     }
-    while (::flock(file_.fd(), LOCK_EX | LOCK_NB) != 0) {
+    while (::flock(file_.get(), LOCK_EX | LOCK_NB) != 0) {
       cancel.ThrowIfCancelled();
       if (steady_clock::now() > end) {
         throw Error(ErrorCode::kUnavailable,
@@ -96,40 +81,18 @@ class StartLock {
   }
 
  private:
-  Descriptor file_;
+  FileDescriptor file_;
 };
 
 // A server holds this lock from its start to its end (server/storage/data_folder.h).
 bool IsDataFolderInUse(const fs::path& folder) {
-  const Descriptor lock(::open((folder / "lock").c_str(), O_RDWR | O_CLOEXEC));
-  return lock.fd() >= 0 && ::flock(lock.fd(), LOCK_EX | LOCK_NB) != 0;
+  const FileDescriptor lock(::open((folder / "lock").c_str(), O_RDWR | O_CLOEXEC));
+  return lock.get() >= 0 && ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0;
 }
 
-// In a session of its own, so that it outlives this process and its terminal.
-pid_t StartDetached(const std::vector<std::string>& arguments, const fs::path& log) {
-  posix_spawnattr_t attributes;
-  posix_spawn_file_actions_t actions;
-  posix_spawnattr_init(&attributes);
-  posix_spawn_file_actions_init(&actions);
-  sigset_t signals;
-  ::sigemptyset(&signals);
-  posix_spawnattr_setsigmask(&attributes, &signals);
-  ::sigaddset(&signals, SIGINT);
-  posix_spawnattr_setsigdefault(&attributes, &signals);
-  posix_spawnattr_setflags(&attributes,
-                           POSIX_SPAWN_SETSID | POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-  posix_spawn_file_actions_addopen(&actions, 0, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, 1, log.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_adddup2(&actions, 1, 2);
-  std::vector<std::string> texts = arguments;
-  std::vector<char*> pointers;
-  for (std::string& text : texts) pointers.push_back(text.data());
-  pointers.push_back(nullptr);
-  pid_t child = 0;
-  const int error =
-      ::posix_spawn(&child, texts[0].c_str(), &actions, &attributes, pointers.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  posix_spawnattr_destroy(&attributes);
+pid_t StartServer(const std::vector<std::string>& arguments, const fs::path& log) {
+  pid_t server = 0;
+  const int error = StartDetached(arguments, log, &server);
   if (error != 0) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot start a server with {}: {}; install color3d-server beside color3d, or name "
@@ -137,7 +100,7 @@ pid_t StartDetached(const std::vector<std::string>& arguments, const fs::path& l
                 arguments[0],
                 std::strerror(error));
   }
-  return child;
+  return server;
 }
 
 std::string LastLine(const fs::path& log) {
@@ -222,15 +185,15 @@ std::string FindOrStartServer(const LocalServerOptions& options,
       if (!said)
         say(fmt::format("starting a server of your own; its files are in {}", folder.string()));
       said = true;
-      child = StartDetached({options.program.string(),
-                             "serve",
-                             "--data-dir",
-                             folder.string(),
-                             "--listen",
-                             address,
-                             "--idle-exit",
-                             fmt::format("{}s", options.idle_exit.count())},
-                            log);
+      child = StartServer({options.program.string(),
+                           "serve",
+                           "--data-dir",
+                           folder.string(),
+                           "--listen",
+                           address,
+                           "--idle-exit",
+                           fmt::format("{}s", options.idle_exit.count())},
+                          log);
     }
     int status = 0;
     const bool has_ended = child != 0 && ::waitpid(child, &status, WNOHANG) == child;

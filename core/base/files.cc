@@ -13,6 +13,7 @@
 #include <cstring>
 
 #include "core/base/error.h"
+#include "core/base/file_descriptor.h"
 
 namespace color3d {
 namespace fs = std::filesystem;
@@ -33,20 +34,6 @@ namespace {
   }
   throw Error(code, "{} {}: {}{}", what, path.string(), std::strerror(error), remedy);
 }
-
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int fd) : fd_(fd) {}
-  ~FileDescriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  int get() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 // Gives the new file the mode and owner of the file that it replaces. Without permission to change
 // the owner, keeps the mode only.
