@@ -162,7 +162,7 @@ public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads
   embedded/embedded_weights
 public core/grid edge_weights grid_solver
 public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling reduced weighted_resize \
-  probe/focal_length probe/orientation probe/probe
+  credit/caption credit/picture_credit probe/focal_length probe/orientation probe/probe
 public core/keycolor edit_model from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
 public core/film anchor_frames film_carry moving_regions returning_shots shots steady_colors steady_tones

@@ -14,6 +14,7 @@
 #include "client/options/colorize_options.h"
 #include "client/options/key_color_flags.h"
 #include "client/studio/found_photos.h"
+#include "client/studio/live_png.h"
 #include "client/studio/run_progress.h"
 #include "core/base/error.h"
 #include "core/base/file_kind.h"
@@ -70,35 +71,6 @@ std::optional<v1::JobPlan> PlanOf(Connection& connection, const v1::PlanJobReque
   } catch (const RpcError&) {  // an older server, or options that it no longer takes
     return std::nullopt;
   }
-}
-
-std::string LivePng(Connection& connection,
-                    const LiveSource& source,
-                    const LivePicture& picture,
-                    int max_side_px) {
-  std::string png;
-  ColorizeLive(
-      connection,
-      source,
-      {picture},
-      {.max_side_px = max_side_px},
-      [&](size_t, const v1::ColorizeImagesResponse& answer) {
-        if (answer.has_error()) {
-          throw Error(ErrorCodeOf(static_cast<grpc::StatusCode>(answer.error().code())),
-                      "{}",
-                      answer.error().message());
-        }
-        if (!answer.has_image_digest()) {
-          png = answer.image();
-          return;
-        }
-        const ScratchFolder scratch;
-        const auto file = scratch.path() / "picture.png";
-        const v1::Digest& digest = answer.image_digest();
-        DownloadBlob(connection, {digest.sha256(), digest.size_bytes()}, file, [](int64_t) {});
-        png = ReadFile(file);
-      });
-  return png;
 }
 
 // The stage of a run that coloured its key view; nullopt if it has not ended yet.
