@@ -48,17 +48,17 @@ const answerOf = async (request: Promise<Response>): Promise<Response> => {
     response = await request;
   } catch (error) {
     if (error instanceof DOMException && error.name === 'AbortError') throw error;
-    throw new StudioError('The studio does not answer. Start it again with `color3d studio`.', 'UNREACHABLE');
+    throw new StudioError('The studio does not answer. Start Color3D Studio again from the menu, or with `color3d studio`.', 'UNREACHABLE');
   }
   if (response.ok) return response;
   const body = await response.json().catch(() => null) as { error?: { code: string; message: string } } | null;
   throw new StudioError(body?.error?.message ?? `The studio answered ${response.status}.`, body?.error?.code ?? 'UNKNOWN');
 };
 
-const get = async <T>(path: string): Promise<T> => (await answerOf(fetch(path))).json() as Promise<T>;
-const post = async <T>(path: string, body: unknown = {}): Promise<T> =>
+export const get = async <T>(path: string): Promise<T> => (await answerOf(fetch(path))).json() as Promise<T>;
+export const post = async <T>(path: string, body: unknown = {}): Promise<T> =>
   (await answerOf(fetch(path, { method: 'POST', body: JSON.stringify(body) }))).json() as Promise<T>;
-const query = (values: Record<string, string | number>): string =>
+export const query = (values: Record<string, string | number>): string =>
   new URLSearchParams(Object.entries(values).map(([name, value]) => [name, String(value)])).toString();
 
 export const getState = (): Promise<State> => get('/api/state');
@@ -104,7 +104,7 @@ export const follow = (
     on.end();
   });
   source.onerror = () => {
-    if (source.readyState === EventSource.CLOSED) on.problem('The studio does not answer. Start it again with `color3d studio`.');
+    if (source.readyState === EventSource.CLOSED) on.problem('The studio does not answer. Start Color3D Studio again from the menu, or with `color3d studio`.');
   };
   return () => source.close();
 };
