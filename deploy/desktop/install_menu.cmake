@@ -1,4 +1,5 @@
 # Part of `cmake --install`: the studio's entry in the menu, with the program's place at that time.
+# Desktops look for entries below $XDG_DATA_DIRS: /usr/local/share, /usr/share, and ~/.local/share.
 #   source, bin, apps: variables set by the caller; the latter two relative to the prefix
 set(program "${CMAKE_INSTALL_PREFIX}/${bin}/color3d")
 if(CMAKE_INSTALL_PREFIX MATCHES "_CPack_Packages")
