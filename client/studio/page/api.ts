@@ -37,9 +37,13 @@ export interface KeyViews {
 export interface State {
   server: { version: string; address: string; presets: string[] }; sets: PhotoSet[]; jobs: Job[];
 }
-export interface Choices {
-  preset: string; key_view: string; color: 'automatic' | 'picture' | 'strokes';
-  picture?: string; strokes?: readonly unknown[];
+export interface KeyChoice {
+  key_view: string; color: 'automatic' | 'picture' | 'strokes'; picture?: string; strokes?: readonly unknown[];
+}
+export interface Choices extends KeyChoice {
+  preset: string;
+  poses?: boolean; // films: also a scene in 3D
+  further?: KeyChoice[]; // more coloured photos
 }
 
 const answerOf = async (request: Promise<Response>): Promise<Response> => {

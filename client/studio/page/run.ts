@@ -11,6 +11,7 @@ import { errorInWords, isFinished, seconds, stageName, stateName } from './words
 
 const previews = 6;
 const previewSide = 480;
+const tryAgainMs = 5000;
 
 const stageRow = (stage: Stage): HTMLElement => {
   const note = stage.error ?? stage.left_out ?? (stage.state === 'SUCCEEDED'
@@ -145,16 +146,26 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     void showShare(run);
     main.dataset.state = 'done';
   };
-  stop = follow(id, {
-    run: show,
-    problem: (text) => {
-      void goWhereMoved();
-      replace(trouble, problem(text, button('Try again', () => { stop(); showRun(main, id); })));
-    },
-    end: () => undefined,
-  });
+  // A service that went away is started again, or comes back: the page goes on by itself.
+  let timer: number | undefined;
+  const watch = (): void => {
+    clearTimeout(timer);
+    stop();
+    stop = follow(id, {
+      run: show,
+      problem: (text) => {
+        if (left) return;
+        void goWhereMoved();
+        replace(trouble, problem(text, button('Try again', watch)));
+        timer = window.setTimeout(watch, tryAgainMs);
+      },
+      end: () => undefined,
+    });
+  };
+  watch();
   return () => {
     left = true;
+    clearTimeout(timer);
     stop();
     document.title = 'Color3D Studio';
     delete main.dataset.state;
