@@ -98,7 +98,7 @@ class Studio::Parts {
   void StreamEvents(const Request& request, Response& response);
   void SendArtifact(const Request& request, Response& response);
 
-  PhotoFolder FolderOf(const std::string& id) const { return CollectPhotos(sets_.Get(id).folder); }
+  PhotoFolder FolderOf(const std::string& id) const { return CollectSet(sets_.Get(id)); }
   // "scenes/..." of the set, uploaded if it is not there yet.
   std::string SceneOf(const std::string& id);
 };
@@ -203,7 +203,12 @@ void Studio::Parts::AddSetRoutes() {
   Get(Pattern("sets", ""), [this](const Request& request, Response& response) {
     const PhotoSet set = sets_.Get(request.matches[1]);
     Json json = SetJson(set);
-    json["found"] = DescribePhotos(CollectPhotos(set.folder), cancel_);
+    try {
+      json["found"] = DescribePhotos(CollectSet(set), cancel_);
+    } catch (const Error& e) {  // no error of the call: the page says what is wrong with the files
+      if (e.code() == ErrorCode::kCancelled) throw;
+      json["problem"] = e.what();
+    }
     AnswerJson(json, response);
   });
   Get(Pattern("sets", "/photo"), [this](const Request& request, Response& response) {

@@ -46,6 +46,8 @@ TEST_F(StudioInputTest, NamesWhatIsNoPhoto) {
   EXPECT_THAT(Said({{"a.pdf", "%PDF"}}), AllOf(HasSubstr("documents"), HasSubstr("a.pdf")));
   EXPECT_THAT(Said({{"a.jpg", Photo()}}), HasSubstr("one photograph"));
   EXPECT_THAT(Found("0123"), HasSubstr("there are no photos"));
+  EXPECT_THAT(Said({{"notes.txt", "hello"}}), testing::Not(HasSubstr(scratch_.path().string())))
+      << "the name of the set in place of its folder";
 }
 
 TEST_F(StudioInputTest, TakesPhotosBesideOtherFilesAndNamesThem) {

@@ -67,7 +67,11 @@ export const query = (values: Record<string, string | number>): string =>
 
 export const getState = (): Promise<State> => get('/api/state');
 export const makeSet = (name: string): Promise<PhotoSet> => post('/api/sets', { name });
-export const describeSet = (id: string): Promise<PhotoSet & { found: Found }> => get(`/api/sets/${id}`);
+export const describeSet = async (id: string): Promise<PhotoSet & { found: Found }> => {
+  const set = await get<PhotoSet & { found?: Found; problem?: string }>(`/api/sets/${id}`);
+  if (!set.found) throw new StudioError(set.problem ?? 'These files cannot be used.', 'INVALID_ARGUMENT');
+  return { ...set, found: set.found };
+};
 export const sendFile = async (id: string, name: string, file: Blob): Promise<void> => {
   await answerOf(fetch(`/api/sets/${id}/files?${query({ name })}`, { method: 'POST', body: file }));
 };
