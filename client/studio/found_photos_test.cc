@@ -70,7 +70,7 @@ TEST(ScaleStrokesTest, ScalesAllLengths) {
   EXPECT_THROW(ScaleStrokes("[1]", 0.5), Error);
 }
 
-TEST(FoundPhotosTest, OddSizesAreNamed) {
+TEST(SizeNotesTest, NameOddPhotos) {
   const auto photo = [](const char* name, int width, int height) {
     return nlohmann::ordered_json{{"name", name}, {"width", width}, {"height", height}};
   };
