@@ -26,6 +26,7 @@ constexpr int kJpegQuality = 90;
 constexpr int64_t kBytesPerPhotoPixel = 40;
 constexpr int64_t kLargePixels = 60'000'000;
 constexpr int kEnoughSidePx = 6000;
+constexpr size_t kManyPhotos = 300;
 constexpr size_t kNamed = 3;  // of odd photos
 
 // As views are called: relative to images/.
@@ -93,6 +94,11 @@ Json DescribePhotos(const PhotoFolder& folder, const CancellationToken& cancel) 
   });
   Json notes = folder.notes;
   for (const std::string& note : SizeNotes(photos)) notes.push_back(note);
+  if (photos.size() > kManyPhotos) {
+    notes.push_back(fmt::format(
+        "{} photos take long; 10 to 50 of one place are enough, so bring a part of them",
+        photos.size()));
+  }
   Json in_color;
   bool is_whole = true;
   for (const Json& photo : photos) is_whole = is_whole && !photo.contains("problem");
