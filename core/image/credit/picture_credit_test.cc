@@ -88,12 +88,10 @@ TEST(PictureCreditTest, JpegHoldsXmpAndIptc) {
 }
 
 TEST(PictureCreditTest, OtherProgramsReadIt) {
-  const std::string png =
-      Identify(AddCredit(EncodePng8(Ramp()), Sample(), "a"), ".png", "%[Description]");
-  if (png.empty()) GTEST_SKIP() << "skipped, because there is no ImageMagick";
-  EXPECT_EQ(png, CreditText(Sample()));
   const std::string jpeg = AddCredit(EncodeJpeg(Ramp()), Sample(), "a");
-  EXPECT_EQ(Identify(jpeg, ".jpg", "%[IPTC:2:120]"), CreditText(Sample()));
+  const std::string caption = Identify(jpeg, ".jpg", "%[IPTC:2:120]");
+  if (caption.empty()) GTEST_SKIP() << "skipped, because there is no ImageMagick";
+  EXPECT_EQ(caption, CreditText(Sample()));
   EXPECT_EQ(Identify(jpeg, ".jpg", "%[IPTC:2:116]"), "CC BY 4.0");
 }
 
@@ -132,7 +130,7 @@ TEST(CaptionTest, StandsBelowThePicture) {
   ASSERT_GT(whole.height, picture.height + 20);
   for (int y = 0; y < picture.height; ++y) {
     for (int x = 0; x < picture.width; ++x) {
-      ASSERT_EQ(whole.At(1, y, x), picture.At(1, y, x));
+      ASSERT_NEAR(whole.At(1, y, x), picture.At(1, y, x), 1e-6f);
     }
   }
   float darkest = 1.0f;
