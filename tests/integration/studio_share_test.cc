@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <regex>
+#include <thread>
 
 #include "core/image/credit/picture_credit.h"
 #include "core/image/probe/probe.h"
@@ -97,6 +98,30 @@ TEST_F(StudioShareTest, QueueKeepsItsOrderAndItsRuns) {
         return done == 3;
       },
       seconds(400)));
+}
+
+TEST_F(StudioShareTest, PageGoesOnWhenTheServiceComesBack) {
+  MakeRoom();
+  Process studio(ClientCommand({"studio", "--no-open", Path("room")}), Path("studio"));
+  const fs::path mark = Path("mark");
+  std::vector<std::string> command = {
+      "node", COLOR3D_LOSE_SERVICE, "chromium", AddressOf(studio), mark};
+  if (const char* screenshots = std::getenv("COLOR3D_SCREENSHOTS")) {
+    command.emplace_back(screenshots);
+  }
+  Process page(command, Path("page"));
+  ASSERT_TRUE(WaitUntil([&] { return fs::exists(mark); }, seconds(180))) << page.Err();
+  const std::string address = server().address();
+  StopServer();
+  // Longer than the studio waits for it.
+  std::this_thread::sleep_for(seconds(40));
+  StartServer({}, address);
+  const auto ended = page.Wait(seconds(300));
+  ASSERT_TRUE(ended.has_value() && *ended == 0) << page.Err();
+  const auto seen = nlohmann::json::parse(page.Out());
+  EXPECT_THAT(seen.at("said").get<std::string>(), HasSubstr("server"));
+  EXPECT_EQ(seen.at("second"), 200);
+  EXPECT_EQ(seen.at("done"), true);
 }
 
 // Other users see the arguments of every program.
