@@ -122,6 +122,7 @@ export const showHome = (main: HTMLElement): (() => void) => {
     try {
       const { sets, jobs } = await getState();
       known = sets;
+      queue.refresh();
       const rows = cards(sets, jobs);
       list.hidden = rows.length === 0;
       replace(list, h('h2', { id: 'list-title' }, 'Your scenes'), h('ul', { class: 'cards' }, ...rows));

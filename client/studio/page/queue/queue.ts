@@ -7,7 +7,7 @@ import { withMoved } from './order';
 
 const lookEveryMs = 4000;
 
-export interface QueueView { element: HTMLElement; stop: () => void }
+export interface QueueView { element: HTMLElement; refresh: () => void; stop: () => void }
 
 // `sets`: for names; `changed`: the list of scenes is to be read again.
 export const queueView = (sets: () => PhotoSet[], changed: () => void): QueueView => {
@@ -79,6 +79,7 @@ export const queueView = (sets: () => PhotoSet[], changed: () => void): QueueVie
   void look();
   return {
     element,
+    refresh: () => void look(),
     stop: () => {
       stopped = true;
       clearTimeout(timer);

@@ -102,7 +102,7 @@ const pictures = (run: Run, set: PhotoSet | undefined, form: CreditForm): { elem
 const others = (run: Run): HTMLElement => {
   const rows = formats.map(([format, name, text]) => {
     const place = h('div', { class: 'share-place' });
-    const ready = (job: string): HTMLElement => h('p', { class: 'row' }, save(artifactUrl(job, name, true), 'Save', name), ` ${text}`);
+    const ready = (job: string): HTMLElement => h('p', { class: 'row' }, save(artifactUrl(job, name, true), 'Save', name), h('span', { class: 'small share-format' }, text));
     if (find(run, name)) {
       replace(place, ready(run.id));
     } else {
@@ -110,7 +110,7 @@ const others = (run: Run): HTMLElement => {
         makeFile(run.id, format).then((job) => waitFor(job.id, `Writing ${name}`, place, () => replace(place, ready(job.id))),
           (error: Error) => replace(place, problem(error.message)));
       }, { 'data-format': format });
-      replace(place, h('p', { class: 'row' }, make, ` ${text}`));
+      replace(place, h('p', { class: 'row' }, make, h('span', { class: 'small share-format' }, text)));
     }
     return place;
   });

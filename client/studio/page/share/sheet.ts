@@ -6,7 +6,7 @@ import { coloredUrl, getCredit } from './calls';
 import { adoptShareStyle } from './style';
 import { creditText, pagesOf, spread, stem } from './texts';
 
-const onFirstPage = 6, onOthers = 12, mostPhotos = 54;
+const onFirstPage = 9, onOthers = 12, mostPhotos = 57;
 const sideOfThumb = 640, sideOfKey = 1200;
 
 interface Picture { src: string; text: string }
