@@ -24,11 +24,11 @@ border:1px solid var(--strong-line);border-radius:8px}
 .queue-item button{min-height:44px;padding:.3rem .7rem}
 .sheets{display:grid;grid-template-columns:minmax(0,210mm);justify-content:center;gap:1.5rem}
 .sheet{container-type:inline-size;width:100%;aspect-ratio:210/297;background:#fff;color:#1a1a1a;display:grid;
-grid-template-rows:auto auto minmax(0,1fr) auto;box-shadow:0 1px 8px #0003;overflow:hidden}
+grid-template-columns:minmax(0,1fr);grid-template-rows:auto auto minmax(0,1fr) auto;box-shadow:0 1px 8px #0003;overflow:hidden}
 .sheet>*{margin-inline:6.2cqw}
 .sheet-head{display:flex;flex-wrap:nowrap;justify-content:space-between;align-items:baseline;gap:3cqw;margin-top:6.2cqw;padding:0 0 1.4cqw;
 border-bottom:.2cqw solid #1a1a1a;background:none;font-size:1.9cqw}
-.sheet-head strong{font-size:2.9cqw;overflow:hidden;text-overflow:ellipsis;white-space:nowrap}
+.sheet-head strong{font-size:2.7cqw;line-height:1.2;overflow-wrap:anywhere}
 .sheet-head span{white-space:nowrap}
 .sheet-key{grid-row:2;display:grid;grid-template-columns:1fr 1fr;gap:2.4cqw;padding-top:2.4cqw}
 .sheet-grid{grid-row:3;display:grid;grid-template-columns:repeat(3,minmax(0,1fr));grid-template-rows:repeat(4,minmax(0,1fr));gap:2.4cqw;padding:2.4cqw 0}
