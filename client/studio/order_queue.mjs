@@ -1,6 +1,7 @@
 // Several scenes in the studio's queue, in headless Chromium; tells what was seen, as JSON on stdout.
 //   node order_queue.mjs CHROMIUM ADDRESS FOLDER [SCREENSHOTS]
-// ADDRESS: as `color3d studio` printed it; FOLDER: photos, dropped three times under other names. before, after: names
+// ADDRESS: as `color3d studio` printed it; FOLDER: photos, brought four times under other names, each time
+// without another one, as the service calls equal files one scene. before, after: names
 // in the queue before and after the last scene was put first; moved: where a page of a moved run ended; left: names
 // after a cancel; again: names after browser and studio page were closed and opened again.
 import { readdirSync, readFileSync } from 'node:fs';
@@ -19,11 +20,11 @@ const files = readdirSync(folder, { recursive: true, withFileTypes: true }).filt
   .map((entry) => [join(entry.parentPath ?? entry.path, entry.name)])
   .map(([path]) => [path.slice(folder.length + 1), readFileSync(path).toString('base64')]);
 
-// Brings the folder as set `name` and starts a run. Returns its ID.
-const start = (name) => evaluate(`(async () => {
+// Brings the folder without its photo `left_out` as set `name`, and starts a run. Returns its ID.
+const start = (name, left_out) => evaluate(`(async () => {
   const call = async (path, body) => (await fetch(path, { method: 'POST', body })).json();
   const set = (await call('/api/sets', JSON.stringify({ name: ${JSON.stringify(name)} }))).id;
-  for (const [path, base64] of ${JSON.stringify(files)}) {
+  for (const [path, base64] of ${JSON.stringify(files.filter(([path]) => path !== left_out))}) {
     const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
     await call('/api/sets/' + set + '/files?name=' + encodeURIComponent(path), bytes);
   }
@@ -37,7 +38,8 @@ const use = async () => {
   await send('Page.navigate', { url: address });
   await waitFor('!!document.querySelector(".drop-area")');
   const runs = [];
-  for (const name of ['one', 'two', 'three', 'four']) runs.push(await start(name));
+  const photos = files.map(([path]) => path).filter((path) => /\.(png|jpg)$/.test(path)).sort();
+  for (const [i, name] of ['one', 'two', 'three', 'four'].entries()) runs.push(await start(name, photos[i + 1]));
   await waitFor('document.querySelectorAll(".queue-item").length === 4');
   await waitFor('!!document.querySelector(".queue-item .state-running")');
   const before = await names();
