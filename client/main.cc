@@ -126,6 +126,7 @@ int Main(int argc, char** argv) {
   AddViewCommand(app, context);
   AddCorrectCommand(app, context);
   AddMovieCommands(app, context);
+  AddExportCommand(app, context);
   AddColorizerCommands(app, context);
   AddJobCommands(app, context);
   AddArtifactCommands(app, context);

@@ -50,6 +50,7 @@ allow core/simd 'core/(base|simd)'
 allow core/grid 'core/(base|simd|grid)'
 allow core/color 'core/(base|color)'
 allow core/image 'core/(base|image(/(probe|decode))?)'
+allow core/image/credit 'core/(base|image(/credit)?)'
 allow core/image/decode 'core/(base|image/(probe|decode))'
 allow core/image/probe 'core/(base|image/probe)'
 allow core/zip 'core/(base|zip)'
@@ -128,7 +129,7 @@ allow server/worker/supervision 'core/base|server/(store|ops|worker/supervision)
 allow server/worker/live \
   'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/(live|remote))'
 allow server/worker/remote 'core/base|server/(base|ops|rpc/calls|storage|store|worker/remote)'
-allow client 'core/(base|catalogue|color|image(/probe)?|trace|video)|client(/[a-z]+)?'
+allow client 'core/(base|catalogue|color|image(/(credit|probe))?|trace|video|zip)|client(/[a-z]+)?'
 
 forbid 'torch/|ATen/|c10/' core/base core/zip core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \
@@ -161,7 +162,7 @@ public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads
   embedded/embedded_weights
 public core/grid edge_weights grid_solver
 public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling reduced weighted_resize \
-  probe/focal_length probe/orientation probe/probe
+  credit/caption credit/picture_credit probe/focal_length probe/orientation probe/probe
 public core/keycolor edit_model from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_map hints/hints references/reference words/prompt
 public core/film anchor_frames film_carry moving_regions returning_shots shots steady_colors steady_tones

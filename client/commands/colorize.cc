@@ -21,6 +21,7 @@
 #include "client/lib/plan_text.h"
 #include "client/lib/text.h"
 #include "client/options/colorize_options.h"
+#include "client/options/credit_flags.h"
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
 
@@ -30,14 +31,16 @@ namespace {
 
 class Colorize {
  public:
-  Colorize(const Context& context, ColorizeOptions options)
+  Colorize(const Context& context, ColorizeOptions options, CreditFlags credit)
       : context_(context),
         options_(std::move(options)),
+        credit_(std::move(credit)),
         out_(options_.out),
         display_(context.json) {}
 
   ExitCode Run() {
     options_.Check();
+    credit_.credit.Validate();
     if (!options_.scene.empty()) return RunStored();
     folder_ = CollectPhotos(options_.photos, options_.film);
     if (!options_.masks.empty()) AddMasks(options_.masks, &folder_);
@@ -221,6 +224,7 @@ class Colorize {
     earlier.push_back(submitted.name());
     const v1::Job job = FollowToSuccess(*connection_, context_, earlier, out_.string(), display_);
     const auto files = DownloadResults(*connection_, context_, job, out_, display_);
+    CreditPictures(out_, files, credit_);
     print({{"job", job.name()},
            {"scene", spec.scene()},
            {"state", StateName(job.state())},
@@ -268,6 +272,7 @@ class Colorize {
 
   const Context& context_;
   ColorizeOptions options_;
+  const CreditFlags credit_;
   const fs::path out_;
   ProgressDisplay display_;
   PhotoFolder folder_;
@@ -279,14 +284,16 @@ class Colorize {
 
 void AddColorizeCommand(CLI::App& app, Context& context) {
   const auto options = std::make_shared<ColorizeOptions>();
+  const auto credit = std::make_shared<CreditFlags>();
   CLI::App* colorize = AddCommand(
       app,
       context,
       "colorize",
       "Make a coloured 3D scene from photos, or colour a film. Without a source of colour: select "
       "the photo to colour",
-      [&context, options] { return Colorize(context, *options).Run(); });
+      [&context, options, credit] { return Colorize(context, *options, *credit).Run(); });
   DeclareOptions(*colorize, options.get());
+  DeclareCreditFlags(*colorize, credit.get(), /*with_caption=*/false);
 }
 
 }  // namespace color3d::client

@@ -56,6 +56,7 @@ void AddPreviewCommand(CLI::App& app, Context& context);
 void AddViewCommand(CLI::App& app, Context& context);
 void AddCorrectCommand(CLI::App& app, Context& context);
 void AddMovieCommands(CLI::App& app, Context& context);
+void AddExportCommand(CLI::App& app, Context& context);
 void AddColorizerCommands(CLI::App& app, Context& context);
 void AddJobCommands(CLI::App& app, Context& context);
 void AddArtifactCommands(CLI::App& app, Context& context);

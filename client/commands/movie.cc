@@ -12,11 +12,12 @@
 #include "client/commands/command.h"
 #include "client/commands/console.h"
 #include "client/commands/follow.h"
-#include "client/commands/key_jobs.h"
 #include "client/commands/results.h"
+#include "client/commands/scene_products.h"
 #include "client/lib/blob_transfer.h"
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
+#include "client/options/credit_flags.h"
 #include "core/base/digest.h"
 #include "core/base/file_kind.h"
 #include "core/catalogue/artifacts.h"
@@ -42,6 +43,7 @@ struct MovieOptions {
   bool bounce = false;
   bool skip_cache = false;
   std::string movie_name = artifact::kMovie;  // in a folder
+  CreditFlags credit;                         // of pictures
 };
 
 bool IsMovieName(const fs::path& out) {
@@ -51,6 +53,7 @@ bool IsMovieName(const fs::path& out) {
 
 // Checks that need no server.
 void Check(const MovieOptions& options) {
+  options.credit.credit.Validate();
   if (options.path.empty() &&
       (options.seconds || options.time_s || options.bounce || options.pictures)) {
     throw InvalidArgument(
@@ -107,16 +110,14 @@ int FrameCount(const MovieOptions& options) {
 }
 
 v1::JobSpec MakeSpec(Connection& connection, const MovieOptions& options, const v1::Job& of) {
-  v1::JobSpec spec;
-  spec.set_scene(of.spec().scene());
+  v1::JobSpec spec = SpecOn(connection, of);
   spec.set_skip_cache(options.skip_cache);
-  for (const std::string& input : JobAndInputs(connection, of)) spec.add_inputs(input);
   v1::RenderSpec* render = spec.mutable_render();
   for (const std::string& view : options.views) render->add_views(view);
   if (options.max_side_px) {
     render->set_max_side_px(*options.max_side_px);
-  } else if (of.spec().colorize_scene().has_max_side_px()) {
-    render->set_max_side_px(of.spec().colorize_scene().max_side_px());
+  } else {
+    SetSideOf(of, render);
   }
   if (options.path.empty()) return spec;
   if (options.path == kOrbit) {
@@ -146,19 +147,19 @@ v1::JobSpec MakeSpec(Connection& connection, const MovieOptions& options, const 
 // Downloads the movie under its name and the other results into the folder. Returns their paths.
 std::vector<std::string> Fetch(Connection& connection,
                                const v1::Job& job,
-                               const fs::path& out,
-                               const std::string& movie_name,
+                               const MovieOptions& options,
                                ProgressDisplay& display) {
+  const fs::path out = options.out;
   const fs::path folder = IsMovieName(out) ? out.parent_path() : out;
   std::vector<v1::Artifact> artifacts(job.artifacts().begin(), job.artifacts().end());
   for (v1::Artifact& artifact : artifacts) {
     if (artifact.name() != artifact::kMovie) continue;
-    artifact.set_name(IsMovieName(out) ? out.filename().string() : movie_name);
+    artifact.set_name(IsMovieName(out) ? out.filename().string() : options.movie_name);
   }
+  const auto names = DownloadArtifacts(connection, artifacts, folder, display);
+  CreditPictures(folder, names, options.credit);
   std::vector<std::string> files;
-  for (const std::string& name : DownloadArtifacts(connection, artifacts, folder, display)) {
-    files.push_back((folder / name).string());
-  }
+  for (const std::string& name : names) files.push_back((folder / name).string());
   return files;
 }
 
@@ -173,7 +174,7 @@ ExitCode RunMovie(const Context& context, const MovieOptions& options) {
   ProgressDisplay display(context.json);
   const v1::Job job = FollowToSuccess(
       connection, context, {submitted.name()}, folder.empty() ? "." : folder.string(), display);
-  const auto files = Fetch(connection, job, out, options.movie_name, display);
+  const auto files = Fetch(connection, job, options, display);
   if (context.json) {
     PrintJson({{"job", job.name()},
                {"scene", job.spec().scene()},
@@ -250,6 +251,7 @@ void AddMovieCommands(CLI::App& app, Context& context) {
                      "Names of the views to render, or that the path original passes");
   render->add_option("-o,--out", rendering->out, "FILE.mp4 or a folder")->capture_default_str();
   render->add_flag("--png", rendering->pictures, "Also write every frame as a picture");
+  DeclareCreditFlags(*render, &rendering->credit, /*with_caption=*/true);
   render->add_flag("!--no-video", rendering->video, "With --png: write no movie");
 }
 

@@ -71,7 +71,7 @@ ExitCode RunList(const Context& context, int limit) {
   return PrintAnswer(context, all, Table(rows));
 }
 
-ExitCode RunShow(const Context& context, const std::string& name) {
+ExitCode RunShowScene(const Context& context, const std::string& name) {
   Connection connection(context.server, *context.interrupt);
   const v1::Scene scene = GetScene(connection, ResourceName(name, "scenes"));
   std::vector<std::vector<std::string>> rows = {{"FILE", "SIZE"}};
@@ -91,7 +91,7 @@ ExitCode RunShow(const Context& context, const std::string& name) {
                   Table(rows)));
 }
 
-ExitCode RunDelete(const Context& context, const std::string& name) {
+ExitCode RunDeleteScene(const Context& context, const std::string& name) {
   Connection connection(context.server, *context.interrupt);
   v1::DeleteSceneRequest request;
   request.set_name(ResourceName(name, "scenes"));
@@ -140,7 +140,7 @@ void AddSceneCommands(CLI::App& app, Context& context) {
              context,
              "show",
              "Show a scene with its files",
-             [&context, text] { return RunShow(context, *text); })
+             [&context, text] { return RunShowScene(context, *text); })
       ->add_option("NAME", *text, "scenes/ID")
       ->required();
 
@@ -148,7 +148,7 @@ void AddSceneCommands(CLI::App& app, Context& context) {
              context,
              "delete",
              "Delete a scene",
-             [&context, text] { return RunDelete(context, *text); })
+             [&context, text] { return RunDeleteScene(context, *text); })
       ->add_option("NAME", *text, "scenes/ID")
       ->required();
 }

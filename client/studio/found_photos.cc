@@ -1,7 +1,10 @@
 #include "client/studio/found_photos.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
+#include <map>
 
 #include "client/lib/photos/gray_copies.h"
 #include "core/base/error.h"
@@ -21,6 +24,10 @@ constexpr size_t kMostHeaders = 400;
 constexpr int kPhotosOfColor = 12;  // looked at for colour
 constexpr int kJpegQuality = 90;
 constexpr int64_t kBytesPerPhotoPixel = 40;
+constexpr int64_t kLargePixels = 60'000'000;
+constexpr int kEnoughSidePx = 6000;
+constexpr size_t kManyPhotos = 300;
+constexpr size_t kNamed = 3;  // of odd photos
 
 // As views are called: relative to images/.
 std::string ViewName(const LocalFile& photo) {
@@ -31,6 +38,13 @@ const char* KindOf(const PhotoFolder& folder) {
   if (folder.splat) return "splat";
   if (folder.film) return "film";
   return folder.camera_films.empty() ? "photos" : "films";
+}
+
+std::string NameSome(const std::vector<std::string>& names) {
+  const std::vector<std::string> first(names.begin(),
+                                       names.begin() + std::min(names.size(), kNamed));
+  const std::string list = fmt::format("{}", fmt::join(first, ", "));
+  return names.size() > kNamed ? fmt::format("{} and {} more", list, names.size() - kNamed) : list;
 }
 
 Json DescribePhoto(const LocalFile& photo) {
@@ -79,6 +93,12 @@ Json DescribePhotos(const PhotoFolder& folder, const CancellationToken& cancel) 
                           : Json::object({{"name", ViewName(folder.photos[i])}});
   });
   Json notes = folder.notes;
+  for (const std::string& note : SizeNotes(photos)) notes.push_back(note);
+  if (photos.size() > kManyPhotos) {
+    notes.push_back(fmt::format(
+        "{} photos take long; 10 to 50 of one place are enough, so bring a part of them",
+        photos.size()));
+  }
   Json in_color;
   bool is_whole = true;
   for (const Json& photo : photos) is_whole = is_whole && !photo.contains("problem");
@@ -98,6 +118,56 @@ Json DescribePhotos(const PhotoFolder& folder, const CancellationToken& cancel) 
           {"in_color", in_color},
           {"notes", notes},
           {"photos", photos}};
+}
+
+std::vector<std::string> SizeNotes(const Json& photos) {
+  std::map<std::pair<int, int>, std::vector<std::string>> sizes;
+  size_t known = 0;
+  for (const Json& photo : photos) {
+    const std::pair<int, int> size(photo.value("width", 0), photo.value("height", 0));
+    if (size.first == 0) continue;
+    sizes[size].push_back(photo.value("name", ""));
+    ++known;
+  }
+  std::vector<std::string> notes;
+  const auto most =
+      std::ranges::max_element(sizes, {}, [](const auto& size) { return size.second.size(); });
+  for (const auto& [size, names] : sizes) {
+    const auto [width, height] = size;
+    const std::string list = NameSome(names);
+    if (static_cast<int64_t>(width) * height >= kLargePixels) {
+      notes.push_back(fmt::format(
+          "{}: {} x {} px, which takes much memory and time; {} px on the longer side are enough",
+          list,
+          width,
+          height,
+          kEnoughSidePx));
+    } else if (known >= 3 && 2 * most->second.size() > known && size != most->first) {
+      notes.push_back(fmt::format("{}: {} x {} px, unlike most of the photos ({} x {} px)",
+                                  list,
+                                  width,
+                                  height,
+                                  most->first.first,
+                                  most->first.second));
+    }
+  }
+  return notes;
+}
+
+PhotoFolder CollectSet(const PhotoSet& set) {
+  const auto by_name = [&](std::string text) {
+    const std::string path = set.folder.string();
+    for (size_t at; (at = text.find(path)) != text.npos;) text.replace(at, path.size(), set.name);
+    return text;
+  };
+  try {
+    PhotoFolder folder = CollectPhotos(set.folder);
+    for (std::string& note : folder.notes) note = by_name(note);
+    return folder;
+  } catch (const Error& e) {
+    if (!set.is_own) throw;  // the user's own folder: its path helps
+    throw Error(e.code(), "{}", by_name(e.what()));
+  }
 }
 
 v1::CaptureFacts CaptureFactsOf(const PhotoFolder& folder) {

@@ -3,17 +3,27 @@
 
 #include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "client/lib/photos/photo_folder.h"
+#include "client/studio/photo_sets.h"
 #include "color3d/v1/job.pb.h"
 #include "core/base/cancellation.h"
 
 namespace color3d::client {
 
 // kind ("photos", "film", "films", "splat"), name, bytes, has_poses, in_color (true, false, or null
-// if unsure), notes on what is odd, and photos: for each its name as a view, width and height in px
-// (0: not a picture that can be used, with the problem). Reads the headers of at most 400 photos.
+// if unsure), notes on what is odd (by name), and photos: for each its name as a view, width and
+// height in px (0: not a picture that can be used, with the problem). Reads the headers of at most
+// 400 photos.
 nlohmann::ordered_json DescribePhotos(const PhotoFolder& folder, const CancellationToken& cancel);
+
+// What is odd about the sizes of photos, by name: few that differ from most, and scans that need
+// much memory. `photos` as in DescribePhotos.
+std::vector<std::string> SizeNotes(const nlohmann::ordered_json& photos);
+
+// CollectPhotos of a set; errors and notes call its folder by the name of the set.
+PhotoFolder CollectSet(const PhotoSet& set);
 
 // Facts for a plan before the upload.
 v1::CaptureFacts CaptureFactsOf(const PhotoFolder& folder);

@@ -70,5 +70,24 @@ TEST(ScaleStrokesTest, ScalesAllLengths) {
   EXPECT_THROW(ScaleStrokes("[1]", 0.5), Error);
 }
 
+TEST(SizeNotesTest, NameOddPhotos) {
+  const auto photo = [](const char* name, int width, int height) {
+    return nlohmann::ordered_json{{"name", name}, {"width", width}, {"height", height}};
+  };
+  const nlohmann::ordered_json even = {photo("a", 90, 60), photo("b", 90, 60), photo("c", 90, 60)};
+  EXPECT_TRUE(SizeNotes(even).empty());
+  nlohmann::ordered_json odd = even;
+  odd.push_back(photo("d.jpg", 60, 90));
+  odd.push_back(photo("scan.png", 20000, 10000));
+  const auto notes = SizeNotes(odd);
+  ASSERT_EQ(notes.size(), 2u);
+  EXPECT_NE(notes[0].find("d.jpg: 60 x 90 px, unlike most of the photos (90 x 60 px)"),
+            std::string::npos);
+  EXPECT_NE(notes[1].find("scan.png: 20000 x 10000 px, which takes much memory"),
+            std::string::npos);
+  // Where no size is that of most, none is odd.
+  EXPECT_TRUE(SizeNotes({photo("a", 1, 2), photo("b", 2, 1), photo("c", 3, 1)}).empty());
+}
+
 }  // namespace
 }  // namespace color3d::client

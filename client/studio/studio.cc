@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstdlib>
 #include <optional>
 #include <thread>
@@ -15,11 +16,14 @@
 #include "client/studio/found_photos.h"
 #include "client/studio/page_files.h"
 #include "client/studio/photo_sets.h"
+#include "client/studio/queue/queue_routes.h"
 #include "client/studio/run_progress.h"
+#include "client/studio/share/share_routes.h"
 #include "client/studio/studio_answers.h"
 #include "client/studio/studio_calls.h"
 #include "client/studio/studio_guard.h"
 #include "client/studio/studio_requests.h"
+#include "client/studio/studio_routes.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/base/text/lower_case.h"
@@ -33,12 +37,11 @@ using httplib::ContentReader;
 using httplib::Request;
 using httplib::Response;
 using Json = nlohmann::ordered_json;
+using Steady = std::chrono::steady_clock;
 
 constexpr int64_t kMaxPictureBytes = 256 << 20;
 constexpr int kMaxEventStreams = 8;
-std::string Pattern(const std::string& before, const std::string& after) {
-  return "/api/" + before + "/([0-9a-f-]{1,64})" + after;
-}
+constexpr auto Pattern = ApiPattern;
 
 // Counts event streams, so that they leave threads for other requests.
 class StreamPlace {
@@ -63,7 +66,7 @@ class Studio::Parts {
   Parts(const StudioOptions& options, const CancellationToken& cancel);
 
   void AddRoutes();
-  void Serve();
+  void Serve(const std::function<void(bool entered)>& look);
 
   const StudioOptions options_;
   const CancellationToken& cancel_;
@@ -72,12 +75,15 @@ class Studio::Parts {
   std::optional<StudioGuard> guard_;
   PhotoSets sets_;
   StudioCalls calls_;
+  ShareCalls share_;
+  QueueCalls queue_;
   const ScratchFolder downloads_;
   std::atomic<int> streams_{0};
+  std::atomic<Steady::time_point> last_request_{Steady::now()};
 
  private:
-  using Handler = std::function<void(const Request&, Response&)>;
-  using BodyHandler = std::function<void(const Request&, Response&, const ContentReader&)>;
+  using Handler = StudioRoutes::Handler;
+  using BodyHandler = StudioRoutes::BodyHandler;
 
   void Get(const std::string& pattern, Handler handler);
   void Post(const std::string& pattern, BodyHandler handler);
@@ -92,7 +98,7 @@ class Studio::Parts {
   void StreamEvents(const Request& request, Response& response);
   void SendArtifact(const Request& request, Response& response);
 
-  PhotoFolder FolderOf(const std::string& id) const { return CollectPhotos(sets_.Get(id).folder); }
+  PhotoFolder FolderOf(const std::string& id) const { return CollectSet(sets_.Get(id)); }
   // "scenes/..." of the set, uploaded if it is not there yet.
   std::string SceneOf(const std::string& id);
 };
@@ -103,7 +109,9 @@ Studio::Parts::Parts(const StudioOptions& options, const CancellationToken& canc
       http_(options.http),
       port_(http_.Bind(options.port)),
       sets_(options.folder),
-      calls_(options.server, cancel) {
+      calls_(options.server, cancel),
+      share_(options.server, cancel),
+      queue_(options.server, cancel) {
   if (port_ < 0) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot listen on port {} of this machine; name another with --port",
@@ -113,7 +121,10 @@ Studio::Parts::Parts(const StudioOptions& options, const CancellationToken& canc
   http_.set_pre_routing_handler([this](const Request& request, Response& response) {
     StudioGuard::Verdict verdict = guard_->CheckOrigin(request);
     if (verdict.status == 200 && request.path != "/open") verdict = guard_->CheckCookie(request);
-    if (verdict.status == 200) return httplib::Server::HandlerResponse::Unhandled;
+    if (verdict.status == 200) {
+      last_request_ = Steady::now();
+      return httplib::Server::HandlerResponse::Unhandled;
+    }
     AnswerError(verdict.status, "PERMISSION_DENIED", verdict.reason, response);
     return httplib::Server::HandlerResponse::Handled;
   });
@@ -153,6 +164,19 @@ void Studio::Parts::AddRoutes() {
   AddPageRoutes();
   AddSetRoutes();
   AddJobRoutes();
+  const StudioRoutes routes{
+      [this](const std::string& pattern, Handler handler) { Get(pattern, std::move(handler)); },
+      [this](const std::string& pattern, BodyHandler handler) {
+        Post(pattern, std::move(handler));
+      }};
+  AddShareRoutes(routes,
+                 {options_.folder,
+                  downloads_.path(),
+                  [this](const std::string& set) { return FolderOf(set); },
+                  &calls_,
+                  &cancel_},
+                 share_);
+  AddQueueRoutes(routes, queue_);
 }
 
 void Studio::Parts::AddPageRoutes() {
@@ -161,6 +185,9 @@ void Studio::Parts::AddPageRoutes() {
     const PageFile* file = FindPageFile(request.path);
     response.set_content(file->bytes.data(), file->bytes.size(), file->media_type);
   });
+  // Pages ask every half minute, so that a studio ends when the last one has been closed.
+  Get("/api/alive",
+      [](const Request&, Response& response) { AnswerJson(Json::object(), response); });
   Get("/api/state", [this](const Request&, Response& response) {
     Json sets = Json::array();
     for (const PhotoSet& set : sets_.List()) sets.push_back(SetJson(set));
@@ -176,7 +203,12 @@ void Studio::Parts::AddSetRoutes() {
   Get(Pattern("sets", ""), [this](const Request& request, Response& response) {
     const PhotoSet set = sets_.Get(request.matches[1]);
     Json json = SetJson(set);
-    json["found"] = DescribePhotos(CollectPhotos(set.folder), cancel_);
+    try {
+      json["found"] = DescribePhotos(CollectSet(set), cancel_);
+    } catch (const Error& e) {  // no error of the call: the page says what is wrong with the files
+      if (e.code() == ErrorCode::kCancelled) throw;
+      json["problem"] = e.what();
+    }
     AnswerJson(json, response);
   });
   Get(Pattern("sets", "/photo"), [this](const Request& request, Response& response) {
@@ -351,18 +383,24 @@ void Studio::Parts::SendArtifact(const Request& request, Response& response) {
   const fs::path file = SafePathBelow(downloads_.path() / job, name);
   const std::string type = calls_.Fetch(job, name, file);
   if (request.has_param("download")) {
-    std::string plain = fs::path(name).filename().string();
-    std::erase_if(plain, [](char c) { return c == '"' || c == '\\' || c < ' ' || c > '~'; });
-    response.set_header("Content-Disposition", "attachment; filename=\"" + plain + "\"");
+    SetDownloadName(fs::path(name).filename().string(), response);
   } else if (type == "text/html") {
     return AnswerSandboxed(ReadFile(file), response);
   }
   response.set_content(ReadFile(file), type);
 }
 
-void Studio::Parts::Serve() {
+void Studio::Parts::Serve(const std::function<void(bool entered)>& look) {
   std::thread listener([this] { http_.listen_after_bind(); });
-  while (!cancel_.IsCancelled()) std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  last_request_ = Steady::now();
+  const auto is_left = [&] {
+    return options_.idle_exit.count() > 0 && streams_ == 0 &&
+           Steady::now() - last_request_.load() > options_.idle_exit;
+  };
+  while (!cancel_.IsCancelled() && !is_left()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    if (look) look(guard_->is_used());
+  }
   // stop() before listen_after_bind() has begun would be lost.
   while (!http_.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
   http_.Stop();
@@ -394,6 +432,6 @@ std::string Studio::Address(const std::string& page) const {
 
 int Studio::port() const { return parts_->port_; }
 
-void Studio::Serve() { parts_->Serve(); }
+void Studio::Serve(const std::function<void(bool entered)>& look) { parts_->Serve(look); }
 
 }  // namespace color3d::client

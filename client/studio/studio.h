@@ -2,7 +2,9 @@
 // (README.md). The work is done by the service; the studio keeps dropped files and hands on calls.
 #pragma once
 
+#include <chrono>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 
@@ -16,6 +18,8 @@ struct StudioOptions {
   std::filesystem::path folder;  // dropped files
   int port = 0;                  // 0: any free port
   HttpLimits http;
+  // The studio ends after this time without a request; 0: never. Jobs go on.
+  std::chrono::seconds idle_exit{0};
   int64_t max_file_bytes = int64_t{8} << 30;  // of a dropped file
 };
 
@@ -37,8 +41,9 @@ class Studio {
   std::string Address(const std::string& page) const;
   int port() const;
 
-  // Answers requests until `cancel` is set.
-  void Serve();
+  // Answers requests until `cancel` is set or nobody has used it for idle_exit. Calls `look` ten
+  // times a second; `entered`: the address has let a browser in.
+  void Serve(const std::function<void(bool entered)>& look = {});
 
  private:
   class Parts;

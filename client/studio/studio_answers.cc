@@ -92,6 +92,12 @@ void AnswerSandboxed(const std::string& html, httplib::Response& response) {
   response.set_content(html, "text/html; charset=utf-8");
 }
 
+void SetDownloadName(const std::string& name, httplib::Response& response) {
+  std::string plain = name;
+  std::erase_if(plain, [](char c) { return c == '"' || c == '\\' || c < ' ' || c > '~'; });
+  response.set_header("Content-Disposition", "attachment; filename=\"" + plain + "\"");
+}
+
 void RequireLength(const httplib::Request& request, int64_t max_bytes) {
   if (!request.has_header("Content-Length")) return;  // counted as it arrives
   const std::string text = request.get_header_value("Content-Length");

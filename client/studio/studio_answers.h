@@ -25,6 +25,9 @@ void AddSafetyHeaders(httplib::Response& response);
 // studio, this machine or the network.
 void AnswerSandboxed(const std::string& html, httplib::Response& response);
 
+// The browser keeps the answer as a file; characters that a header cannot hold are left out.
+void SetDownloadName(const std::string& name, httplib::Response& response);
+
 // The whole body. Throws Error{kResourceExhausted} above `max_bytes`, kAborted if it ends early.
 std::string ReadBody(const httplib::Request& request,
                      const httplib::ContentReader& reader,

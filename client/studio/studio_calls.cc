@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <set>
 
 #include "client/commands/follow.h"
 #include "client/commands/results.h"
@@ -14,11 +15,13 @@
 #include "client/options/colorize_options.h"
 #include "client/options/key_color_flags.h"
 #include "client/studio/found_photos.h"
+#include "client/studio/live_png.h"
 #include "client/studio/run_progress.h"
 #include "core/base/error.h"
 #include "core/base/file_kind.h"
 #include "core/base/files.h"
 #include "core/catalogue/artifacts.h"
+#include "core/catalogue/limits.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {
@@ -38,7 +41,34 @@ ColorizeOptions OptionsOf(const RunChoices& choices) {
   options.preset = choices.preset;
   options.key_view = choices.key_view;
   options.time_budget_seconds = choices.time_budget_seconds;
+  options.poses = choices.poses;
   return options;
+}
+
+v1::KeyColorSource KeyColorOf(Connection& connection, const RunChoices& choices) {
+  KeyColorFlags color;
+  color.automatic = choices.automatic;
+  if (!choices.automatic) (choices.is_strokes ? color.hints : color.image) = choices.picture;
+  color.Check();
+  return UploadKeyColor(connection, color);
+}
+
+// Throws Error{kInvalidArgument} unless each has a photo of its own.
+void CheckKeyViews(const RunChoices& choices) {
+  if (choices.further.size() > size_t{kMaxAdditionalKeyViews}) {
+    throw InvalidArgument("{} more photos are coloured; at most {} are used",
+                          choices.further.size(),
+                          kMaxAdditionalKeyViews);
+  }
+  std::set<std::string> views = {choices.key_view};
+  for (const RunChoices& one : choices.further) {
+    if (choices.key_view.empty() || one.key_view.empty()) {
+      throw InvalidArgument("choose the photos that the colours belong to");
+    }
+    if (!views.insert(one.key_view).second) {
+      throw InvalidArgument("the photo {} is coloured twice; remove one of them", one.key_view);
+    }
+  }
 }
 
 Json PlanJson(const v1::JobPlan& plan) {
@@ -70,35 +100,6 @@ std::optional<v1::JobPlan> PlanOf(Connection& connection, const v1::PlanJobReque
   } catch (const RpcError&) {  // an older server, or options that it no longer takes
     return std::nullopt;
   }
-}
-
-std::string LivePng(Connection& connection,
-                    const LiveSource& source,
-                    const LivePicture& picture,
-                    int max_side_px) {
-  std::string png;
-  ColorizeLive(
-      connection,
-      source,
-      {picture},
-      {.max_side_px = max_side_px},
-      [&](size_t, const v1::ColorizeImagesResponse& answer) {
-        if (answer.has_error()) {
-          throw Error(ErrorCodeOf(static_cast<grpc::StatusCode>(answer.error().code())),
-                      "{}",
-                      answer.error().message());
-        }
-        if (!answer.has_image_digest()) {
-          png = answer.image();
-          return;
-        }
-        const ScratchFolder scratch;
-        const auto file = scratch.path() / "picture.png";
-        const v1::Digest& digest = answer.image_digest();
-        DownloadBlob(connection, {digest.sha256(), digest.size_bytes()}, file, [](int64_t) {});
-        png = ReadFile(file);
-      });
-  return png;
 }
 
 // The stage of a run that coloured its key view; nullopt if it has not ended yet.
@@ -181,17 +182,20 @@ Json StudioCalls::KeyViews(const std::string& job) const {
 }
 
 v1::Job StudioCalls::Colorize(const std::string& scene, const RunChoices& choices) const {
-  KeyColorFlags color;
-  color.automatic = choices.automatic;
-  if (!choices.automatic) (choices.is_strokes ? color.hints : color.image) = choices.picture;
-  color.Check();
   if (!choices.automatic && choices.key_view.empty()) {
     throw InvalidArgument("choose the photo that the colours belong to");
   }
+  CheckKeyViews(choices);
   Connection connection = Connect();
   v1::JobSpec spec = ColorizeSpec(OptionsOf(choices), ResourceName(scene, "scenes"));
   spec.mutable_colorize_scene()->set_key_view(choices.key_view);
-  *spec.mutable_colorize_scene()->mutable_key_color() = UploadKeyColor(connection, color);
+  *spec.mutable_colorize_scene()->mutable_key_color() = KeyColorOf(connection, choices);
+  for (const RunChoices& one : choices.further) {
+    v1::FurtherKeyView* added =
+        spec.mutable_colorize_scene()->mutable_carry_color()->add_further_key_views();
+    added->set_view(one.key_view);
+    *added->mutable_color() = KeyColorOf(connection, one);
+  }
   return SubmitJob(connection, spec);
 }
 

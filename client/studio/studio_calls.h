@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/lib/connection.h"
 #include "client/lib/photos/photo_folder.h"
@@ -24,6 +25,9 @@ struct RunChoices {
   std::filesystem::path picture;     // a coloured key view, or its strokes
   bool is_strokes = false;           // `picture` holds points as JSON, as for `key color --hints`
   double time_budget_seconds = 0.0;  // 0: none
+  bool poses = false;                // films: also a scene in 3D
+  // More photos that the user coloured, the most important first: their key views and colours.
+  std::vector<RunChoices> further;
 };
 
 class StudioCalls {

@@ -75,6 +75,11 @@ std::string StudioGuard::Exchange(const std::string& token) {
   return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict", cookie_, session_);
 }
 
+bool StudioGuard::is_used() const {
+  const MutexLock lock(mutex_);
+  return is_used_;
+}
+
 StudioGuard::Verdict StudioGuard::CheckOrigin(const httplib::Request& request) const {
   const std::string host = request.get_header_value("Host");
   const bool is_own_host = host == "127.0.0.1:" + port_ || host == "localhost:" + port_;

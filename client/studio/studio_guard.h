@@ -29,6 +29,9 @@ class StudioGuard {
   // used before.
   std::string Exchange(const std::string& token);
 
+  // Whether the token has let a browser in.
+  bool is_used() const;
+
   struct Verdict {
     int status = 200;    // of HTTP; 200: may pass
     std::string reason;  // for the user
@@ -41,7 +44,7 @@ class StudioGuard {
  private:
   const std::string token_, session_;
   const std::string port_, cookie_;
-  Mutex mutex_;
+  mutable Mutex mutex_;
   bool is_used_ COLOR3D_GUARDED_BY(mutex_) = false;
 };
 

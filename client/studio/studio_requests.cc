@@ -12,6 +12,28 @@ using httplib::Request;
 using Json = nlohmann::ordered_json;
 constexpr int kMaxSidePx = 8192;
 
+// A photo and its colours.
+RunChoices ReadKeyView(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
+  RunChoices choices;
+  choices.key_view = TextOf(body, "key_view");
+  const std::string color = TextOf(body, "color");
+  if (color.empty() || color == "automatic") return choices;
+  choices.automatic = false;
+  if (color == "strokes") {
+    const auto strokes = body.find("strokes");
+    if (strokes == body.end() || !strokes->is_array() || strokes->empty()) {
+      throw InvalidArgument("there are no strokes yet; draw one, or choose automatic colours");
+    }
+    choices.is_strokes = true;
+    choices.picture = sets.KeepPicture(set, ".json", strokes->dump());
+    return choices;
+  }
+  if (color != "picture") throw InvalidArgument("color is automatic, picture or strokes");
+  const std::string picture = TextOf(body, "picture");
+  choices.picture = sets.KeptPicture(set, picture);
+  return choices;
+}
+
 }  // namespace
 
 std::string TextOf(const nlohmann::json& body, const char* field) {
@@ -40,28 +62,21 @@ Json SetJson(const PhotoSet& set) {
 }
 
 RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
-  RunChoices choices;
+  RunChoices choices = ReadKeyView(body, set, sets);
   const std::string preset = TextOf(body, "preset");
   if (preset.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != preset.npos) {
     throw InvalidArgument("the preset {} is unknown", preset.substr(0, 40));  // never a file
   }
   if (!preset.empty()) choices.preset = preset;
-  choices.key_view = TextOf(body, "key_view");
-  const std::string color = TextOf(body, "color");
-  if (color.empty() || color == "automatic") return choices;
-  choices.automatic = false;
-  if (color == "strokes") {
-    const auto strokes = body.find("strokes");
-    if (strokes == body.end() || !strokes->is_array() || strokes->empty()) {
-      throw InvalidArgument("there are no strokes yet; draw one, or choose automatic colours");
-    }
-    choices.is_strokes = true;
-    choices.picture = sets.KeepPicture(set, ".json", strokes->dump());
-    return choices;
+  const auto poses = body.find("poses");
+  choices.poses = poses != body.end() && *poses == true;
+  const auto further = body.find("further");
+  if (further == body.end()) return choices;
+  if (!further->is_array()) throw InvalidArgument("further is not a list");
+  for (const nlohmann::json& one : *further) {
+    if (!one.is_object()) throw InvalidArgument("further is not a list of photos");
+    choices.further.push_back(ReadKeyView(one, set, sets));
   }
-  if (color != "picture") throw InvalidArgument("color is automatic, picture or strokes");
-  const std::string picture = TextOf(body, "picture");
-  choices.picture = sets.KeptPicture(set, picture);
   return choices;
 }
 

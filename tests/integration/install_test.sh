@@ -27,6 +27,16 @@ for file in share/doc/color3d/README.md share/doc/color3d/deploy/README.md \
   [ -s "$prefix/$file" ] || fail "$file was not installed"
 done
 
+# The studio, where it is built, has an entry in the menu that starts the installed program.
+if "$prefix/bin/color3d" studio --help >/dev/null 2>&1; then
+  entry=$prefix/share/applications/color3d-studio.desktop
+  grep -qF "Exec=\"$prefix/bin/color3d\" studio --from-menu %f" "$entry" || fail "the menu has no entry of the studio"
+  [ -s "$prefix/share/icons/hicolor/scalable/apps/color3d-studio.svg" ] || fail "the studio's icon was not installed"
+  if command -v desktop-file-validate >/dev/null; then
+    said=$(desktop-file-validate "$entry") || fail "$said"
+  fi
+fi
+
 "$prefix/bin/color3d-server" serve --listen 127.0.0.1:0 --data-dir "$prefix/data" \
   --port-file "$prefix/address" >"$prefix/log" 2>&1 &
 server=$!

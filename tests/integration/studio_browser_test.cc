@@ -6,38 +6,14 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "core/base/error.h"
 #include "core/base/files.h"
-#include "tests/integration/service_fixture.h"
+#include "tests/integration/studio_fixture.h"
 
 namespace color3d {
 namespace {
 using std::chrono::seconds;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-bool IsInstalled(const std::string& program, const ScratchFolder& scratch) {
-  return RunProcess({"env", program, "--version"}, scratch.path() / "log", seconds(30)).exit_code ==
-         0;
-}
-
-class StudioTest : public ServiceTest {
- protected:
-  void SetUp() override {
-    if (!IsInstalled("chromium", folder_)) GTEST_SKIP() << "skipped, because there is no Chromium";
-    if (!IsInstalled("node", folder_)) GTEST_SKIP() << "skipped, because there is no Node";
-    ::setenv("XDG_DATA_HOME", Path("home").c_str(), 1);
-    StartServer();
-  }
-  // Returns the address that the studio prints.
-  std::string AddressOf(Process& studio) {
-    EXPECT_TRUE(
-        WaitUntil([&] { return studio.Out().find('\n') != std::string::npos; }, seconds(30)))
-        << studio.Err();
-    const std::string out = studio.Out();
-    return out.substr(0, out.find('\n'));
-  }
-};
 
 TEST_F(StudioTest, FolderBecomesColoredScene) {
   WriteProceduralScene(Path("room"), SmallRoom(8, /*gray=*/true));

@@ -1,5 +1,7 @@
 #include "client/lib/photos/photo_folder.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <set>
 
@@ -167,6 +169,22 @@ std::optional<LocalFile> FindOnly(const fs::path& root,
   return LocalFile{found[0], root / found[0]};
 }
 
+// "; it has a.txt, b.csv" of a folder without a picture; "" for an empty one.
+std::string WhatIsThere(const fs::path& root) {
+  constexpr size_t kShown = 3;
+  std::vector<std::string> names;
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(root, none)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with('.') && IsFile(entry.path())) names.push_back(EscapeControls(name));
+  }
+  if (names.empty()) return "";
+  std::ranges::sort(names);
+  const bool has_more = names.size() > kShown;
+  names.resize(std::min(names.size(), kShown));
+  return fmt::format("; it has {}{}", fmt::join(names, ", "), has_more ? ", ..." : "");
+}
+
 void CheckCounts(const PhotoFolder& folder, bool as_frames, const SkippedFiles& skipped) {
   const std::string root = folder.root.string();
   if (folder.splat || folder.film || !folder.camera_films.empty()) return;
@@ -177,11 +195,12 @@ void CheckCounts(const PhotoFolder& folder, bool as_frames, const SkippedFiles& 
         : HasPoses(folder.root)
             ? "; the photos that its poses are of belong into " + (folder.root / "images").string()
             : "; did you mean " + (folder.root / sub).string() + "?";
+    const std::string clause = skipped.Clause();
     throw InvalidArgument("{} contains no photographs ({}){}{}",
                           root,
                           ReadableImageFormats(),
                           remedy,
-                          skipped.Clause());
+                          clause.empty() && remedy.empty() ? WhatIsThere(folder.root) : clause);
   }
   if (folder.photos.size() == 1 && as_frames) {
     throw InvalidArgument(

@@ -249,6 +249,8 @@ TEST_F(PhotoFolderTest, NotesUnusedPosesBesidePhotos) {
 
 TEST_F(PhotoFolderTest, ErrorsNameFolder) {
   EXPECT_THAT(ErrorOf(root()), HasSubstr("there is no folder"));
+  Write("notes.txt"), Write("list.csv");
+  EXPECT_THAT(ErrorOf(root()), HasSubstr("; it has list.csv, notes.txt"));
   Write("deep/a.jpg");
   EXPECT_THAT(ErrorOf(root()), HasSubstr("contains no photographs (JPEG, PNG, TIFF, "));
   EXPECT_THAT(ErrorOf(root()), HasSubstr("did you mean"));

@@ -54,7 +54,10 @@ struct Kind {
   const char* remedy;
 };
 constexpr Kind kKinds[] = {
-    {" heic heif hif ", "HEIC pictures", "convert them to JPEG, e.g. `heif-convert a.heic a.jpg`"},
+    {" heic heif hif ",
+     "HEIC pictures",
+     "convert them to JPEG: export them from the program that shows them, or `heif-convert a.heic "
+     "a.jpg`"},
     {" avif ", "AVIF pictures", "convert them to PNG, e.g. `heif-convert a.avif a.png`"},
     {" jxl ", "JPEG XL pictures", "convert them to PNG, e.g. `djxl a.jxl a.png`"},
     {" jp2 j2k jpx jpf jpc j2c ",
@@ -72,6 +75,9 @@ constexpr Kind kKinds[] = {
     {" gif ",
      "GIF files",
      "convert pictures to PNG, and animated ones to a film (`ffmpeg -i a.gif a.mp4`)"},
+    {" obj mtl fbx stl dae 3ds blend gltf glb usd usdz ",
+     "3D meshes",
+     "photos, films and splats (.ply, .sog, .spz) are read"},
     {" pdf eps ps ai svg svgz ",
      "documents",
      "take the pictures out as PNG, e.g. `pdfimages -png a.pdf a`"},

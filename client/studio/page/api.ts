@@ -37,9 +37,13 @@ export interface KeyViews {
 export interface State {
   server: { version: string; address: string; presets: string[] }; sets: PhotoSet[]; jobs: Job[];
 }
-export interface Choices {
-  preset: string; key_view: string; color: 'automatic' | 'picture' | 'strokes';
-  picture?: string; strokes?: readonly unknown[];
+export interface KeyChoice {
+  key_view: string; color: 'automatic' | 'picture' | 'strokes'; picture?: string; strokes?: readonly unknown[];
+}
+export interface Choices extends KeyChoice {
+  preset: string;
+  poses?: boolean; // films: also a scene in 3D
+  further?: KeyChoice[]; // more coloured photos
 }
 
 const answerOf = async (request: Promise<Response>): Promise<Response> => {
@@ -48,22 +52,26 @@ const answerOf = async (request: Promise<Response>): Promise<Response> => {
     response = await request;
   } catch (error) {
     if (error instanceof DOMException && error.name === 'AbortError') throw error;
-    throw new StudioError('The studio does not answer. Start it again with `color3d studio`.', 'UNREACHABLE');
+    throw new StudioError('The studio does not answer. Start Color3D Studio again from the menu, or with `color3d studio`.', 'UNREACHABLE');
   }
   if (response.ok) return response;
   const body = await response.json().catch(() => null) as { error?: { code: string; message: string } } | null;
   throw new StudioError(body?.error?.message ?? `The studio answered ${response.status}.`, body?.error?.code ?? 'UNKNOWN');
 };
 
-const get = async <T>(path: string): Promise<T> => (await answerOf(fetch(path))).json() as Promise<T>;
-const post = async <T>(path: string, body: unknown = {}): Promise<T> =>
+export const get = async <T>(path: string): Promise<T> => (await answerOf(fetch(path))).json() as Promise<T>;
+export const post = async <T>(path: string, body: unknown = {}): Promise<T> =>
   (await answerOf(fetch(path, { method: 'POST', body: JSON.stringify(body) }))).json() as Promise<T>;
-const query = (values: Record<string, string | number>): string =>
+export const query = (values: Record<string, string | number>): string =>
   new URLSearchParams(Object.entries(values).map(([name, value]) => [name, String(value)])).toString();
 
 export const getState = (): Promise<State> => get('/api/state');
 export const makeSet = (name: string): Promise<PhotoSet> => post('/api/sets', { name });
-export const describeSet = (id: string): Promise<PhotoSet & { found: Found }> => get(`/api/sets/${id}`);
+export const describeSet = async (id: string): Promise<PhotoSet & { found: Found }> => {
+  const set = await get<PhotoSet & { found?: Found; problem?: string }>(`/api/sets/${id}`);
+  if (!set.found) throw new StudioError(set.problem ?? 'These files cannot be used.', 'INVALID_ARGUMENT');
+  return { ...set, found: set.found };
+};
 export const sendFile = async (id: string, name: string, file: Blob): Promise<void> => {
   await answerOf(fetch(`/api/sets/${id}/files?${query({ name })}`, { method: 'POST', body: file }));
 };
@@ -104,7 +112,7 @@ export const follow = (
     on.end();
   });
   source.onerror = () => {
-    if (source.readyState === EventSource.CLOSED) on.problem('The studio does not answer. Start it again with `color3d studio`.');
+    if (source.readyState === EventSource.CLOSED) on.problem('The studio does not answer. Start Color3D Studio again from the menu, or with `color3d studio`.');
   };
   return () => source.close();
 };

@@ -2,6 +2,7 @@
 import { getState, makeSet, photoUrl, sendFile, describeSet, type Job, type PhotoSet } from './api';
 import { bar, button, h, problem, replace, say } from './dom';
 import { filesOfDrop, filesOfInput, type Drop } from './drops';
+import { queueView } from './queue/queue';
 import { bytes, day, isFinished, stateName } from './words';
 
 const filesAtOnce = 3;
@@ -62,7 +63,7 @@ const cards = (sets: PhotoSet[], jobs: Job[]): HTMLElement[] => {
   return rows.sort((a, b) => b.at - a.at).map(({ element }) => element);
 };
 
-export const showHome = (main: HTMLElement): void => {
+export const showHome = (main: HTMLElement): (() => void) => {
   const dropping = h('div', { class: 'dropping' });
   const take = async (drop: Drop): Promise<void> => {
     if (!drop.files.length) return;
@@ -108,16 +109,20 @@ export const showHome = (main: HTMLElement): void => {
   h('p', { class: 'row' }, input('Choose photos', 'choose-files', false), input('Choose a folder', 'choose-folder', true)));
 
   const list = h('section', { 'aria-labelledby': 'list-title', hidden: true });
+  let known: PhotoSet[] = [];
+  const queue = queueView(() => known, () => void load());
   replace(main,
     h('div', { class: 'hero' },
       h('h1', {}, 'Colour a place from its grey photos'),
       h('p', { class: 'lead' }, 'You colour one photo. Its colours go to the same surfaces in all others, and to a 3D scene that you can walk through.')),
-    area, dropping, list,
+    area, dropping, queue.element, list,
     h('p', { class: 'soft small' }, 'Everything stays on this computer.'));
 
   const load = async (): Promise<void> => {
     try {
       const { sets, jobs } = await getState();
+      known = sets;
+      queue.refresh();
       const rows = cards(sets, jobs);
       list.hidden = rows.length === 0;
       replace(list, h('h2', { id: 'list-title' }, 'Your scenes'), h('ul', { class: 'cards' }, ...rows));
@@ -127,4 +132,5 @@ export const showHome = (main: HTMLElement): void => {
     }
   };
   void load();
+  return queue.stop;
 };

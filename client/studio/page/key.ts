@@ -1,9 +1,11 @@
 // Which photo is coloured, and with what.
 import {
   colorize, describeSet, follow, getState, keepPicture, keyViews, photoUrl, previewStrokes, selectKey,
-  type Choices, type Found, type KeyViews, type Run,
+  type Choices, type Found, type KeyChoice, type KeyViews, type Run,
 } from './api';
 import { bar, button, h, problem, replace, say } from './dom';
+import { furtherKeys } from './keys/further_keys';
+import { asChoices } from './keys/key_list';
 import { Painter, type StrokeFile } from './paint/index';
 import { errorInWords, seconds, stageName } from './words';
 
@@ -82,6 +84,26 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
       if (strokes.length) painter.load(strokes);
     };
 
+    const keyNow = (): KeyChoice => {
+      if (painter) strokes = painter.strokes();
+      if (way === 'strokes' && !strokes.length) throw new Error('Draw a stroke first, or choose automatic colours.');
+      if (way === 'picture' && !picture) throw new Error('Bring the coloured picture first.');
+      return { key_view: view, color: way, ...(way === 'picture' ? { picture } : {}), ...(way === 'strokes' ? { strokes } : {}) };
+    };
+    const also = furtherKeys<KeyChoice>({
+      set, key: keyNow, proposed: views.views.map(({ name }) => name), photos: found.photos.map(({ name }) => name),
+      go: (next, kept) => {
+        choose(next);
+        if (!kept) return;
+        picture = kept.picture ?? '';
+        strokes = (kept.strokes ?? []) as StrokeFile;
+        const radio = wayChoice.querySelector<HTMLInputElement>(`input[value=${kept.color}]`);
+        if (radio) radio.checked = true;
+        pickWay(kept.color);
+      },
+      problem: (text) => replace(problems, text !== null && problem(text)),
+    });
+
     const choose = (next: string): void => {
       if (next !== view) strokes = [];
       view = next;
@@ -140,16 +162,12 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
     const presetWords: Record<string, string> = { fast: 'Fast', best: 'Best, takes several times as long' };
     const preset = h('select', { id: 'preset' }, ...presets.filter((value) => presetWords[value])
       .map((value) => h('option', { value }, presetWords[value]!)));
+    const poses = h('input', { type: 'checkbox', id: 'poses' });
     const start = button('Colour the scene', () => void run(), { class: 'main-button', id: 'start' });
     const run = async (): Promise<void> => {
       start.disabled = true;
       try {
-        if (painter) strokes = painter.strokes();
-        if (way === 'picture' && !picture) throw new Error('Bring the coloured picture first.');
-        const job = await colorize(set, {
-          preset: preset.value || 'fast', key_view: view, color: way,
-          ...(way === 'picture' ? { picture } : {}), ...(way === 'strokes' ? { strokes } : {}),
-        });
+        const job = await colorize(set, { preset: preset.value || 'fast', poses: poses.checked, ...asChoices(also.all()) });
         location.hash = `job/${job.id}`;
       } catch (error) {
         start.disabled = false;
@@ -161,10 +179,12 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
       h('div', { class: 'key-layout' },
         h('div', { class: 'key-main' }, name, stage,
           h('section', { 'aria-labelledby': 'which' }, h('h2', { id: 'which' }, 'Which photo'), options,
-            found.photos.length > 1 && h('p', {}, h('label', { for: 'other-view', class: 'said' }, 'Another photo'), others))),
+            found.photos.length > 1 && h('p', {}, h('label', { for: 'other-view', class: 'said' }, 'Another photo'), others),
+            found.photos.length > 1 && also.root)),
         h('div', { class: 'key-side panel' },
           wayChoice, detail, problems,
           h('p', { class: 'row' }, h('label', { for: 'preset' }, 'Quality'), preset),
+          found.kind === 'film' && h('label', { class: 'choice' }, poses, ' Also a scene in 3D: finds how the camera moved, and takes several times as long'),
           h('p', {}, start))));
     choose(views.view);
     pickWay(way);

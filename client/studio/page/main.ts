@@ -1,9 +1,11 @@
-// The studio's page: which part is shown follows the address (#set/ID, #key/ID, #job/ID).
+// The studio's page: which part is shown follows the address (#set/ID, #key/ID, #job/ID, #sheet/ID).
+import { stayAlive } from './alive';
 import { h, problem, replace } from './dom';
 import { showHome } from './home';
 import { showKey } from './key';
 import { showPhotos } from './photos';
 import { showRun } from './run';
+import { showSheet } from './share/sheet';
 
 // Shows itself in `main`. Returns what to do when it is left.
 export type Show = (main: HTMLElement, id: string) => (() => void) | void;
@@ -13,6 +15,7 @@ const pages: Record<string, { show: Show; step: number }> = {
   set: { show: showPhotos, step: 1 },
   key: { show: showKey, step: 2 },
   job: { show: showRun, step: 3 },
+  sheet: { show: showSheet, step: 3 },
 };
 const stepNames = ['Photos', 'Colours', 'Scene'];
 
@@ -62,5 +65,6 @@ document.getElementById('skip')!.addEventListener('click', (event) => {
 });
 // A file that misses the drop area must not replace the page.
 for (const kind of ['dragover', 'drop'] as const) addEventListener(kind, (event) => event.preventDefault());
+stayAlive(document.getElementById('gone')!);
 addEventListener('hashchange', show);
 show();

@@ -49,7 +49,7 @@ const planTable = (plan: Plan): HTMLElement => h('details', { class: 'plan' },
   plan.measured_jobs === 0 && h('p', { class: 'soft small' }, 'Estimated for a machine with two cores; this one has not been measured yet.'));
 
 export const showPhotos = (main: HTMLElement, set: string): (() => void) => {
-  let left = false;
+  let left = false, isLooking = true;
   const body = h('div', { class: 'stack' }, h('p', { class: 'soft' }, 'Looking at the photos …'));
   const title = h('h1', {}, 'Photos');
   replace(main, title, body);
@@ -57,6 +57,7 @@ export const showPhotos = (main: HTMLElement, set: string): (() => void) => {
     try {
       const { name, found } = await describeSet(set);
       if (left) return;
+      isLooking = false;
       title.textContent = name;
       const bad = found.photos.filter((photo) => photo.problem);
       const plan = h('div', {});
@@ -69,7 +70,9 @@ export const showPhotos = (main: HTMLElement, set: string): (() => void) => {
       say(`${found.photos.length} photos found`);
       replace(plan, planTable(await planRun(set, 'fast')));
     } catch (error) {
-      if (!left) body.append(problem((error as Error).message, h('a', { class: 'button', href: '#' }, 'Drop other photos')));
+      if (left) return;
+      if (isLooking) replace(body);
+      body.append(problem((error as Error).message, h('a', { class: 'button', href: '#' }, 'Drop other photos')));
     }
   };
   void load();

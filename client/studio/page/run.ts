@@ -1,24 +1,17 @@
 // A run: what it is doing, pictures as they come, and its results.
 import {
   artifactUrl, cancelJob, describeSet, follow, getState, previewOfRun, retryJob,
-  type Artifact, type PhotoSet, type Run, type Stage,
+  type PhotoSet, type Run, type Stage,
 } from './api';
 import { bar, button, h, problem, replace, say } from './dom';
 import { setStepsOf } from './main';
-import { bytes, errorInWords, isFinished, seconds, stageName, stateName } from './words';
+import { movedTo } from './queue/calls';
+import { sharePanel } from './share/panel';
+import { errorInWords, isFinished, seconds, stageName, stateName } from './words';
 
 const previews = 6;
 const previewSide = 480;
-
-// Files that people take with them, in this order.
-const takeAway: [RegExp, string][] = [
-  [/^view\.html$/, 'The scene as one page for any browser'],
-  [/^film\.mp4$/, 'The coloured film'],
-  [/^scene\.mp4$/, 'A movie of the scene'],
-  [/^key_view_colored\.png$/, 'The coloured key photo'],
-  [/^scene\.(sog|ply|spz|glb)$/, 'The scene for other viewers'],
-  [/^report\.html$/, 'The report: seen, inferred and guessed colours'],
-];
+const tryAgainMs = 5000;
 
 const stageRow = (stage: Stage): HTMLElement => {
   const note = stage.error ?? stage.left_out ?? (stage.state === 'SUCCEEDED'
@@ -46,21 +39,12 @@ const headline = (run: Run): string => {
   return 'Colouring the scene';
 };
 
-const downloads = (run: Run): HTMLElement => {
-  const rows = takeAway.flatMap(([pattern, text]) => run.artifacts.filter(({ name }) => pattern.test(name))
-    .map((artifact: Artifact) => h('li', {},
-      h('a', { href: artifactUrl(run.id, artifact.name, true), download: artifact.name }, artifact.name),
-      ` ${bytes(artifact.bytes)} `, h('span', { class: 'soft' }, text))));
-  return h('section', { 'aria-labelledby': 'take' }, h('h2', { id: 'take' }, 'Take it with you'), h('ul', { class: 'downloads' }, ...rows));
-};
-
 const results = (run: Run): HTMLElement[] => {
   const has = (name: string): boolean => run.artifacts.some((artifact) => artifact.name === name);
   const film = run.artifacts.find(({ name }) => name === 'film.mp4');
   return [
     ...(has('view.html') ? [h('iframe', { src: artifactUrl(run.id, 'view.html'), sandbox: 'allow-scripts allow-pointer-lock', title: 'The coloured scene', class: 'scene', id: 'scene' })] : []),
     ...(!has('view.html') && film ? [h('p', { class: 'soft' }, 'Save the film to play it.')] : []),
-    downloads(run),
   ];
 };
 
@@ -108,6 +92,23 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     }
   };
 
+  const showShare = async (run: Run): Promise<void> => {
+    try {
+      const { sets } = await getState();
+      set = sets.find((one) => one.scene === run.scene);
+      if (set) setStepsOf(set.id, 3);
+    } catch {
+      // Without the photos there is still the scene to share.
+    }
+    if (!left) result.append(sharePanel(run, set));
+  };
+
+  // A run that waited was put elsewhere in the queue, as another one.
+  const goWhereMoved = async (): Promise<void> => {
+    const to = await movedTo(id).catch(() => '');
+    if (to && !left) location.replace(`#job/${to}`);
+  };
+
   const act = async (what: Promise<unknown>, again: boolean): Promise<void> => {
     try {
       await what;
@@ -136,20 +137,35 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     if (!gallery.querySelector('img')) void showPreviews(run);
     const working = run.stages.find((stage) => stage.state === 'RUNNING');
     say(isOver ? headline(run) : working ? stageName(working.kind) : '');
+    if (run.state === 'CANCELLED') void goWhereMoved();
     if (run.state !== 'SUCCEEDED' || finished) return;
     finished = true;
     stageSection.open = false;
     gallerySection.hidden = true;
     replace(result, ...results(run));
+    void showShare(run);
     main.dataset.state = 'done';
   };
-  stop = follow(id, {
-    run: show,
-    problem: (text) => replace(trouble, problem(text, button('Try again', () => { stop(); showRun(main, id); }))),
-    end: () => undefined,
-  });
+  // A service that went away is started again, or comes back: the page goes on by itself.
+  let timer: number | undefined;
+  const watch = (): void => {
+    clearTimeout(timer);
+    stop();
+    stop = follow(id, {
+      run: show,
+      problem: (text) => {
+        if (left) return;
+        void goWhereMoved();
+        replace(trouble, problem(text, button('Try again', watch)));
+        timer = window.setTimeout(watch, tryAgainMs);
+      },
+      end: () => undefined,
+    });
+  };
+  watch();
   return () => {
     left = true;
+    clearTimeout(timer);
     stop();
     document.title = 'Color3D Studio';
     delete main.dataset.state;

@@ -1,0 +1,50 @@
+// A page of a run while its service goes away and comes back, in headless Chromium; tells what was seen, as JSON.
+//   node lose_service.mjs CHROMIUM ADDRESS MARK [SCREENSHOTS]
+// ADDRESS: as `color3d studio FOLDER` printed it; MARK: a file that is written once the run goes on: then the service is
+// to be ended, and started again some time later. said: the page while it was away; done: whether the run ended well on
+// the same page; second: photos that were dropped meanwhile were taken.
+import { writeFileSync } from 'node:fs';
+
+import { openBrowser } from '../../tests/support/browser.mjs';
+import { handOn } from '../../tests/support/page_hand.mjs';
+
+const [chromium, address, mark, screenshots] = process.argv.slice(2);
+const browser = openBrowser(chromium, ['--window-size=1280,900']);
+const { send, open, evaluate, close } = browser;
+const { waitFor, keep } = handOn(browser, screenshots);
+
+const use = async () => {
+  await open();
+  await send('Page.navigate', { url: address });
+  await waitFor('!!document.querySelector("#go-on")');
+  const set = await evaluate('location.hash.split("/")[1]');
+  await evaluate(`(async () => {
+    const body = JSON.stringify({ preset: 'fast', color: 'automatic' });
+    const answer = await fetch('/api/sets/${set}/colorize', { method: 'POST', body });
+    location.hash = 'job/' + (await answer.json()).id;
+  })()`);
+  await waitFor('!!document.querySelector(".stage.state-running")', 120000);
+  writeFileSync(mark, '');
+  await waitFor('!!document.querySelector(".problem p")', 120000, true);
+  const said = await evaluate('document.querySelector(".problem p").textContent');
+  await keep('service_away');
+  // Photos are taken without the service.
+  const second = await evaluate(`(async () => {
+    const made = await (await fetch('/api/sets', { method: 'POST', body: '{"name": "second"}' })).json();
+    const answer = await fetch('/api/sets/' + made.id + '/files?name=a.jpg', { method: 'POST', body: 'bytes' });
+    return answer.status;
+  })()`);
+  await waitFor('document.querySelector("main").dataset.state === "done"', 300000, true);
+  return { said, second, done: !(await evaluate('!!document.querySelector(".problem")')) };
+};
+
+let failed = 0;
+try {
+  console.log(JSON.stringify(await use(), null, 1));
+} catch (error) {
+  console.error(error.stack, await evaluate('document.body.innerText').catch(() => ''));
+  await keep('failed').catch(() => undefined);
+  failed = 1;
+}
+await close();
+process.exit(failed);

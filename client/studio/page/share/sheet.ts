@@ -1,0 +1,84 @@
+// A contact sheet for print: A4 pages as they will come out of the printer.
+import { artifactUrl, describeSet, follow, getState, photoUrl, type PhotoSet, type Run } from '../api';
+import { button, h, problem, replace, say } from '../dom';
+import { setStepsOf } from '../main';
+import { coloredUrl, getCredit } from './calls';
+import { adoptShareStyle } from './style';
+import { creditText, pagesOf, spread, stem } from './texts';
+
+const onFirstPage = 9, onOthers = 12, mostPhotos = 57;
+const sideOfThumb = 640, sideOfKey = 1200;
+
+interface Picture { src: string; text: string }
+
+const lastState = (id: string): Promise<Run> => new Promise((done, failed) => {
+  const stop = follow(id, {
+    run: (run) => { stop(); done(run); },
+    problem: (text) => failed(new Error(text)),
+    end: () => undefined,
+  });
+});
+
+const picturesOf = async (run: Run, set: PhotoSet | undefined): Promise<{ key: Picture[]; others: Picture[] }> => {
+  const key: Picture[] = run.artifacts.some(({ name }) => name === 'key_view_colored.png')
+    ? [{ src: artifactUrl(run.id, 'key_view_colored.png'), text: 'Key photo, coloured' }] : [];
+  const found = set && (await describeSet(set.id)).found;
+  if (!set || !found || found.kind !== 'photos') {
+    if (run.artifacts.some(({ name }) => name === 'key_view.png')) key.unshift({ src: artifactUrl(run.id, 'key_view.png'), text: 'Key photo, original' });
+    const drawn = run.artifacts.filter(({ name }) => /^renders\/.*\.png$/.test(name));
+    return { key, others: spread(drawn, mostPhotos).map(({ name }) => ({ src: artifactUrl(run.id, name), text: `${stem(name)}, drawn from the scene` })) };
+  }
+  const view = run.key_view || found.photos[0]?.name || '';
+  const photo = found.photos.find(({ name }) => name === view || stem(name) === stem(view));
+  if (photo) key.unshift({ src: photoUrl(set.id, photo.name, sideOfKey, true), text: `Key photo, original: ${stem(photo.name)}` });
+  const rest = found.photos.filter((one) => one !== photo);
+  return { key, others: spread(rest, mostPhotos).map(({ name }) => ({ src: coloredUrl(run.id, set.id, name, sideOfThumb), text: stem(name) })) };
+};
+
+const figure = ({ src, text }: Picture, loads: Promise<void>[]): HTMLElement => {
+  const image = h('img', { src, alt: text });
+  loads.push(new Promise((done) => {
+    image.addEventListener('load', () => done());
+    image.addEventListener('error', () => done());
+  }));
+  return h('figure', {}, image, h('figcaption', {}, text));
+};
+
+export const showSheet = (main: HTMLElement, id: string): (() => void) => {
+  adoptShareStyle();
+  let left = false;
+  const waiting = h('p', { class: 'soft', role: 'status' }, 'Colouring the photos for the sheet …');
+  const print = button('Print, or save as PDF', () => window.print(), { class: 'main-button', id: 'print', disabled: true });
+  const sheets = h('div', { class: 'sheets', id: 'sheets' });
+  replace(main,
+    h('div', { class: 'no-print' }, h('h1', {}, 'Contact sheet'),
+      h('p', { class: 'row' }, print, h('a', { class: 'button', href: `#job/${id}` }, 'Back to the scene')), waiting),
+    sheets);
+  const load = async (): Promise<void> => {
+    const [run, { sets }, credit] = await Promise.all([lastState(id), getState(), getCredit()]);
+    const set = sets.find((one) => one.scene === run.scene);
+    if (set) setStepsOf(set.id, 3);
+    const { key, others } = await picturesOf(run, set);
+    if (left) return;
+    const loads: Promise<void>[] = [];
+    const pages = pagesOf(others, onFirstPage, onOthers);
+    const title = set?.name ?? 'Coloured scene';
+    const day = new Date().toLocaleDateString(undefined, { dateStyle: 'long' });
+    replace(sheets, ...pages.map((page, i) => h('article', { class: 'sheet', 'aria-label': `Page ${i + 1}` },
+      h('header', { class: 'sheet-head' }, h('strong', {}, title), h('span', {}, `${day} · page ${i + 1} of ${pages.length}`)),
+      i === 0 && h('div', { class: 'sheet-key' }, ...key.map((one) => figure(one, loads))),
+      h('div', { class: i === 0 ? 'sheet-grid sheet-first' : 'sheet-grid' }, ...page.map((one) => figure(one, loads))),
+      h('footer', { class: 'sheet-foot' }, creditText(credit)))));
+    await Promise.all(loads);
+    if (left) return;
+    waiting.textContent = `${pages.length === 1 ? 'One page' : `${pages.length} pages`} of A4.`;
+    print.disabled = false;
+    main.dataset.state = 'done';
+    say(waiting.textContent);
+  };
+  void load().catch((error: Error) => replace(waiting, problem(error.message)));
+  return () => {
+    left = true;
+    delete main.dataset.state;
+  };
+};

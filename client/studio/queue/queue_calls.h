@@ -1,0 +1,47 @@
+// The runs that are not finished, in the order in which the service works on them. Thread-safe.
+#pragma once
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "client/lib/connection.h"
+#include "color3d/v1/job.pb.h"
+#include "core/base/mutex.h"
+
+namespace color3d::client {
+
+class QueueCalls {
+ public:
+  QueueCalls(ServerTarget server, const CancellationToken& cancel)
+      : server_(std::move(server)), cancel_(cancel) {}
+
+  // Facts of each run (JobFacts) with has_begun, first those that are worked on.
+  nlohmann::ordered_json List() const;
+
+  // Brings the runs that have not begun into this order. The service works in the order of
+  // submission, so the runs from the first difference on are submitted again and the earlier ones
+  // cancelled; what was computed for them is kept by the service. Returns {old ID: new ID}.
+  // Throws Error{kAborted} if `order` is not of those that wait.
+  nlohmann::ordered_json Reorder(const std::vector<std::string>& order);
+
+  // The ID of a run that was submitted again; "" if `id` was not.
+  std::string MovedTo(const std::string& id) const;
+
+ private:
+  struct Run {
+    v1::Job job;
+    bool has_begun = false;
+  };
+  std::vector<Run> Unfinished(Connection& connection) const;
+  std::string SubmitAgain(Connection& connection, const v1::Job& run) const;
+
+  const ServerTarget server_;
+  const CancellationToken& cancel_;
+  mutable Mutex mutex_;
+  Mutex reordering_;  // one at a time
+  std::map<std::string, std::string> moved_ COLOR3D_GUARDED_BY(mutex_);
+};
+
+}  // namespace color3d::client

@@ -1,0 +1,25 @@
+// What parts of the studio add their calls to. Exceptions of handlers become answers.
+#pragma once
+
+#include <httplib.h>
+
+#include <functional>
+#include <string>
+
+namespace color3d::client {
+
+struct StudioRoutes {
+  using Handler = std::function<void(const httplib::Request&, httplib::Response&)>;
+  using BodyHandler = std::function<void(
+      const httplib::Request&, httplib::Response&, const httplib::ContentReader&)>;
+
+  std::function<void(const std::string& pattern, Handler)> get;
+  std::function<void(const std::string& pattern, BodyHandler)> post;
+};
+
+// "/api/BEFORE/IDAFTER", with ID as the first match.
+inline std::string ApiPattern(const std::string& before, const std::string& after) {
+  return "/api/" + before + "/([0-9a-f-]{1,64})" + after;
+}
+
+}  // namespace color3d::client
