@@ -14,11 +14,31 @@ uniform float uShades;
 uniform vec3 uGuessed;
 uniform vec3 uInferred;
 uniform vec3 uSeen;
+uniform vec4 uTone;
 ${moved.declare}
+vec3 toned(vec3 srgb) {
+  vec3 encoded = clamp(srgb, 0.0, 1.0);
+  vec3 linear = mix(encoded / 12.92, pow((encoded + 0.055) / 1.055, vec3(2.4)), step(0.04045, encoded));
+  vec3 xyz = vec3(dot(linear, vec3(0.433953, 0.376220, 0.189828)),
+                  dot(linear, vec3(0.212673, 0.715152, 0.072175)),
+                  dot(linear, vec3(0.017758, 0.109477, 0.872766)));
+  vec3 f = mix((903.2963 * xyz + 16.0) / 116.0, pow(max(xyz, 1e-6), vec3(1.0 / 3.0)), step(0.008856452, xyz));
+  float a = 500.0 * (f.x - f.y), b = 200.0 * (f.y - f.z), bright = 116.0 * f.y;
+  f.x = f.y + (uTone.x * a + uTone.y * bright) / 500.0;
+  f.z = f.y - (uTone.z * b + uTone.w * bright) / 200.0;
+  xyz = mix((116.0 * f - 16.0) / 903.2963, f * f * f, step(6.0 / 29.0, f));
+  linear = clamp(vec3(dot(xyz, vec3(3.079955, -1.537139, -0.542816)),
+                      dot(xyz, vec3(-0.921259, 1.876011, 0.045247)),
+                      dot(xyz, vec3(0.052887, -0.204026, 1.151138))), 0.0, 1.0);
+  return mix(12.92 * linear, 1.055 * pow(max(linear, 1e-6), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, linear));
+}
 void modifySplatCenter(inout vec3 center) {${moved.center}}
 void modifySplatRotationScale(vec3 before, vec3 after, inout vec4 rotation, inout vec3 scale) {${moved.rotation}}
 void modifySplatColor(vec3 center, inout vec4 color) {${moved.color}
-  if (uShades < 0.5) return;
+  if (uShades < 0.5) {
+    if (uTone != vec4(1.0, 0.0, 1.0, 0.0)) color.rgb = toned(color.rgb);
+    return;
+  }
   vec3 linear = pow(clamp(color.rgb, 0.0, 1.0), vec3(2.2));
   float gray = pow(dot(linear, vec3(0.2126, 0.7152, 0.0722)), 1.0 / 2.2);
   if (uShades < 1.5) {
@@ -36,11 +56,33 @@ uniform uShades: f32;
 uniform uGuessed: vec3f;
 uniform uInferred: vec3f;
 uniform uSeen: vec3f;
+uniform uTone: vec4f;
 ${moved.declare}
+fn toned(srgb: vec3f) -> vec3f {
+  let encoded = clamp(srgb, vec3f(0.0), vec3f(1.0));
+  var linear = mix(encoded / 12.92, pow((encoded + 0.055) / 1.055, vec3f(2.4)), step(vec3f(0.04045), encoded));
+  var xyz = vec3f(dot(linear, vec3f(0.433953, 0.376220, 0.189828)),
+                  dot(linear, vec3f(0.212673, 0.715152, 0.072175)),
+                  dot(linear, vec3f(0.017758, 0.109477, 0.872766)));
+  var f = mix((903.2963 * xyz + 16.0) / 116.0, pow(max(xyz, vec3f(1e-6)), vec3f(1.0 / 3.0)), step(vec3f(0.008856452), xyz));
+  let a = 500.0 * (f.x - f.y);
+  let b = 200.0 * (f.y - f.z);
+  let bright = 116.0 * f.y;
+  f.x = f.y + (uniform.uTone.x * a + uniform.uTone.y * bright) / 500.0;
+  f.z = f.y - (uniform.uTone.z * b + uniform.uTone.w * bright) / 200.0;
+  xyz = mix((116.0 * f - 16.0) / 903.2963, f * f * f, step(vec3f(6.0 / 29.0), f));
+  linear = clamp(vec3f(dot(xyz, vec3f(3.079955, -1.537139, -0.542816)),
+                       dot(xyz, vec3f(-0.921259, 1.876011, 0.045247)),
+                       dot(xyz, vec3f(0.052887, -0.204026, 1.151138))), vec3f(0.0), vec3f(1.0));
+  return mix(12.92 * linear, 1.055 * pow(max(linear, vec3f(1e-6)), vec3f(1.0 / 2.4)) - 0.055, step(vec3f(0.0031308), linear));
+}
 fn modifySplatCenter(center: ptr<function, vec3f>) {${moved.center}}
 fn modifySplatRotationScale(before: vec3f, after: vec3f, rotation: ptr<function, vec4f>, scale: ptr<function, vec3f>) {${moved.rotation}}
 fn modifySplatColor(center: vec3f, color: ptr<function, vec4f>) {${moved.color}
-  if (uniform.uShades < 0.5) { return; }
+  if (uniform.uShades < 0.5) {
+    if (any(uniform.uTone != vec4f(1.0, 0.0, 1.0, 0.0))) { *color = vec4f(toned((*color).rgb), (*color).a); }
+    return;
+  }
   let linear = pow(clamp((*color).rgb, vec3f(0.0), vec3f(1.0)), vec3f(2.2));
   let gray = pow(dot(linear, vec3f(0.2126, 0.7152, 0.0722)), 1.0 / 2.2);
   if (uniform.uShades < 1.5) {
@@ -131,6 +173,7 @@ const cameraOf = (photo) =>
 // ---- the page ---------------------------------------------------------------------------------
 let viewer = null, splats = null;
 let player = null;  // of a scene that moves
+let frame = null;  // connection with the page that shows this one, if one does
 let held = null;  // {photo, from, since}: the camera stands where this photo was taken
 
 const showShades = (mode) => {
@@ -172,6 +215,7 @@ const goTo = (index, { glide = true, keepTime = false } = {}) => {
   viewer.state.animationPaused = true;
   $('photo').src = pictureOf(photo);
   for (const button of $('photos').children) press(button, Number(button.dataset.index) === index);
+  frame?.onHeld(photo);
   say(photo.name + (index === facts.key ? ' (key view)' : photo.held_out ? ' (held out)' : ''));
   layOut();
   viewer.app.renderNextFrame = true;
@@ -185,6 +229,7 @@ const letGo = () => {
     press($('film'), false);
   }
   held = null;
+  frame?.onHeld(null);
   press($('compare'), false);
   for (const button of $('photos').children) press(button, false);
   say('');
@@ -295,6 +340,38 @@ const wireButtons = () => {
   new ResizeObserver(layOut).observe(stage);
 };
 
+// What framed.js needs of this page.
+const hooksOfFrame = () => {
+  const entity = viewer.app.root.findByName('camera');
+  const Vec3 = entity.getPosition().constructor;
+  const numbers = ({ x, y, z }) => [x, y, z];
+  let centers = null;
+  return {
+    photos, stage, canvas: document.querySelector('#viewer canvas'), showShades, goTo,
+    showTone: (tone) => {
+      splats.setParameter('uTone', tone);
+      viewer.app.renderNextFrame = true;
+    },
+    held: () => held && !held.film && performance.now() - held.since > 700
+      ? { photo: held.photo, frame: frameOf(held.photo) } : null,
+    eye: () => numbers(entity.getPosition()),
+    ray: (x, y) => {
+      const at = entity.camera.screenToWorld(x, y, 1);
+      return numbers(at.sub(entity.getPosition()).normalize());
+    },
+    centers: () => {
+      if (centers) return centers;
+      const local = splats.resource.centers, world = splats.entity.getWorldTransform(), point = new Vec3();
+      centers = new Float32Array(local.length);
+      for (let i = 0; i < local.length; i += 3) {
+        world.transformPoint(point.set(local[i], local[i + 1], local[i + 2]), point);
+        centers.set(numbers(point), i);
+      }
+      return centers;
+    },
+  };
+};
+
 // The scene stands upright here, and each Gaussian gets its sureness, before anything is drawn.
 const prepare = (entity, confidence) => {
   const { rotation, scale, position } = facts.frame;
@@ -313,6 +390,7 @@ const prepare = (entity, confidence) => {
   if (confidence) texels.set(confidence);
   texture.unlock();
   splats.setParameter('uShades', 0);
+  splats.setParameter('uTone', [1, 0, 1, 0]);
   for (const [name, [hex]] of Object.entries(shades)) splats.setParameter(name, rgb(hex));
   if (player) player.attach(splats, !viewer.app.graphicsDevice.isWebGPU);
   const still = { declare: '', center: '', rotation: '', color: '' };
@@ -359,6 +437,7 @@ const start = async () => {
     viewer.state.cameraMode = 'orbit';
     wireButtons();
     if (player) player.wire();
+    if (window.parent !== window) frame = color3dFramed.connect(hooksOfFrame());
     goTo(facts.key, { glide: false });
     say('Drag to turn, wheel or pinch to come nearer, right drag or two fingers to move');
     document.body.dataset.state = 'ready';
