@@ -19,16 +19,16 @@ ${moved.declare}
 vec3 toned(vec3 srgb) {
   vec3 encoded = clamp(srgb, 0.0, 1.0);
   vec3 linear = mix(encoded / 12.92, pow((encoded + 0.055) / 1.055, vec3(2.4)), step(0.04045, encoded));
-  vec3 xyz = vec3(dot(linear, vec3(0.433953, 0.376220, 0.189828)),
+  vec3 xyz = vec3(dot(linear, vec3(0.433950, 0.376210, 0.189840)),
                   dot(linear, vec3(0.212673, 0.715152, 0.072175)),
-                  dot(linear, vec3(0.017758, 0.109477, 0.872766)));
+                  dot(linear, vec3(0.017757, 0.109468, 0.872775)));
   vec3 f = mix((903.2963 * xyz + 16.0) / 116.0, pow(max(xyz, 1e-6), vec3(1.0 / 3.0)), step(0.008856452, xyz));
   float a = 500.0 * (f.x - f.y), b = 200.0 * (f.y - f.z), bright = 116.0 * f.y;
   f.x = f.y + (uTone.x * a + uTone.y * bright) / 500.0;
   f.z = f.y - (uTone.z * b + uTone.w * bright) / 200.0;
   xyz = mix((116.0 * f - 16.0) / 903.2963, f * f * f, step(6.0 / 29.0, f));
   linear = clamp(vec3(dot(xyz, vec3(3.079955, -1.537139, -0.542816)),
-                      dot(xyz, vec3(-0.921259, 1.876011, 0.045247)),
+                      dot(xyz, vec3(-0.921259, 1.876011, 0.045248)),
                       dot(xyz, vec3(0.052887, -0.204026, 1.151138))), 0.0, 1.0);
   return mix(12.92 * linear, 1.055 * pow(max(linear, 1e-6), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, linear));
 }
@@ -61,9 +61,9 @@ ${moved.declare}
 fn toned(srgb: vec3f) -> vec3f {
   let encoded = clamp(srgb, vec3f(0.0), vec3f(1.0));
   var linear = mix(encoded / 12.92, pow((encoded + 0.055) / 1.055, vec3f(2.4)), step(vec3f(0.04045), encoded));
-  var xyz = vec3f(dot(linear, vec3f(0.433953, 0.376220, 0.189828)),
+  var xyz = vec3f(dot(linear, vec3f(0.433950, 0.376210, 0.189840)),
                   dot(linear, vec3f(0.212673, 0.715152, 0.072175)),
-                  dot(linear, vec3f(0.017758, 0.109477, 0.872766)));
+                  dot(linear, vec3f(0.017757, 0.109468, 0.872775)));
   var f = mix((903.2963 * xyz + 16.0) / 116.0, pow(max(xyz, vec3f(1e-6)), vec3f(1.0 / 3.0)), step(vec3f(0.008856452), xyz));
   let a = 500.0 * (f.x - f.y);
   let b = 200.0 * (f.y - f.z);
@@ -72,7 +72,7 @@ fn toned(srgb: vec3f) -> vec3f {
   f.z = f.y - (uniform.uTone.z * b + uniform.uTone.w * bright) / 200.0;
   xyz = mix((116.0 * f - 16.0) / 903.2963, f * f * f, step(vec3f(6.0 / 29.0), f));
   linear = clamp(vec3f(dot(xyz, vec3f(3.079955, -1.537139, -0.542816)),
-                       dot(xyz, vec3f(-0.921259, 1.876011, 0.045247)),
+                       dot(xyz, vec3f(-0.921259, 1.876011, 0.045248)),
                        dot(xyz, vec3f(0.052887, -0.204026, 1.151138))), vec3f(0.0), vec3f(1.0));
   return mix(12.92 * linear, 1.055 * pow(max(linear, vec3f(1e-6)), vec3f(1.0 / 2.4)) - 0.055, step(vec3f(0.0031308), linear));
 }
