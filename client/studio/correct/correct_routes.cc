@@ -27,9 +27,10 @@ std::string ViewOf(const Request& request) {
 Corrections::Map MapOf(const Request& request) {
   const std::string map = request.get_param_value("map");
   if (map == "color") return Corrections::Map::kColor;
+  if (map == "base") return Corrections::Map::kBase;
   if (map == "source") return Corrections::Map::kSource;
   if (map == "pull") return Corrections::Map::kPull;
-  throw InvalidArgument("map is color, source or pull");
+  throw InvalidArgument("map is color, base, source or pull");
 }
 
 std::string TrialOf(const Request& request) {

@@ -111,6 +111,11 @@ std::vector<v1::Job> VersionsOf(Connection& connection, const v1::Job& run) {
   return versions;
 }
 
+v1::JobSpec NewestSpec(const std::vector<v1::Job>& versions, const v1::Job& run) {
+  const auto newest = std::ranges::find_if_not(versions, IsOver);
+  return newest == versions.end() ? run.spec() : newest->spec();
+}
+
 // Of versions, the newest first: the newest that has succeeded, and a newer one that is worked on.
 Json StateOf(const std::vector<v1::Job>& versions) {
   Json state = {{"newest", nullptr}, {"working", nullptr}};
@@ -266,6 +271,10 @@ std::string Corrections::MapPng(const std::string& name,
       if (!png) png = read(artifact::kViewsAb);
       if (png) png = SmallAbPng(*png, view, side > 0 ? side : SceneViews::kSidePx);
       break;
+    case Map::kBase:
+      png = read(artifact::kViewsAb);
+      if (png) png = SmallAbPng(*png, view, side > 0 ? side : SceneViews::kSidePx);
+      break;
     case Map::kSource:
       png = read(artifact::kCorrectedProvenance);
       if (!png) png = read(artifact::kProvenance);
@@ -276,13 +285,6 @@ std::string Corrections::MapPng(const std::string& name,
   }
   if (!png) throw Error(ErrorCode::kNotFound, "there is no such map of {}", view);
   return *png;
-}
-
-v1::JobSpec Corrections::NewestSpec(Connection& connection, const v1::Job& run) const {
-  for (const v1::Job& job : VersionsOf(connection, run)) {
-    if (!IsOver(job)) return job.spec();
-  }
-  return run.spec();
 }
 
 v1::FurtherKeyView Corrections::Uploaded(Connection& connection,
@@ -307,12 +309,25 @@ v1::FurtherKeyView Corrections::Uploaded(Connection& connection,
   return correction;
 }
 
-v1::Job Corrections::Try(const std::string& name, const nlohmann::json& stroke) {
+VersionChange Corrections::ReadChange(Connection& connection,
+                                      const Run& run,
+                                      const nlohmann::json& json) {
+  VersionChange change = ReadVersionChange(json);
+  if (const auto add = json.find("add"); add != json.end()) {
+    change.add = Uploaded(connection, run, *add);
+  }
+  return change;
+}
+
+v1::Job Corrections::Try(const std::string& name, const nlohmann::json& json) {
   const std::shared_ptr<const Run> run = Open(name);
   Connection connection = calls_.Connect();
-  VersionChange change;
-  change.add = Uploaded(connection, *run, stroke);
-  const v1::JobSpec whole = Changed(NewestSpec(connection, run->job), change);
+  const VersionChange change = ReadChange(connection, *run, json);
+  const v1::JobSpec whole =
+      Changed(NewestSpec(VersionsOf(connection, run->job), run->job), change);
+  if (whole.colorize_scene().correct_colors().corrections().empty()) {
+    throw Error(ErrorCode::kFailedPrecondition, "no correction is left to show");
+  }
   v1::JobSpec spec;
   spec.set_scene(whole.scene());
   spec.set_seed(whole.seed());
@@ -336,16 +351,13 @@ v1::Job Corrections::Try(const std::string& name, const nlohmann::json& stroke) 
 
 v1::Job Corrections::Change(const std::string& name, const nlohmann::json& json) {
   const std::shared_ptr<const Run> run = Open(name);
-  VersionChange change = ReadVersionChange(json);
   Connection connection = calls_.Connect();
-  if (const auto add = json.find("add"); add != json.end()) {
-    change.add = Uploaded(connection, *run, *add);
-  }
+  const VersionChange change = ReadChange(connection, *run, json);
   v1::Job submitted;
   {
     const MutexLock one_by_one(submitting_);
     const std::vector<v1::Job> versions = VersionsOf(connection, run->job);
-    submitted = SubmitJob(connection, Changed(NewestSpec(connection, run->job), change));
+    submitted = SubmitJob(connection, Changed(NewestSpec(versions, run->job), change));
     for (const v1::Job& version : versions) {
       if (IsFinished(version.state())) continue;
       v1::CancelJobRequest cancel;

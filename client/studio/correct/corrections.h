@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "client/studio/correct/scene_views.h"
+#include "client/studio/correct/versions.h"
 #include "client/studio/studio_calls.h"
 #include "color3d/v1/job.pb.h"
 #include "core/base/files.h"
@@ -31,6 +32,7 @@ class Corrections {
 
   enum class Map {
     kColor,   // R, G: (a, b + 128) / 255
+    kBase,    // the same without any correction
     kSource,  // R guessed, G seen, B inferred
     kPull,    // grey: what the last correction touches
   };
@@ -42,12 +44,13 @@ class Corrections {
                      const std::string& view,
                      int side);
 
-  // Submits the correction stage alone, with `strokes` (SceneViews::CapturedStrokes; `reach` as in
-  // core/keycolor/hints/hints.h) on top of the newest version: {view, strokes, reach}. Change with
-  // the same stroke goes on from its result.
-  v1::Job Try(const std::string& run, const nlohmann::json& stroke);
-  // Submits a new version: {add: {view, strokes, reach}, remove: [id], tone: {saturation, tint,
-  // warmth}}, each optional. A version that is still worked on is cancelled.
+  // A change of the newest version: {add: {view, strokes, reach}, remove: [id], tone: {saturation,
+  // tint, warmth}}, each optional. Strokes as for SceneViews::CapturedStrokes; reach as in
+  // core/keycolor/hints/hints.h.
+  // Try submits the correction stage alone, whose maps show what Change would do; Change then goes
+  // on from its result. Throws Error{kFailedPrecondition} if no correction is left.
+  v1::Job Try(const std::string& run, const nlohmann::json& change);
+  // Submits a new version. One that is still worked on is cancelled.
   v1::Job Change(const std::string& run, const nlohmann::json& change);
 
   // Passes {newest: job or null, working: job or null} of the versions of the run to `send` now and
@@ -67,7 +70,7 @@ class Corrections {
   std::shared_ptr<const SceneViews> OpenViews(Connection& connection,
                                               const v1::Job& job,
                                               const v1::Artifact& scene);
-  v1::JobSpec NewestSpec(Connection& connection, const v1::Job& run) const;
+  VersionChange ReadChange(Connection& connection, const Run& run, const nlohmann::json& change);
   v1::FurtherKeyView Uploaded(Connection& connection, const Run& run, const nlohmann::json& stroke);
 
   const StudioCalls& calls_;
