@@ -71,6 +71,7 @@ nlohmann::ordered_json SceneViews::Facts() const {
     facts.push_back({{"name", scene_.views[i].name},
                      {"width", camera.width},
                      {"height", camera.height},
+                     {"photo_width", scene_.views[i].captured_camera.width},
                      {"held_out", scene_.views[i].held_out}});
   }
   return facts;

@@ -23,7 +23,7 @@ class SceneViews {
   const Scene& scene() const { return scene_; }
   // Index of a view by its whole name. Throws Error{kNotFound}.
   int Find(const std::string& name) const;
-  // name, width, height (px of its picture), held_out.
+  // name, width, height (px of its picture), photo_width (px as captured), held_out.
   nlohmann::ordered_json Facts() const;
   // Grey JPEG. `side`: longer side, px, at most kSidePx; 0: that. Throws what `fetch` throws.
   std::string Jpeg(int view, int side) const;

@@ -3,7 +3,7 @@ import { StudioError, type Job } from '../api';
 import type { Stroke } from './model/strokes';
 import type { Tone } from './model/tone';
 
-export interface SceneView { name: string; width: number; height: number; held_out: boolean }
+export interface SceneView { name: string; width: number; height: number; photo_width: number; held_out: boolean }
 export interface Correction { id: string; view: string; strokes: Stroke[] | null }
 export interface Version {
   key: string; views: SceneView[]; has_sources: boolean; tone: Tone; corrections: Correction[];
