@@ -1,8 +1,9 @@
 // A run: what it is doing, pictures as they come, and its results.
 import {
-  artifactUrl, cancelJob, describeSet, follow, getState, previewOfRun, retryJob,
+  artifactUrl, cancelJob, describeSet, follow, getRun, getState, previewOfRun, retryJob,
   type Artifact, type PhotoSet, type Run, type Stage,
 } from './api';
+import { mountCorrector } from './correct/index';
 import { bar, button, h, problem, replace, say } from './dom';
 import { setStepsOf } from './main';
 import { bytes, errorInWords, isFinished, seconds, stageName, stateName } from './words';
@@ -54,17 +55,32 @@ const downloads = (run: Run): HTMLElement => {
   return h('section', { 'aria-labelledby': 'take' }, h('h2', { id: 'take' }, 'Take it with you'), h('ul', { class: 'downloads' }, ...rows));
 };
 
-const results = (run: Run): HTMLElement[] => {
+// The scene, where it can be corrected. `stops`: what to do when the page is left.
+const scene = (run: Run, stops: (() => void)[]): HTMLElement => {
+  const frame = (): HTMLElement =>
+    h('iframe', { src: artifactUrl(run.id, 'view.html'), sandbox: 'allow-scripts allow-pointer-lock', title: 'The coloured scene', class: 'scene', id: 'scene' });
+  const host = h('div', { class: 'corrector' });
+  const onVersion = async (id: string): Promise<void> => {
+    history.replaceState(null, '', `#job/${id}`);
+    const newest = await getRun(id);
+    document.getElementById('take')?.closest('section')?.replaceWith(downloads(newest));
+  };
+  stops.push(mountCorrector(host, run.id, (id) => void onVersion(id), () => replace(host, frame())));
+  return host;
+};
+
+const results = (run: Run, stops: (() => void)[]): HTMLElement[] => {
   const has = (name: string): boolean => run.artifacts.some((artifact) => artifact.name === name);
   const film = run.artifacts.find(({ name }) => name === 'film.mp4');
   return [
-    ...(has('view.html') ? [h('iframe', { src: artifactUrl(run.id, 'view.html'), sandbox: 'allow-scripts allow-pointer-lock', title: 'The coloured scene', class: 'scene', id: 'scene' })] : []),
+    ...(has('view.html') ? [scene(run, stops)] : []),
     ...(!has('view.html') && film ? [h('p', { class: 'soft' }, 'Save the film to play it.')] : []),
     downloads(run),
   ];
 };
 
 export const showRun = (main: HTMLElement, id: string): (() => void) => {
+  const leaves: (() => void)[] = [];
   let left = false, asked = false, finished = false;
   let set: PhotoSet | undefined;
   const title = h('h1', {}, 'Colouring the scene');
@@ -140,7 +156,7 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     finished = true;
     stageSection.open = false;
     gallerySection.hidden = true;
-    replace(result, ...results(run));
+    replace(result, ...results(run, leaves));
     main.dataset.state = 'done';
   };
   stop = follow(id, {
@@ -151,6 +167,7 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
   return () => {
     left = true;
     stop();
+    for (const leave of leaves) leave();
     document.title = 'Color3D Studio';
     delete main.dataset.state;
   };
