@@ -90,7 +90,8 @@ void main() {
     vec3 shares = texture(uSource, at).rgb;
     vec3 hue = (shares.r * ${vec3(guessed)} + shares.g * ${vec3(seen)} + shares.b * ${vec3(inferred)}) /
       max(1.0 / 255.0, shares.r + shares.g + shares.b);
-    rgb = hue * (0.15 + 0.95 * photo);
+    float stripe = mod(floor((gl_FragCoord.x - gl_FragCoord.y) / 4.0), 2.0);
+    rgb = hue * (0.15 + 0.95 * photo) * (1.0 - 0.4 * stripe * shares.r);
   } else if (uMode == 3) {
     float heat = pow(max(texture(uPull, at).r, 1e-6), 1.0 / uReach);
     float opacity = heat < ${visible.toFixed(4)} ? 0.0 : 0.25 + 0.6 * heat;
