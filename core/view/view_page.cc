@@ -152,7 +152,7 @@ std::string RenderViewPage(const Scene& scene, const ViewPage& page) {
   const std::string facts = Facts(scene, page);
   const std::string program = Base64(ViewerProgram());
   const std::string motion = page.motion ? Base64(Gzip(page.motion->file)) : "";
-  std::string player(PageFramedScript());
+  std::string player = fmt::format("{}\n{}", PageShadingScript(), PageFramedScript());
   if (page.motion) player += fmt::format("\n{}\n{}", PageMotionScript(), PagePlayerScript());
   const std::pair<std::string_view, std::string_view> parts[] = {{"@STYLE@", PageStyle()},
                                                                  {"@FACTS@", facts},

@@ -2,15 +2,20 @@
 // points. Messages of anybody else, and such that are not as described here, are ignored.
 //   in:  {color3d: 'show', shades?: 0|1|2, photo?: name, tone?: [ka, pa, kb, pb]}, where colours become
 //        a' = ka a + pa (L + 16), b' = kb b + pb (L + 16) in Lab
+//        {color3d: 'recolor', maps: [{photo, width, height, ab: Int8Array}, ...]}: changes of a and b that
+//        photos show, pixel after pixel, for the Gaussians that they show; no maps: as it was
 //   out: {color3d: 'ready', photos: [name, ...]}; {color3d: 'held', photo: name or null};
 //        {color3d: 'picked', photo, x, y}: a click, as a place in a photo that shows the same surface, in
-//        shares of its undistorted width and height
+//        shares of its undistorted width and height; {color3d: 'recolored'}: the answer to 'recolor'
 const color3dFramed = (() => {
 'use strict';
 const kClickPx = 5, kClickMs = 500;
 const kBeam = 0.006;        // radius of a ray that looks for surfaces, per unit of distance
 const kSameDepth = 0.08;    // relative difference of depths of one surface
 const kMaxTone = 20;
+const kCellsWide = 120;     // of the grid in which a photo looks for what it sees
+const kBehind = 0.06;       // relative depth behind the first surface that still belongs to it
+const kMaxMaps = 64, kMaxMapPx = 4096;
 
 const minus = (a, b) => a.map((x, i) => x - b[i]);
 const dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
@@ -75,10 +80,50 @@ const bestPhoto = (photos, centers, from, point) => {
   return null;
 };
 
+// Distances of what a photo sees first, in a grid of cells; Infinity where there is nothing.
+const depthsOf = (photo, centers, high) => {
+  const depths = new Float32Array(kCellsWide * high).fill(Infinity);
+  for (let i = 0; i < centers.length; i += 3) {
+    const at = inPhoto(photo, [centers[i], centers[i + 1], centers[i + 2]]);
+    if (!at) continue;
+    const cell = Math.floor(at.y * high) * kCellsWide + Math.floor(at.x * kCellsWide);
+    if (at.distance < depths[cell]) depths[cell] = at.distance;
+  }
+  return depths;
+};
+
+// Changes of a and b of each Gaussian, as 128 + change: means over the photos that show it.
+const changesOf = (photos, centers, maps) => {
+  const count = centers.length / 3;
+  const sums = new Float32Array(2 * count), shown = new Uint8Array(count);
+  for (const { photo: name, width, height, ab } of maps) {
+    const photo = photos.find((one) => one.name === name);
+    if (!photo) continue;
+    const high = Math.max(1, Math.round(kCellsWide / photo.aspect));
+    const depths = depthsOf(photo, centers, high);
+    for (let i = 0; i < count; ++i) {
+      const at = inPhoto(photo, [centers[3 * i], centers[3 * i + 1], centers[3 * i + 2]]);
+      if (!at) continue;
+      const first = depths[Math.floor(at.y * high) * kCellsWide + Math.floor(at.x * kCellsWide)];
+      if (at.distance > first * (1 + kBehind)) continue;
+      const pixel = 2 * (Math.floor(at.y * height) * width + Math.floor(at.x * width));
+      sums[2 * i] += ab[pixel];
+      sums[2 * i + 1] += ab[pixel + 1];
+      ++shown[i];
+    }
+  }
+  const changes = new Uint8Array(2 * count);
+  for (let i = 0; i < changes.length; ++i) changes[i] = 128 + Math.round(sums[i] / Math.max(1, shown[i >> 1]));
+  return changes;
+};
+
+const isMap = ({ photo, width, height, ab } = {}) => typeof photo === 'string' && Number.isInteger(width) &&
+    Number.isInteger(height) && width > 0 && height > 0 && width <= kMaxMapPx && height <= kMaxMapPx &&
+    ab instanceof Int8Array && ab.length === 2 * width * height;
 const isTone = (tone) => Array.isArray(tone) && tone.length === 4 &&
     tone.every((x) => typeof x === 'number' && Math.abs(x) <= kMaxTone);
 
-// hooks: photos; stage, the element; canvas; showShades(mode); showTone(tone); goTo(index); held(): the
+// hooks: photos; stage, the element; canvas; showShades(mode); showTone(tone); showChanges(bytes or null); goTo(index); held(): the
 // photo at whose place the camera stands, with the frame of its picture on the stage, or null; eye():
 // position of the camera; ray(x, y): unit direction through a pixel; centers(): in the page's space.
 const connect = (hooks) => {
@@ -89,10 +134,15 @@ const connect = (hooks) => {
     const index = hooks.photos.findIndex(({ name }) => name === photo);
     if (index >= 0) hooks.goTo(index);
   };
+  const recolor = ({ maps }) => {
+    if (!Array.isArray(maps) || maps.length > kMaxMaps || !maps.every((map) => map && isMap(map))) return;
+    hooks.showChanges(maps.length ? changesOf(hooks.photos, hooks.centers(), maps) : null);
+    tell({ color3d: 'recolored' });
+  };
   window.addEventListener('message', ({ source, data }) => {
-    if (source === window.parent && data !== null && typeof data === 'object' && data.color3d === 'show') {
-      obey(data);
-    }
+    if (source !== window.parent || data === null || typeof data !== 'object') return;
+    if (data.color3d === 'show') obey(data);
+    if (data.color3d === 'recolor') recolor(data);
   });
 
   const pick = (x, y) => {
@@ -128,5 +178,5 @@ const connect = (hooks) => {
   return { onHeld: (photo) => tell({ color3d: 'held', photo: photo ? photo.name : null }) };
 };
 
-return { connect, firstSurface, inPhoto, bestPhoto };
+return { connect, firstSurface, inPhoto, bestPhoto, changesOf };
 })();

@@ -1,8 +1,7 @@
 // One scene on its page: photos, scene, brush, tone and corrections together.
-import { artifactUrl, follow, type Run } from '../api';
-import { bar, h, problem, replace, say } from '../dom';
+import { artifactUrl } from '../api';
+import { h, problem, replace, say } from '../dom';
 import { labFromBytes } from '../paint/color/lab';
-import { isFinished, seconds, stageName } from '../words';
 import { applyChange, describe, followVersions, type Change, type Correction, type SceneView, type Version, type VersionState } from './calls';
 import { Draft, tried } from './draft';
 import { strokeOf, type Stroke } from './model/strokes';
@@ -14,12 +13,14 @@ import { Legend } from './panel/legend';
 import { SideBySide } from './panel/side_by_side';
 import { TonePanel } from './panel/tone_panel';
 import { Touched } from './touched';
+import { changesBetween } from './view/changes';
 import { Picture, type PictureHooks } from './view/picture';
 import { PictureStore, type Colors } from './view/picture_store';
 import { cropOf, sampleAt } from './view/sample';
 import { SceneFrame } from './view/scene_frame';
 import { shade, Shader, type Look, type Mode, type Parts } from './view/shading';
 import { Strip, stripSide } from './view/strip';
+import { WorkStatus } from './work_status';
 
 const mainSide = 1200; // px
 const maxHeated = 40; // photos whose pull is fetched at once
@@ -42,22 +43,21 @@ export class Corrector {
   private readonly moments;
   private readonly panes: SideBySide;
   private readonly legend = new Legend();
-  private readonly status = h('div', { class: 'co-status', role: 'status' });
-  private readonly progress = bar('Working on the scene');
+  private readonly work: WorkStatus;
   private readonly trouble = h('div', {});
   private readonly stops: (() => void)[] = [];
-  private stopWorking: (() => void) | undefined;
-  private working: string | null = null;
   private view: SceneView;
   private mode: Mode = 'color';
   private moment: 'before' | 'after' = 'after';
   private tone: Tone;
   private ownTone: Tone | null = null; // asked for and not solved yet
-  private sceneTones = new Map<string, Tone>(); // by address
+  private readonly scenes = new Map<string, { run: string; tone: Tone }>(); // by address
+  private sceneColors = ''; // what the scene was told
   private applied = ''; // a trial that is being applied
   private without: Colors | null = null;
   private asked = 0; // number of the newest request for pictures
   private frame = 0;
+  private recolored = 0; // times
   private sceneUrl = '';
   private isOver = false;
 
@@ -74,6 +74,7 @@ export class Corrector {
     this.scene = new SceneFrame({
       ready: (url) => this.onScene(url),
       picked: ({ photo, x, y }) => this.picked(photo, x, y),
+      recolored: () => { this.root.dataset.recolored = String(++this.recolored); },
       held: (photo) => { if (photo && photo !== this.view.name) this.choose(photo, false); },
     });
     this.strip = new Strip(version.views, version.key, this.shader, {
@@ -102,6 +103,11 @@ export class Corrector {
       without: (id) => void this.showWithout(id),
       draw: (correction, before, after) => void this.drawPlace(correction, before, after),
     });
+    this.work = new WorkStatus({
+      scene: (one, page) => void this.switchTo(one, page),
+      failed: (text) => this.complain(text),
+      ended: (succeeded) => this.onRest(succeeded),
+    });
     this.panes = new SideBySide({
       photo: this.photoPicture.root, color: this.colorPicture.root,
       scene: h('div', { class: 'co-pane-scene' }, this.scene.root, h('p', {}, 'Scene')),
@@ -112,13 +118,13 @@ export class Corrector {
   }
 
   loadScene(url: string): void {
-    this.sceneTones.set(url, this.version.tone);
+    this.scenes.set(url, { run: this.run, tone: this.version.tone });
     this.scene.load(url);
   }
   destroy(): void {
     this.isOver = true;
     for (const stop of this.stops) stop();
-    this.stopWorking?.();
+    this.work.destroy();
     cancelAnimationFrame(this.frame);
     this.draft.clear();
     this.store.destroy();
@@ -129,12 +135,11 @@ export class Corrector {
   }
 
   private lay(): void {
-    this.progress.element.hidden = true;
     this.root.append(
       h('div', { class: 'co-bar' }, this.panes.buttons, this.modes.root, this.moments.root),
       h('div', { class: 'co-main' },
         this.panes.root, this.legend.root, this.strip.root,
-        this.status, this.progress.element, this.trouble),
+        this.work.root, this.trouble),
       h('div', { class: 'co-side' }, this.brush.root, this.tones.root, this.history.root));
     if (innerWidth < narrow) this.panes.toggle('photo');
     this.modes.set(this.mode);
@@ -160,6 +165,22 @@ export class Corrector {
     void this.fillMain();
     for (const { name } of this.version.views) if (this.strip.isSeen(name)) void this.fillCell(name);
     this.redraw();
+    void this.recolor();
+  }
+  // Gives the scene the colours of the photos, as far as its own differ.
+  private async recolor(): Promise<void> {
+    const scene = this.scenes.get(this.sceneUrl);
+    if (!scene) return;
+    const own: Colors = { run: scene.run, trial: '', isBase: false };
+    const wanted = JSON.stringify(this.colors);
+    if (wanted === (this.sceneColors || JSON.stringify(own))) return;
+    this.sceneColors = wanted;
+    try {
+      const maps = await changesBetween(this.store, this.version.views, own, this.colors, gainOf(scene.tone));
+      if (!this.isOver && wanted === this.sceneColors) this.scene.recolor(maps);
+    } catch {
+      // The scene itself follows.
+    }
   }
   private async fillMain(): Promise<void> {
     const number = ++this.asked;
@@ -198,13 +219,15 @@ export class Corrector {
     });
   }
   private tellScene(photo?: string): void {
-    const baked = this.sceneTones.get(this.sceneUrl) ?? plainTone;
+    const baked = this.scenes.get(this.sceneUrl)?.tone ?? plainTone;
     this.scene.show({ shades: this.mode === 'source' ? 2 : 0, tone: gainBetween(baked, this.tone), ...(photo && { photo }) });
   }
   private onScene(url: string): void {
     this.sceneUrl = url;
+    this.sceneColors = '';
     this.root.dataset.scene = url;
     this.tellScene(this.view.name);
+    void this.recolor();
   }
 
   private choose(view: string, inScene: boolean): void {
@@ -316,8 +339,7 @@ export class Corrector {
     this.history.setWithout(null);
     try {
       const job = await applyChange(this.run, change);
-      this.status.textContent = text;
-      this.followWorking(job.id);
+      this.follow(job.id, text);
       return true;
     } catch (error) {
       this.applied = '';
@@ -328,51 +350,22 @@ export class Corrector {
   }
   private onVersions({ newest, working }: VersionState): void {
     if (this.isOver) return;
-    if (working && working !== this.working) {
-      if (!this.status.textContent) this.status.textContent = 'The scene is being changed …';
-      this.followWorking(working);
+    if (working) {
+      this.follow(working, 'The scene is being changed …');
     } else if (!working && newest && newest !== this.run) {
       void this.switchTo(newest);
     }
   }
-  private followWorking(job: string): void {
-    if (this.working === job) return;
-    this.stopWorking?.();
-    this.working = job;
+  private follow(job: string, text: string): void {
+    this.work.follow(job, text);
     this.root.dataset.working = job;
-    this.progress.element.hidden = false;
-    this.progress.set(null);
-    this.stopWorking = follow(job, {
-      run: (run) => this.onWorking(run),
-      problem: (text) => this.complain(text),
-      end: () => { if (this.working === job) this.rest(); },
-    });
   }
-  private onWorking(run: Run): void {
-    if (run.id !== this.working) return;
-    const exported = run.stages.find(({ kind }) => kind === 'export');
-    // The scene is there before it is measured and its report is written.
-    if (exported?.state === 'SUCCEEDED') void this.switchTo(run.id, artifactUrl(exported.id, 'view.html'));
-    else {
-      const stage = run.stages.find(({ state }) => state === 'RUNNING');
-      const left = run.seconds_left !== null ? ` About ${seconds(run.seconds_left)} for all of it.` : '';
-      if (stage) this.progress.element.setAttribute('aria-label', `${stageName(stage.kind)}.${left}`);
-      this.progress.set(stage && stage.share > 0 ? stage.share : null);
-    }
-    if (!isFinished(run.state)) return;
-    if (run.state === 'FAILED') this.complain(run.stages.find(({ error }) => error)?.error ?? run.error ?? 'The change did not work.');
-    if (run.state === 'FAILED' || run.state === 'CANCELLED') {
-      this.applied = '';
-      this.ownTone = null;
-      this.refresh();
-    }
-    this.rest();
-  }
-  private rest(): void {
-    this.working = null;
+  private onRest(succeeded: boolean): void {
     delete this.root.dataset.working;
-    this.progress.element.hidden = true;
-    this.status.textContent = '';
+    if (succeeded) return;
+    this.applied = '';
+    this.ownTone = null;
+    this.refresh();
   }
   // Shows another version of the scene. `page`: of its scene; otherwise that of the run.
   private async switchTo(run: string, page = artifactUrl(run, 'view.html')): Promise<void> {
@@ -388,8 +381,7 @@ export class Corrector {
       this.complain((error as Error).message, error);
       return;
     }
-    this.sceneTones.set(page, this.version.tone);
-    this.scene.load(page);
+    this.loadScene(page);
     this.onVersion(run);
   }
   private update(version: Version): void {

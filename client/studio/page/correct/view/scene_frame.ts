@@ -2,12 +2,14 @@
 // behind the one that is shown. Messages of other windows, and such that are not as described there, are ignored.
 import { h } from '../../dom';
 import type { Gain } from '../model/tone';
+import type { ChangeMap } from './changes';
 
 export interface ScenePlace { readonly photo: string; readonly x: number; readonly y: number }
 export interface SceneHooks {
   ready(url: string): void;
   picked(place: ScenePlace): void;
   held(photo: string | null): void;
+  recolored(): void;
 }
 export interface SceneLook { shades?: 0 | 1 | 2; tone?: Gain; photo?: string }
 
@@ -15,12 +17,12 @@ const isShare = (value: unknown): value is number => typeof value === 'number' &
 const isName = (value: unknown): value is string => typeof value === 'string' && value.length > 0 && value.length <= 1024;
 
 export type SceneMessage =
-  | { kind: 'ready' } | { kind: 'held'; photo: string | null } | ({ kind: 'picked' } & ScenePlace);
+  | { kind: 'ready' } | { kind: 'recolored' } | { kind: 'held'; photo: string | null } | ({ kind: 'picked' } & ScenePlace);
 // null: not a message of a scene's page.
 export const readMessage = (data: unknown): SceneMessage | null => {
   if (data === null || typeof data !== 'object') return null;
   const { color3d, photo, x, y } = data as Record<string, unknown>;
-  if (color3d === 'ready') return { kind: 'ready' };
+  if (color3d === 'ready' || color3d === 'recolored') return { kind: color3d };
   if (color3d === 'held' && (photo === null || isName(photo))) return { kind: 'held', photo };
   if (color3d === 'picked' && isName(photo) && isShare(x) && isShare(y)) return { kind: 'picked', photo, x, y };
   return null;
@@ -52,6 +54,10 @@ export class SceneFrame {
     // The frame has no origin; what is sent is no secret.
     this.shown?.contentWindow?.postMessage({ color3d: 'show', ...look }, '*');
   }
+  // Changes the colours of the scene that is shown; no maps: as it is in its file.
+  recolor(maps: readonly ChangeMap[]): void {
+    this.shown?.contentWindow?.postMessage({ color3d: 'recolor', maps }, '*', maps.map(({ ab }) => ab.buffer as ArrayBuffer));
+  }
   destroy(): void {
     removeEventListener('message', this.listen);
     this.root.replaceChildren();
@@ -73,7 +79,8 @@ export class SceneFrame {
       this.hooks.ready(frame.getAttribute('src')!);
     } else if (frame === this.shown) {
       if (message.kind === 'picked') this.hooks.picked(message);
-      else this.hooks.held(message.photo);
+      else if (message.kind === 'held') this.hooks.held(message.photo);
+      else this.hooks.recolored();
     }
   }
 }
