@@ -10,7 +10,8 @@
 const color3dFramed = (() => {
 'use strict';
 const kClickPx = 5, kClickMs = 500;
-const kBeam = 0.006;        // radius of a ray that looks for surfaces, per unit of distance
+const kBeam = 0.012;        // radius of a ray that looks for surfaces, per unit of distance
+const kSurface = 3;         // Gaussians in the ray that surely are a surface
 const kSameDepth = 0.08;    // relative difference of depths of one surface
 const kMaxTone = 20;
 const kCellsWide = 120;     // of the grid in which a photo looks for what it sees
@@ -41,13 +42,13 @@ const firstSurface = (centers, from, direction) => {
   }
   if (!hits.length) return NaN;
   hits.sort((a, b) => a - b);
-  // The first group that is at least a third as large as the largest: single Gaussians float before it.
+  // Single Gaussians may float before it.
   const groups = hits.map((near, i) => {
     let end = i;
     while (end < hits.length && hits[end] <= near * (1 + kSameDepth / 2)) ++end;
     return end - i;
   });
-  const enough = Math.max(...groups) / 3;
+  const enough = Math.min(kSurface, Math.max(...groups) / 3);
   const first = groups.findIndex((size) => size >= enough);
   return hits[first + (groups[first] >> 1)];
 };
