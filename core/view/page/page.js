@@ -363,8 +363,8 @@ const start = async () => {
     viewer.state.cameraMode = 'orbit';
     wireButtons();
     if (player) player.wire();
-    if (window.parent !== window) frame = color3dFramed.connect(hooksOfFrame());
     goTo(facts.key, { glide: false });
+    if (window.parent !== window) frame = color3dFramed.connect(hooksOfFrame());
     say('Drag to turn, wheel or pinch to come nearer, right drag or two fingers to move');
     document.body.dataset.state = 'ready';
   });

@@ -86,7 +86,7 @@ export class Corrector {
       this.moments.set(moment);
       this.refresh();
     });
-    this.brush = new BrushPanel({
+    this.brush = new BrushPanel(this.view.width, {
       changed: () => this.onBrush(),
       reach: (reach) => { this.draft.reach = reach; this.redraw(); this.showDraft(); },
       reached: (reach) => { this.draft.reach = reach; if (!this.draft.isEmpty) void this.draft.try(this.run); },
@@ -135,6 +135,7 @@ export class Corrector {
   }
 
   private lay(): void {
+    this.root.addEventListener('keydown', (event) => this.undoByKey(event));
     this.root.append(
       h('div', { class: 'co-bar' }, this.panes.buttons, this.modes.root, this.moments.root),
       h('div', { class: 'co-main' },
@@ -248,7 +249,7 @@ export class Corrector {
 
   // ---- a stroke
   private onBrush(): void {
-    if (!this.photoPicture) return; // while it is built
+    if (!this.brush) return; // while it is built
     for (const picture of [this.photoPicture, this.colorPicture]) {
       picture.setTool(this.brush.tool, { width: this.brush.width, color: this.brush.shownColor });
     }
@@ -279,6 +280,13 @@ export class Corrector {
       this.setMode('color');
     }
     this.showDraft();
+  }
+  private undoByKey(event: KeyboardEvent): void {
+    if (event.key !== 'z' || !(event.ctrlKey || event.metaKey) || event.shiftKey) return;
+    event.preventDefault();
+    const last = this.version.corrections.at(-1);
+    if (!this.draft.isEmpty) this.draft.undo(this.run);
+    else if (last && !this.work.job) void this.change({ remove: [last.id] }, 'Removing the correction …');
   }
   private showStrokes(): void {
     const strokes = this.draft.view === this.view.name ? this.draft.strokes : [];

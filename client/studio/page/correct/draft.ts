@@ -49,6 +49,12 @@ export class Draft {
     this.reach = 1;
     this.changed();
   }
+  // Takes back the last stroke.
+  undo(run: string): void {
+    this.strokes = this.strokes.slice(0, -1);
+    if (this.isEmpty) this.clear();
+    else void this.try(run);
+  }
   async try(run: string): Promise<void> {
     const number = ++this.number;
     this.trial = '';

@@ -19,7 +19,7 @@ const maxRecent = 8;
 export class BrushPanel {
   readonly root: HTMLElement;
   tool: Tool = 'brush';
-  width = 24; // px of the picture
+  width: number; // px of the picture
   private color = '#a0522d';
   private isNeutral = false;
   private recent: string[] = [];
@@ -33,9 +33,12 @@ export class BrushPanel {
   private readonly says = h('p', { class: 'small', role: 'status' });
   private readonly applies = button('Apply to all photos and the scene', () => this.hooks.apply(), { class: 'main-button', id: 'co-apply' });
 
-  constructor(private readonly hooks: BrushHooks) {
+  // `pictureWidth`: px, that brushes fit to.
+  constructor(pictureWidth: number, private readonly hooks: BrushHooks) {
+    const most = Math.max(8, Math.round(pictureWidth * 0.12));
+    this.width = Math.max(4, Math.round(pictureWidth * 0.025));
     this.input.addEventListener('input', () => this.take({ color: this.input.value }));
-    const width = slider({ id: 'co-width', label: 'Brush', min: 4, max: 120, step: 1, value: this.width, text: (value) => `${value} px` },
+    const width = slider({ id: 'co-width', label: 'Brush', min: 2, max: most, step: 1, value: this.width, text: (value) => `${value} px` },
       { input: (value) => { this.width = value; hooks.changed(); } });
     this.reachSlider = slider(
       { id: 'co-reach', label: 'Reach', min: 0, max: 1, step: 0.01, value: 0.5, text: (value) => reachInWords(reachOfSlider(value)) },
