@@ -81,40 +81,58 @@ const bestPhoto = (photos, centers, from, point) => {
   return null;
 };
 
-// Distances of what a photo sees first, in a grid of cells; Infinity where there is nothing.
-const depthsOf = (photo, centers, high) => {
-  const depths = new Float32Array(kCellsWide * high).fill(Infinity);
-  for (let i = 0; i < centers.length; i += 3) {
-    const at = inPhoto(photo, [centers[i], centers[i + 1], centers[i + 2]]);
-    if (!at) continue;
-    const cell = Math.floor(at.y * high) * kCellsWide + Math.floor(at.x * kCellsWide);
-    if (at.distance < depths[cell]) depths[cell] = at.distance;
+// What a photo shows, without what is hidden: indices of Gaussians, and their places in it as shares of 65535.
+const shownBy = (photo, centers) => {
+  const high = Math.max(1, Math.round(kCellsWide / photo.aspect)), count = centers.length / 3;
+  const right = turn(photo.rotation, [1, 0, 0]), up = turn(photo.rotation, [0, 1, 0]), back = turn(photo.rotation, [0, 0, 1]);
+  const [ox, oy, oz] = photo.position, wide = 2 * photo.tan * photo.aspect, tall = 2 * photo.tan;
+  const nearest = new Float32Array(kCellsWide * high).fill(Infinity);
+  const depth = new Float32Array(count), at = new Float32Array(2 * count);
+  const cellOf = (i) => Math.floor(at[2 * i + 1] * high) * kCellsWide + Math.floor(at[2 * i] * kCellsWide);
+  for (let i = 0; i < count; ++i) {
+    const x = centers[3 * i] - ox, y = centers[3 * i + 1] - oy, z = centers[3 * i + 2] - oz;
+    const far = -(x * back[0] + y * back[1] + z * back[2]);
+    if (far <= 0) continue;
+    const u = photo.center[0] + (x * right[0] + y * right[1] + z * right[2]) / far / wide;
+    const v = photo.center[1] - (x * up[0] + y * up[1] + z * up[2]) / far / tall;
+    if (!(u > 0 && v > 0 && u < 1 && v < 1)) continue;
+    at[2 * i] = u;
+    at[2 * i + 1] = v;
+    depth[i] = far;
+    const cell = cellOf(i);
+    if (far < nearest[cell]) nearest[cell] = far;
   }
-  return depths;
+  const shown = [];
+  for (let i = 0; i < count; ++i) {
+    if (depth[i] > 0 && depth[i] <= nearest[cellOf(i)] * (1 + kBehind)) shown.push(i);
+  }
+  const index = Uint32Array.from(shown), places = new Uint16Array(2 * index.length);
+  index.forEach((i, n) => {
+    places[2 * n] = 65535 * at[2 * i];
+    places[2 * n + 1] = 65535 * at[2 * i + 1];
+  });
+  return { index, places };
 };
 
-// Changes of a and b of each Gaussian, as 128 + change: means over the photos that show it.
-const changesOf = (photos, centers, maps) => {
+// Changes of a and b of each Gaussian, as 128 + change: means over the photos that show it. `known`: what
+// photos show, by name, which is added to it.
+const changesOf = (photos, centers, maps, known = new Map()) => {
   const count = centers.length / 3;
-  const sums = new Float32Array(2 * count), shown = new Uint8Array(count);
+  const sums = new Float32Array(2 * count), times = new Uint8Array(count);
   for (const { photo: name, width, height, ab } of maps) {
     const photo = photos.find((one) => one.name === name);
     if (!photo) continue;
-    const high = Math.max(1, Math.round(kCellsWide / photo.aspect));
-    const depths = depthsOf(photo, centers, high);
-    for (let i = 0; i < count; ++i) {
-      const at = inPhoto(photo, [centers[3 * i], centers[3 * i + 1], centers[3 * i + 2]]);
-      if (!at) continue;
-      const first = depths[Math.floor(at.y * high) * kCellsWide + Math.floor(at.x * kCellsWide)];
-      if (at.distance > first * (1 + kBehind)) continue;
-      const pixel = 2 * (Math.floor(at.y * height) * width + Math.floor(at.x * width));
-      sums[2 * i] += ab[pixel];
-      sums[2 * i + 1] += ab[pixel + 1];
-      ++shown[i];
+    if (!known.has(name)) known.set(name, shownBy(photo, centers));
+    const { index, places } = known.get(name);
+    for (let n = 0; n < index.length; ++n) {
+      const pixel = 2 * (((places[2 * n + 1] * height) >> 16) * width + ((places[2 * n] * width) >> 16));
+      sums[2 * index[n]] += ab[pixel];
+      sums[2 * index[n] + 1] += ab[pixel + 1];
+      ++times[index[n]];
     }
   }
   const changes = new Uint8Array(2 * count);
-  for (let i = 0; i < changes.length; ++i) changes[i] = 128 + Math.round(sums[i] / Math.max(1, shown[i >> 1]));
+  for (let i = 0; i < changes.length; ++i) changes[i] = 128 + Math.round(sums[i] / Math.max(1, times[i >> 1]));
   return changes;
 };
 
@@ -135,9 +153,10 @@ const connect = (hooks) => {
     const index = hooks.photos.findIndex(({ name }) => name === photo);
     if (index >= 0) hooks.goTo(index);
   };
+  const shown = new Map();
   const recolor = ({ maps }) => {
     if (!Array.isArray(maps) || maps.length > kMaxMaps || !maps.every((map) => map && isMap(map))) return;
-    hooks.showChanges(maps.length ? changesOf(hooks.photos, hooks.centers(), maps) : null);
+    hooks.showChanges(maps.length ? changesOf(hooks.photos, hooks.centers(), maps, shown) : null);
     tell({ color3d: 'recolored' });
   };
   window.addEventListener('message', ({ source, data }) => {
