@@ -124,14 +124,9 @@ export class Corrector {
   destroy(): void {
     this.isOver = true;
     for (const stop of this.stops) stop();
-    this.work.destroy();
     cancelAnimationFrame(this.frame);
     this.draft.clear();
-    this.store.destroy();
-    this.strip.destroy();
-    this.photoPicture.destroy();
-    this.colorPicture.destroy();
-    this.scene.destroy();
+    for (const part of [this.work, this.store, this.strip, this.photoPicture, this.colorPicture, this.scene]) part.destroy();
   }
 
   private lay(): void {
@@ -329,13 +324,9 @@ export class Corrector {
 
   // ---- changes
   private async apply(): Promise<void> {
-    const { asNew, trial } = this.draft;
-    this.applied = trial;
-    this.root.dataset.applied = String(performance.now());
-    const wasMode = this.mode;
-    if (!await this.change({ add: asNew }, 'All photos have the new colours. The scene follows …')) return;
-    this.draft.clear();
-    if (wasMode === 'pull') this.setMode('color');
+    this.applied = this.draft.trial;
+    const done = await this.change({ add: this.draft.asNew }, 'All photos have the new colours. The scene follows …');
+    if (done) this.draft.clear();
   }
   private askTone(tone: Tone): void {
     if (sameTone(tone, this.ownTone ?? this.version.tone)) return;
