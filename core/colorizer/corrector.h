@@ -20,8 +20,8 @@ struct PlacedPicture {
 
 struct Correction {
   PlacedPicture picture;
-  Image ab;       // 2 channels, Lab units: target colours
-  Image painted;  // 1 channel, 0..1: opacity of the paint
+  Image ab;            // 2 channels, Lab units: target colours
+  Image painted;       // 1 channel, 0..1: opacity of the paint
   double reach = 1.0;  // of its colours to similar places, > 0; 1: as measured
 };
 

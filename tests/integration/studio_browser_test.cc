@@ -77,20 +77,13 @@ TEST_F(StudioTest, FolderBecomesColoredScene) {
 TEST_F(StudioTest, SceneIsCorrected) {
   WriteProceduralScene(Path("room"), SmallRoom(8, /*gray=*/true));
   const std::string key = Path("room") / "truth" / "view001.png";
-  const std::vector<std::string> colorize = {"colorize",
-                                             Path("room"),
-                                             "-o",
-                                             Path("out"),
-                                             "--key-view",
-                                             "view001.png",
-                                             "--key-color",
-                                             key};
+  const std::vector<std::string> colorize = {
+      "colorize", Path("room"), "-o", Path("out"), "--key-view", "view001.png", "--key-color", key};
   const ProcessResult colored = Client(colorize + QuickOptions());
   ASSERT_EQ(colored.exit_code, 0) << colored.out << colored.err;
   Process studio(ClientCommand({"studio", "--no-open", Path("out")}), Path("studio"));
   const char* screenshots = std::getenv("COLOR3D_SCREENSHOTS");
-  std::vector<std::string> command = {
-      "node", COLOR3D_USE_CORRECTOR, "chromium", AddressOf(studio)};
+  std::vector<std::string> command = {"node", COLOR3D_USE_CORRECTOR, "chromium", AddressOf(studio)};
   if (screenshots != nullptr) command.emplace_back(screenshots);
   const ProcessResult used = RunProcess(command, Path("browser"), seconds(500));
   ASSERT_EQ(used.exit_code, 0) << used.err << studio.Err();

@@ -52,12 +52,10 @@ void AddCorrectRoutes(Corrections& corrections, const StudioRoutes& routes) {
         corrections.PhotoJpeg(request.matches[1], ViewOf(request), SideOf(request)), "image/jpeg");
   });
   routes.get(CorrectPattern("/map"), [&corrections](const Request& request, Response& response) {
-    response.set_content(corrections.MapPng(request.matches[1],
-                                            TrialOf(request),
-                                            MapOf(request),
-                                            ViewOf(request),
-                                            SideOf(request)),
-                         "image/png");
+    response.set_content(
+        corrections.MapPng(
+            request.matches[1], TrialOf(request), MapOf(request), ViewOf(request), SideOf(request)),
+        "image/png");
   });
   routes.post(
       CorrectPattern("/try"),

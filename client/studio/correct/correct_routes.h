@@ -1,4 +1,4 @@
-// Calls of the page that correct a scene (README.md "Corrections").
+// Calls of the page that correct a scene, listed in client/studio/README.md.
 #pragma once
 
 #include <httplib.h>

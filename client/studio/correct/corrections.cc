@@ -135,10 +135,10 @@ std::string SmallAbPng(const std::string& png, const std::string& name, int side
   const AbMap map = DecodeAbPng(png, name);
   Image rgb(map.ab.width, map.ab.height, 3, 1.0f);
   for (int c = 0; c < 2; ++c) {
-    std::transform(map.ab.Plane(c),
-                   map.ab.Plane(c) + map.ab.PlaneSize(),
-                   rgb.Plane(c),
-                   [](float value) { return (value + 128.0f) / 255.0f; });
+    std::transform(
+        map.ab.Plane(c), map.ab.Plane(c) + map.ab.PlaneSize(), rgb.Plane(c), [](float value) {
+          return (value + 128.0f) / 255.0f;
+        });
   }
   return EncodePng8(FitWithin(rgb, side));
 }
@@ -189,17 +189,17 @@ std::shared_ptr<const Corrections::Run> Corrections::Open(const std::string& nam
   run->stages = StagesOf(connection, run->job);
   for (const std::string needed : {artifact::kModel, artifact::kColorizer, artifact::kScene}) {
     if (FindIn(run->stages, needed).artifact == nullptr) {
-      throw NotCorrectable(IsFinished(run->job.state())
-                               ? "this run made no scene in 3D"
-                               : "the scene is still being coloured");
+      throw NotCorrectable(IsFinished(run->job.state()) ? "this run made no scene in 3D"
+                                                        : "the scene is still being coloured");
     }
   }
   const Found scene = FindIn(run->stages, artifact::kScene);
   run->views = OpenViews(connection, *scene.job, *scene.artifact);
   const Found key = FindIn(run->stages, artifact::kKeyView);
   if (key.job != nullptr) {
-    const Json found = Json::parse(
-        ReadArtifact(connection, *key.job, artifact::kKeyView), nullptr, /*allow_exceptions=*/false);
+    const Json found = Json::parse(ReadArtifact(connection, *key.job, artifact::kKeyView),
+                                   nullptr,
+                                   /*allow_exceptions=*/false);
     if (found.is_object()) run->key_view = found.value("view", "");
   }
   const bool stays = run->job.state() == v1::Job::STATE_SUCCEEDED;
@@ -221,8 +221,9 @@ Json Corrections::Describe(const std::string& name) {
                             nullptr,
                             /*allow_exceptions=*/false);
     }
-    corrections.push_back(
-        {{"id", id}, {"view", correction.view()}, {"strokes", strokes.is_array() ? strokes : Json()}});
+    corrections.push_back({{"id", id},
+                           {"view", correction.view()},
+                           {"strokes", strokes.is_array() ? strokes : Json()}});
   }
   const bool has_sources = std::ranges::any_of(run->stages, [](const v1::Job& stage) {
     return std::ranges::any_of(stage.artifacts(), [](const v1::Artifact& artifact) {
@@ -241,11 +242,8 @@ std::string Corrections::PhotoJpeg(const std::string& name, const std::string& v
   return run->views->Jpeg(run->views->Find(view), side);
 }
 
-std::string Corrections::MapPng(const std::string& name,
-                                const std::string& trial,
-                                Map map,
-                                const std::string& view,
-                                int side) {
+std::string Corrections::MapPng(
+    const std::string& name, const std::string& trial, Map map, const std::string& view, int side) {
   const std::shared_ptr<const Run> run = Open(name);
   run->views->Find(view);
   Connection connection = calls_.Connect();
@@ -323,8 +321,7 @@ v1::Job Corrections::Try(const std::string& name, const nlohmann::json& json) {
   const std::shared_ptr<const Run> run = Open(name);
   Connection connection = calls_.Connect();
   const VersionChange change = ReadChange(connection, *run, json);
-  const v1::JobSpec whole =
-      Changed(NewestSpec(VersionsOf(connection, run->job), run->job), change);
+  const v1::JobSpec whole = Changed(NewestSpec(VersionsOf(connection, run->job), run->job), change);
   if (whole.colorize_scene().correct_colors().corrections().empty()) {
     throw Error(ErrorCode::kFailedPrecondition, "no correction is left to show");
   }

@@ -38,11 +38,8 @@ class Corrections {
   };
   // PNG of 8 bits. `trial`: a job of Try whose maps are wanted; empty: the run's own. Throws
   // Error{kNotFound} if there is no such map.
-  std::string MapPng(const std::string& run,
-                     const std::string& trial,
-                     Map map,
-                     const std::string& view,
-                     int side);
+  std::string MapPng(
+      const std::string& run, const std::string& trial, Map map, const std::string& view, int side);
 
   // A change of the newest version: {add: {view, strokes, reach}, remove: [id], tone: {saturation,
   // tint, warmth}}, each optional. Strokes as for SceneViews::CapturedStrokes; reach as in

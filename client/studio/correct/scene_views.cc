@@ -102,8 +102,7 @@ Json SceneViews::CapturedStrokes(int view, const Json& strokes) const {
     throw InvalidArgument("draw 1 to {} strokes", kMaxStrokes);
   }
   const View& of = scene_.views.at(static_cast<size_t>(view));
-  const double scale =
-      static_cast<double>(of.captured_camera.width) / PictureCamera(view).width;
+  const double scale = static_cast<double>(of.captured_camera.width) / PictureCamera(view).width;
   Json captured = Json::array();
   for (const Json& stroke : strokes) {
     if (!stroke.is_object()) throw InvalidArgument("a stroke is not an object");
@@ -111,7 +110,8 @@ Json SceneViews::CapturedStrokes(int view, const Json& strokes) const {
     CopyFill(stroke, &out);
     const auto line = stroke.find("line");
     if (line == stroke.end()) {
-      const auto at = Captured(view, StrokeNumber(stroke, "x", -1.0), StrokeNumber(stroke, "y", -1.0));
+      const auto at =
+          Captured(view, StrokeNumber(stroke, "x", -1.0), StrokeNumber(stroke, "y", -1.0));
       out["x"] = at[0];
       out["y"] = at[1];
       out["radius"] = scale * std::clamp(StrokeNumber(stroke, "radius", 4.0), 0.5, 1.0 * kSidePx);

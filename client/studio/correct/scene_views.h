@@ -18,7 +18,9 @@ class SceneViews {
   static constexpr int kSidePx = 1200;  // longer side of pictures, at most
 
   // `fetch` writes a file of the scene ("images/a.jpg") below `folder`, unless it is there.
-  SceneViews(Scene scene, std::filesystem::path folder, std::function<void(const std::string&)> fetch);
+  SceneViews(Scene scene,
+             std::filesystem::path folder,
+             std::function<void(const std::string&)> fetch);
 
   const Scene& scene() const { return scene_; }
   // Index of a view by its whole name. Throws Error{kNotFound}.
@@ -28,8 +30,8 @@ class SceneViews {
   // Grey JPEG. `side`: longer side, px, at most kSidePx; 0: that. Throws what `fetch` throws.
   std::string Jpeg(int view, int side) const;
 
-  // Strokes in px of the picture of the view as points of `key color --hints`, in px of the photo as
-  // captured. Throws Error{kInvalidArgument} for strokes that are none, have no colour, or lie
+  // Strokes in px of the picture of the view as points of `key color --hints`, in px of the photo
+  // as captured. Throws Error{kInvalidArgument} for strokes that are none, have no colour, or lie
   // outside of the photo.
   nlohmann::json CapturedStrokes(int view, const nlohmann::json& strokes) const;
 

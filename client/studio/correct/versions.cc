@@ -34,11 +34,8 @@ std::optional<double> ToneNumber(const nlohmann::json& tone,
   if (value == tone.end()) return std::nullopt;
   const double number = value->is_number() ? value->get<double>() : std::nan("");
   if (!(number >= low && number <= high)) {
-    throw InvalidArgument("{} is {}; it must be between {} and {}",
-                          field,
-                          value->dump().substr(0, 20),
-                          low,
-                          high);
+    throw InvalidArgument(
+        "{} is {}; it must be between {} and {}", field, value->dump().substr(0, 20), low, high);
   }
   return number;
 }

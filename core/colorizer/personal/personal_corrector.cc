@@ -160,10 +160,10 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
         CellPositions(small.position, cells.Count()),
         CellSeenShares(small.seen, cells.Count())};
     const ChangeField::Answer answer = field_->At(places);
-    const Image coarse = ImageFromTensor(
-        torch::cat({answer.change, torch::stack({answer.share, answer.pull}, 1)}, 1)
-            .t()
-            .reshape({4, cells.rows, cells.columns}));
+    const Image coarse =
+        ImageFromTensor(torch::cat({answer.change, torch::stack({answer.share, answer.pull}, 1)}, 1)
+                            .t()
+                            .reshape({4, cells.rows, cells.columns}));
     const int width = picture.luminance.width, height = picture.luminance.height;
     Image fine = Crop(UpsampleGuided(coarse, ImageFromTensor(padded)),
                       0,

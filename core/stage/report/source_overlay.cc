@@ -31,9 +31,11 @@ Image ShadeBySource(const Image& photo, const Image& provenance) {
       const float all = std::max(guessed + seen + inferred, 1e-3f);
       const bool stripe = (x + y) / kStripePx % 2 == 0;
       // So that shades show on black.
-      const float bright = (0.15f + 0.95f * gray) * (stripe ? 1.0f - kStripe * guessed : 1.0f) / all;
+      const float bright =
+          (0.15f + 0.95f * gray) * (stripe ? 1.0f - kStripe * guessed : 1.0f) / all;
       for (int c = 0; c < 3; ++c) {
-        const float shade = guessed * kGuessedShade[c] + seen * kSeenShade[c] + inferred * kInferredShade[c];
+        const float shade =
+            guessed * kGuessedShade[c] + seen * kSeenShade[c] + inferred * kInferredShade[c];
         shaded.At(c, y, x) = std::min(bright * shade, 1.0f);
       }
     }

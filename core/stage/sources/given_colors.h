@@ -10,8 +10,8 @@
 namespace color3d {
 
 struct GivenColors {
-  Image ab;     // 2 channels, Lab units, size of the photo as captured
-  Image given;  // 1 channel: 1 where the user gave a colour, else 0
+  Image ab;            // 2 channels, Lab units, size of the photo as captured
+  Image given;         // 1 channel: 1 where the user gave a colour, else 0
   double reach = 1.0;  // the largest one of the points, lines and regions
 };
 

@@ -1,4 +1,4 @@
-// Calls of the studio for corrections (client/studio/README.md "Corrections").
+// Calls of the studio for corrections, listed in client/studio/README.md.
 import { StudioError, type Job } from '../api';
 import type { Stroke } from './model/strokes';
 import type { Tone } from './model/tone';
