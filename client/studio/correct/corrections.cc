@@ -33,7 +33,7 @@ using std::chrono::steady_clock;
 constexpr size_t kMaxOpenRuns = 16;
 constexpr size_t kMaxOpenScenes = 2;
 constexpr int kVersionsInPage = 200;
-constexpr milliseconds kBetweenLooks{1000};
+constexpr milliseconds kBetweenLooks{2000};
 constexpr milliseconds kStillHere{10'000};
 constexpr int64_t kMaxStrokesBytes = 4 << 20;
 
