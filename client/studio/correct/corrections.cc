@@ -15,6 +15,7 @@
 #include "client/lib/names.h"
 #include "client/lib/out_folder.h"
 #include "client/options/key_color_flags.h"
+#include "client/studio/correct/scene_views.h"
 #include "client/studio/correct/versions.h"
 #include "client/studio/run_progress.h"
 #include "core/base/error.h"

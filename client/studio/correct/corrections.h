@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "client/studio/correct/scene_views.h"
 #include "client/studio/correct/versions.h"
 #include "client/studio/studio_calls.h"
 #include "color3d/v1/job.pb.h"
@@ -19,6 +18,8 @@
 #include "core/base/mutex.h"
 
 namespace color3d::client {
+
+class SceneViews;  // Eigen, which it includes, and httplib exclude each other
 
 class Corrections {
  public:
