@@ -155,7 +155,8 @@ std::shared_ptr<const SceneViews> Corrections::OpenViews(Connection& connection,
     if (const auto known = views_.find(key); known != views_.end()) return known->second;
   }
   std::map<std::string, FileDigest> files;
-  for (const v1::SceneFile& file : GetScene(connection, job.spec().scene()).files()) {
+  const v1::Scene uploaded = GetScene(connection, job.spec().scene());
+  for (const v1::SceneFile& file : uploaded.files()) {
     files[file.path()] = {file.digest().sha256(), file.digest().size_bytes()};
   }
   const fs::path folder = files_.path() / key;
