@@ -129,7 +129,8 @@ allow server/worker/supervision 'core/base|server/(store|ops|worker/supervision)
 allow server/worker/live \
   'core/(base|color|colorizer|encoder|image|keycolor)|server/(base|ops|rpc/calls|storage|store|worker/(live|remote))'
 allow server/worker/remote 'core/base|server/(base|ops|rpc/calls|storage|store|worker/remote)'
-allow client 'core/(base|catalogue|color|image(/(credit|probe))?|trace|video|zip)|client(/[a-z]+)?'
+allow client 'core/(base|catalogue|color|image(/(credit|probe))?|scene|trace|video|zip)|client(/[a-z]+)?'
+forbid 'core/scene/' client/commands client/lib client/options  # the studio shows undistorted photos
 
 forbid 'torch/|ATen/|c10/' core/base core/zip core/simd core/grid core/color core/image core/weights \
   core/scene core/keyview core/splat core/metrics core/report core/view core/stage server client \
@@ -169,7 +170,7 @@ public core/film anchor_frames film_carry moving_regions returning_shots shots s
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics confidence_interval scene_consistency temporal_consistency view_scores
 public core/report contact_sheet curves report_page run_curve scene_plan
-public core/scene camera frame_numbers frame_times import_options key_photo photo_masks relief scene \
+public core/scene camera frame_numbers frame_times import_options key_photo lens photo_masks relief scene \
   view_images formats/camera_file formats/camera_films import/hold_out import/import \
   masks/masked_points masks/still_regions
 public core/splat model/gaussian_cap model/gaussian_model model/memory_plan motion/geometry_in_time raster/render \

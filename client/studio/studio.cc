@@ -13,6 +13,7 @@
 #include "client/lib/names.h"
 #include "client/lib/out_folder.h"
 #include "client/lib/photos/photo_folder.h"
+#include "client/studio/correct/correct_routes.h"
 #include "client/studio/found_photos.h"
 #include "client/studio/page_files.h"
 #include "client/studio/photo_sets.h"
@@ -77,6 +78,7 @@ class Studio::Parts {
   StudioCalls calls_;
   ShareCalls share_;
   QueueCalls queue_;
+  Corrections corrections_{calls_};
   const ScratchFolder downloads_;
   std::atomic<int> streams_{0};
   std::atomic<Steady::time_point> last_request_{Steady::now()};
@@ -96,6 +98,8 @@ class Studio::Parts {
   void KeepPicture(const Request& request, Response& response, const ContentReader& reader);
   void Colorize(const Request& request, Response& response, const ContentReader& reader);
   void StreamEvents(const Request& request, Response& response);
+  // Answers with the states that `watch` passes to `send` as events.
+  void Stream(Response& response, std::function<void(const StudioRoutes::Send& send)> watch);
   void SendArtifact(const Request& request, Response& response);
 
   PhotoFolder FolderOf(const std::string& id) const { return CollectSet(sets_.Get(id)); }
@@ -166,8 +170,9 @@ void Studio::Parts::AddRoutes() {
   AddJobRoutes();
   const StudioRoutes routes{
       [this](const std::string& pattern, Handler handler) { Get(pattern, std::move(handler)); },
-      [this](const std::string& pattern, BodyHandler handler) {
-        Post(pattern, std::move(handler));
+      [this](const std::string& pattern, BodyHandler handler) { Post(pattern, std::move(handler)); },
+      [this](Response& response, std::function<void(const StudioRoutes::Send&)> watch) {
+        Stream(response, std::move(watch));
       }};
   AddShareRoutes(routes,
                  {options_.folder,
@@ -177,6 +182,7 @@ void Studio::Parts::AddRoutes() {
                   &cancel_},
                  share_);
   AddQueueRoutes(routes, queue_);
+  AddCorrectRoutes(corrections_, routes);
 }
 
 void Studio::Parts::AddPageRoutes() {
@@ -353,19 +359,25 @@ void Studio::Parts::Colorize(const Request& request,
 }
 
 void Studio::Parts::StreamEvents(const Request& request, Response& response) {
-  const auto place = std::make_shared<StreamPlace>(&streams_);
   const std::string job = request.matches[1];
   calls_.Job(job);  // an unknown one is refused while the status can still be sent
+  Stream(response, [this, job](const StudioRoutes::Send& send) { calls_.Watch(job, send); });
+}
+
+void Studio::Parts::Stream(Response& response,
+                           std::function<void(const StudioRoutes::Send& send)> watch) {
+  const auto place = std::make_shared<StreamPlace>(&streams_);
   response.set_header("X-Accel-Buffering", "no");
   response.set_chunked_content_provider(
-      "text/event-stream", [this, job, place](size_t, httplib::DataSink& sink) {
+      "text/event-stream",
+      [this, watch = std::move(watch), place](size_t, httplib::DataSink& sink) {
         const auto send = [&](const std::string& text) {
           const std::string event = text.empty() ? ": still here\n\n" : "data: " + text + "\n\n";
           return !http_.is_stopping() && sink.is_writable() &&
                  sink.write(event.data(), event.size());
         };
         try {
-          calls_.Watch(job, send);
+          watch(send);
           const std::string end = "event: end\ndata: {}\n\n";
           sink.write(end.data(), end.size());
         } catch (const std::exception& e) {

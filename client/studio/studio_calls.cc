@@ -14,6 +14,7 @@
 #include "client/lib/text.h"
 #include "client/options/colorize_options.h"
 #include "client/options/key_color_flags.h"
+#include "client/studio/correct/versions.h"
 #include "client/studio/found_photos.h"
 #include "client/studio/live_png.h"
 #include "client/studio/run_progress.h"
@@ -225,10 +226,16 @@ Json StudioCalls::Jobs() const {
   v1::ListJobsRequest request;
   request.set_page_size(kJobsInPage);
   Json list = Json::array();
+  std::set<std::string> versions;
   do {
     const auto page = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
     for (const v1::Job& job : page.jobs()) {
       if (job.kind() != kind::kColorizeScene || !job.parent().empty()) continue;
+      const std::string plain = WithoutCorrections(job.spec());
+      if (versions.contains(plain)) continue;  // a newer one is in the list
+      const bool is_over =
+          job.state() == v1::Job::STATE_FAILED || job.state() == v1::Job::STATE_CANCELLED;
+      if (!is_over) versions.insert(plain);
       list.push_back(JobFacts(job));
       if (list.size() == kJobsInList) return list;
     }

@@ -53,7 +53,7 @@ class StudioCalls {
   v1::Job Cancel(const std::string& job) const;
   v1::Job Retry(const std::string& job) const;
   v1::Job Job(const std::string& job) const;
-  // Jobs of coloured scenes, the newest first, at most 100.
+  // Jobs of coloured scenes, the newest first, at most 100; of versions of a scene the newest.
   nlohmann::ordered_json Jobs() const;
 
   // Passes the state of the job (RunProgress::ToJson) to `send` now and after each change, at most

@@ -13,8 +13,12 @@ struct StudioRoutes {
   using BodyHandler = std::function<void(
       const httplib::Request&, httplib::Response&, const httplib::ContentReader&)>;
 
+  using Send = std::function<bool(const std::string& state)>;
+
   std::function<void(const std::string& pattern, Handler)> get;
   std::function<void(const std::string& pattern, BodyHandler)> post;
+  // Answers with events. `watch` passes each state to `send` until that returns false.
+  std::function<void(httplib::Response&, std::function<void(const Send& send)> watch)> stream;
 };
 
 // "/api/BEFORE/IDAFTER", with ID as the first match.

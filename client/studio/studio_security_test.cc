@@ -106,6 +106,38 @@ TEST_F(StudioSecurityTest, PathsStayInside) {
             400);
 }
 
+TEST_F(StudioSecurityTest, CorrectionsAreForTheOwnPage) {
+  const std::string call = "/api/jobs/1f/correct";
+  for (const char* what : {"", "/photo?view=a", "/map?view=a&map=color", "/events"}) {
+    EXPECT_EQ(Client().Get(call + what)->status, 403) << what << ": no cookie";
+  }
+  for (const char* what : {"", "/try"}) {
+    EXPECT_EQ(Client().Post(call + what, "{}", "application/json")->status, 403) << what;
+    Headers foreign = {{"Cookie", Own().find("Cookie")->second}, {"Origin", "http://evil.test"}};
+    EXPECT_EQ(Client().Post(call + what, foreign, "{}", "application/json")->status, 403) << what;
+    // The frame of a scene has no origin.
+    foreign = {{"Cookie", Own().find("Cookie")->second}, {"Origin", "null"}};
+    EXPECT_EQ(Client().Post(call + what, foreign, "{}", "application/json")->status, 403) << what;
+    const std::string large(4 << 20, ' ');
+    const auto answer = Client().Post(call + what, Own(), large, "application/json");
+    if (answer) {
+      EXPECT_THAT(answer->status, AnyOf(413, 507)) << what;
+    }
+    EXPECT_EQ(Client().Post(call + what, Own(), "[1]", "application/json")->status, 400) << what;
+  }
+  for (const char* bad : {"/photo",
+                          "/photo?view=a&side=100000",
+                          "/map?view=a",
+                          "/map?view=a&map=geometry.c3g",
+                          "/map?view=a&map=color&trial=../1f",
+                          "/map?view=a&map=color&trial=scenes/1"}) {
+    EXPECT_EQ(Client().Get(call + bad, Own())->status, 400) << bad;
+  }
+  for (const char* path : {"/api/jobs/../correct", "/api/jobs/%2e%2e/correct/photo?view=a"}) {
+    EXPECT_THAT(Client().Get(path, Own())->status, AnyOf(400, 404)) << path;
+  }
+}
+
 TEST_F(StudioSecurityTest, BoundsBodies) {
   const std::string id = NewSet();
   const size_t before = Files();

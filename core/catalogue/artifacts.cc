@@ -46,6 +46,7 @@ std::vector<Artifact> MakeCatalogue() {
       {kProvenance, kColorizeViews, kPng},
       {kCorrectedAb, kCorrectColors, kPng},
       {kCorrectedProvenance, kCorrectColors, kPng},
+      {kPull, kCorrectColors, kPng},
       {kCorrections, kCorrectColors, kJson, true},
       {kPaint, kCorrectColors, kPng, true},
       {kModel, kSolveChroma, kBinary, true},

@@ -48,6 +48,8 @@ inline constexpr char kProvenance[] = "provenance/";
 // The same after corrections; where they exist they replace the two above.
 inline constexpr char kCorrectedAb[] = "corrected_ab/";
 inline constexpr char kCorrectedProvenance[] = "corrected_provenance/";
+// view's stem + ".png", at most 480 px: where the last correction acts, for a reach of 1
+inline constexpr char kPull[] = "pull/";
 inline constexpr char kCorrections[] = "corrections.json";  // reach of each, and proposed views
 // view's stem + ".png": photos where a correction is proposed, in their present colours
 inline constexpr char kPaint[] = "paint/";

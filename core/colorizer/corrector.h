@@ -20,8 +20,9 @@ struct PlacedPicture {
 
 struct Correction {
   PlacedPicture picture;
-  Image ab;       // 2 channels, Lab units: target colours
-  Image painted;  // 1 channel, 0..1: opacity of the paint
+  Image ab;            // 2 channels, Lab units: target colours
+  Image painted;       // 1 channel, 0..1: opacity of the paint
+  double reach = 1.0;  // of its colours to similar places, > 0; 1: as measured
 };
 
 // Places sampled from a picture for Corrector::Propose. A place is a cell of the encoder's grid.
@@ -40,6 +41,9 @@ struct CorrectedColor {
   Image change;  // 2 channels, Lab units, to be added to the picture's ab
   // 1 channel, 0..1: certainty of the change; 1 where it was painted.
   Image share;
+  // 1 channel, 0..1: what the last correction has of `share` at a reach of 1; for a reach r it is
+  // about pull^(1/r).
+  Image pull;
   PlaceSample sample;
 };
 

@@ -7,7 +7,7 @@ namespace color3d {
 // and long words scroll or break within their box.
 inline constexpr char kReportStyle[] = R"css(
 :root{color-scheme:light dark;--page:#fbfaf8;--card:#fff;--text:#1d1f21;--soft:#5b6166;--line:#dcdad5;
---accent:#1f5fa8;--seen:#8a8f94;--inferred:#3f7fd0;--guessed:#d9821a}
+--accent:#1f5fa8;--seen:#6fb7b0;--inferred:#e0b25f;--guessed:#b873a0}
 @media(prefers-color-scheme:dark){:root{--page:#15171a;--card:#1e2125;--text:#e9e7e3;--soft:#a3a9af;
 --line:#34383d;--accent:#7db4f0}}
 *{box-sizing:border-box}
@@ -54,9 +54,9 @@ meter{width:8rem;max-width:30vw}
 .legend{list-style:none;padding:0;margin:.6rem 0;display:grid;gap:.35rem}
 .legend li{display:flex;gap:.6rem;align-items:center}
 .legend i{flex:none;width:2.5rem;height:1.4rem;border-radius:4px;border:1px solid var(--line)}
-.legend .seen{background:#b9b9b9}
-.legend .inferred{background:#92b4dc}
-.legend .guessed{background:repeating-linear-gradient(135deg,#d9821a 0 4px,#f1dcc0 4px 8px)}
+.legend .seen{background:#6fb7b0}
+.legend .inferred{background:#e0b25f}
+.legend .guessed{background:repeating-linear-gradient(135deg,#b873a0 0 4px,#6e4560 4px 8px)}
 details{margin:.75rem 0}summary{cursor:pointer;padding:.4rem 0;font-weight:600}
 pre{background:var(--card);border:1px solid var(--line);border-radius:8px;padding:.6rem .75rem;
 white-space:pre-wrap;font-size:.875rem}

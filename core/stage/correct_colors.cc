@@ -28,6 +28,7 @@ namespace {
 constexpr size_t kMaxCorrections = 64;
 constexpr int kMaxProposals = 16;
 constexpr size_t kPlacesOfAllViews = 3000;  // candidates of proposals
+constexpr int kPullPx = 480;                // longer side of the pictures of the pull
 constexpr double kHardlyKnown = 0.2;        // least share of a stroke that lies on the geometry
 
 // Marks masked pixels as seen, so that no stroke is proposed for them.
@@ -118,7 +119,7 @@ Painted ReadCorrection(const ColorCorrection& wanted,
   if (view.held_out) {
     throw InvalidArgument("it is held out for evaluation; correct another view");
   }
-  Painted painted{index, {views.Picture(index), {}, {}}};
+  Painted painted{index, {views.Picture(index), {}, {}, 1.0}};
   Correction& correction = painted.correction;
   const GivenColors given =
       ReadGivenColors(wanted.colors,
@@ -128,6 +129,7 @@ Painted ReadCorrection(const ColorCorrection& wanted,
   CarriedColor undistorted = UndistortGivenColors(given.ab, given.given, index, views.images());
   correction.ab = std::move(undistorted.ab);
   correction.painted = std::move(undistorted.confidence);
+  correction.reach = given.reach;
   if (const auto mask = views.images().Mask(index)) {
     ClearMasked(mask.get(), &correction.painted);
     if (Mean(correction.painted) == 0.0) {
@@ -186,6 +188,10 @@ CorrectedView CorrectView(int number,
     for (size_t i = 0; i < answer.share.data.size(); ++i) {
       float& share = answer.share.data[i];
       share = std::max(share, one.correction.painted.data[i]);
+      if (&one == &painted.back()) {
+        float& pull = answer.pull.data[i];
+        pull = std::max(pull, one.correction.painted.data[i]);
+      }
     }
   }
   return corrected;
@@ -265,11 +271,13 @@ void RunCorrectColors(const CorrectColorsOptions& options,
     Image provenance = views.Provenance(number, picture.luminance);
     if (!provenance.Empty()) CountAsSeen(answer.share, &provenance);
     const std::string ab_png = EncodeAbPng(ab);
+    const std::string pull_png = painted.empty() ? "" : EncodePng8(FitWithin(answer.pull, kPullPx));
     const std::string provenance_png = provenance.Empty() ? "" : EncodePng8(provenance);
     const MutexLock lock(outputs);
     changed += Mean(answer.share);
     if (!painted.empty()) {
       context.WriteOutput(ViewArtifact(artifact::kCorrectedAb, view), ab_png);
+      context.WriteOutput(ViewArtifact(artifact::kPull, view), pull_png);
       if (!provenance.Empty()) {
         context.WriteOutput(ViewArtifact(artifact::kCorrectedProvenance, view), provenance_png);
       }

@@ -9,6 +9,8 @@
 ASSET(page_template);
 ASSET(page_style);
 ASSET(page_script);
+ASSET(page_framed_script);
+ASSET(page_shading_script);
 ASSET(page_motion_script);
 ASSET(page_player_script);
 ASSET(viewer_program);
@@ -30,6 +32,12 @@ std::string_view PageTemplate() {
 std::string_view PageStyle() { return Between(color3d_page_style_begin, color3d_page_style_end); }
 std::string_view PageScript() {
   return Between(color3d_page_script_begin, color3d_page_script_end);
+}
+std::string_view PageFramedScript() {
+  return Between(color3d_page_framed_script_begin, color3d_page_framed_script_end);
+}
+std::string_view PageShadingScript() {
+  return Between(color3d_page_shading_script_begin, color3d_page_shading_script_end);
 }
 std::string_view PageMotionScript() {
   return Between(color3d_page_motion_script_begin, color3d_page_motion_script_end);

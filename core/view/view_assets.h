@@ -8,6 +8,9 @@ namespace color3d {
 std::string_view PageTemplate();  // page/page.html
 std::string_view PageStyle();     // page/page.css
 std::string_view PageScript();    // page/page.js
+// Before it.
+std::string_view PageFramedScript();   // page/framed.js
+std::string_view PageShadingScript();  // page/shading.js
 
 // For scenes that move, before the script of the page.
 std::string_view PageMotionScript();  // page/motion.js

@@ -152,8 +152,8 @@ std::string RenderViewPage(const Scene& scene, const ViewPage& page) {
   const std::string facts = Facts(scene, page);
   const std::string program = Base64(ViewerProgram());
   const std::string motion = page.motion ? Base64(Gzip(page.motion->file)) : "";
-  const std::string player =
-      page.motion ? fmt::format("{}\n{}", PageMotionScript(), PagePlayerScript()) : "";
+  std::string player = fmt::format("{}\n{}", PageShadingScript(), PageFramedScript());
+  if (page.motion) player += fmt::format("\n{}\n{}", PageMotionScript(), PagePlayerScript());
   const std::pair<std::string_view, std::string_view> parts[] = {{"@STYLE@", PageStyle()},
                                                                  {"@FACTS@", facts},
                                                                  {"@SCENE@", scene_text},

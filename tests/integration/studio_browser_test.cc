@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
@@ -44,6 +46,40 @@ TEST_F(StudioTest, FolderBecomesColoredScene) {
   EXPECT_THAT(text("done"), HasSubstr("view.html"));
   // The same job as on the command line.
   EXPECT_EQ(NewestJob("colorize_scene").state(), v1::Job::STATE_SUCCEEDED);
+  studio.Signal(SIGINT);
+  EXPECT_EQ(studio.Wait(seconds(10)), 0) << studio.Err();
+}
+
+TEST_F(StudioTest, SceneIsCorrected) {
+  WriteProceduralScene(Path("room"), SmallRoom(8, /*gray=*/true));
+  const std::string key = Path("room") / "truth" / "view001.png";
+  const std::vector<std::string> colorize = {
+      "colorize", Path("room"), "-o", Path("out"), "--key-view", "view001.png", "--key-color", key};
+  const ProcessResult colored = Client(colorize + QuickOptions());
+  ASSERT_EQ(colored.exit_code, 0) << colored.out << colored.err;
+  Process studio(ClientCommand({"studio", "--no-open", Path("out")}), Path("studio"));
+  const char* screenshots = std::getenv("COLOR3D_SCREENSHOTS");
+  std::vector<std::string> command = {"node", COLOR3D_USE_CORRECTOR, "chromium", AddressOf(studio)};
+  if (screenshots != nullptr) command.emplace_back(screenshots);
+  const ProcessResult used = RunProcess(command, Path("browser"), seconds(500));
+  ASSERT_EQ(used.exit_code, 0) << used.err << studio.Err();
+  const auto seen = nlohmann::json::parse(used.out);
+  SCOPED_TRACE(seen.dump(1));
+  for (const char* none : {"errors", "requests", "wide", "faint"}) {
+    EXPECT_THAT(seen.at(none), IsEmpty()) << none;
+  }
+  const auto color = [&](const char* when) {
+    return seen.at("colors").at(when).get<std::array<int, 3>>();
+  };
+  const auto redness = [](const std::array<int, 3>& rgb) { return rgb[0] - rgb[1]; };
+  EXPECT_GT(redness(color("after")), redness(color("before")) + 15) << "the stroke is red";
+  EXPECT_THAT(seen.at("touches").get<std::string>(), HasSubstr("of 8 photos"));
+  EXPECT_NE(seen.at("touches"), seen.at("touches_less")) << "the reach counts";
+  EXPECT_TRUE(seen.at("other_page_followed").get<bool>());
+  EXPECT_THAT(seen.at("left_over").get<std::string>(), HasSubstr("Blue on"));
+  const auto gray = color("gray");
+  EXPECT_LE(std::max({gray[0], gray[1], gray[2]}) - std::min({gray[0], gray[1], gray[2]}), 8);
+  EXPECT_TRUE(seen.at("scene_click").get<bool>());
   studio.Signal(SIGINT);
   EXPECT_EQ(studio.Wait(seconds(10)), 0) << studio.Err();
 }

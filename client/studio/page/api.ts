@@ -90,6 +90,10 @@ export const previewStrokes = async (
   const response = await answerOf(fetch(`/api/sets/${id}/preview`, { method: 'POST', body, signal }));
   return createImageBitmap(await response.blob());
 };
+export const getJob = (id: string): Promise<Job> => get(`/api/jobs/${id}`);
+export const getRun = async (id: string): Promise<Run> => new Promise((done, failed) => {
+  const stop = follow(id, { run: (run) => { stop(); done(run); }, problem: (text) => failed(new StudioError(text, 'UNKNOWN')), end: () => undefined });
+});
 export const cancelJob = (id: string): Promise<Job> => post(`/api/jobs/${id}/cancel`);
 export const retryJob = (id: string): Promise<Job> => post(`/api/jobs/${id}/retry`);
 export const artifactUrl = (job: string, name: string, download = false): string =>

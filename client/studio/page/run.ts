@@ -1,8 +1,9 @@
 // A run: what it is doing, pictures as they come, and its results.
 import {
-  artifactUrl, cancelJob, describeSet, follow, getState, previewOfRun, retryJob,
+  artifactUrl, cancelJob, describeSet, follow, getRun, getState, previewOfRun, retryJob,
   type PhotoSet, type Run, type Stage,
 } from './api';
+import { mountCorrector } from './correct/index';
 import { bar, button, h, problem, replace, say } from './dom';
 import { setStepsOf } from './main';
 import { movedTo } from './queue/calls';
@@ -39,16 +40,31 @@ const headline = (run: Run): string => {
   return 'Colouring the scene';
 };
 
-const results = (run: Run): HTMLElement[] => {
+// The scene, where it can be corrected. `stops`: what to do when the page is left. `onNewest` gets the
+// run of each newer version.
+const scene = (run: Run, stops: (() => void)[], onNewest: (run: Run) => void): HTMLElement => {
+  const frame = (): HTMLElement =>
+    h('iframe', { src: artifactUrl(run.id, 'view.html'), sandbox: 'allow-scripts allow-pointer-lock', title: 'The coloured scene', class: 'scene', id: 'scene' });
+  const host = h('div', { class: 'corrector' });
+  const onVersion = async (id: string): Promise<void> => {
+    history.replaceState(null, '', `#job/${id}`);
+    onNewest(await getRun(id));
+  };
+  stops.push(mountCorrector(host, run.id, (id) => void onVersion(id), () => replace(host, frame())));
+  return host;
+};
+
+const results = (run: Run, stops: (() => void)[], onNewest: (run: Run) => void): HTMLElement[] => {
   const has = (name: string): boolean => run.artifacts.some((artifact) => artifact.name === name);
   const film = run.artifacts.find(({ name }) => name === 'film.mp4');
   return [
-    ...(has('view.html') ? [h('iframe', { src: artifactUrl(run.id, 'view.html'), sandbox: 'allow-scripts allow-pointer-lock', title: 'The coloured scene', class: 'scene', id: 'scene' })] : []),
+    ...(has('view.html') ? [scene(run, stops)] : []),
     ...(!has('view.html') && film ? [h('p', { class: 'soft' }, 'Save the film to play it.')] : []),
   ];
 };
 
 export const showRun = (main: HTMLElement, id: string): (() => void) => {
+  const leaves: (() => void)[] = [];
   let left = false, asked = false, finished = false;
   let set: PhotoSet | undefined;
   const title = h('h1', {}, 'Colouring the scene');
@@ -92,6 +108,7 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     }
   };
 
+  let share: HTMLElement | undefined;
   const showShare = async (run: Run): Promise<void> => {
     try {
       const { sets } = await getState();
@@ -100,7 +117,11 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     } catch {
       // Without the photos there is still the scene to share.
     }
-    if (!left) result.append(sharePanel(run, set));
+    if (left) return;
+    const panel = sharePanel(run, set);
+    if (share?.isConnected) share.replaceWith(panel);
+    else result.append(panel);
+    share = panel;
   };
 
   // A run that waited was put elsewhere in the queue, as another one.
@@ -142,7 +163,7 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     finished = true;
     stageSection.open = false;
     gallerySection.hidden = true;
-    replace(result, ...results(run));
+    replace(result, ...results(run, leaves, (newest) => void showShare(newest)));
     void showShare(run);
     main.dataset.state = 'done';
   };
@@ -167,6 +188,7 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     left = true;
     clearTimeout(timer);
     stop();
+    for (const leave of leaves) leave();
     document.title = 'Color3D Studio';
     delete main.dataset.state;
   };

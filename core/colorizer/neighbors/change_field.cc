@@ -16,6 +16,7 @@ constexpr double kUnknownApart = 0.8;  // distance of known positions from unkno
 constexpr double kMinWeight = 0.05;
 constexpr double kSamePlace = 0.75;  // share of the maximum covariance
 constexpr double kWorthInferring = 1e-5;
+constexpr double kLeastShare = 1e-4;  // that a reach above 1 amplifies
 
 // Unknown positions coincide, away from all known ones.
 torch::Tensor EmbedPositions(const torch::Tensor& positions) {
@@ -30,7 +31,7 @@ FieldPlaces Rows(const FieldPlaces& places, const torch::Tensor& rows) {
           places.seen.index_select(0, rows)};
 }
 
-// Mean of the wanted colours, weighted by similarity.
+// Mean of the wanted values of the painted places, weighted by similarity.
 torch::Tensor WeightedTarget(const torch::Tensor& similarity, const torch::Tensor& wanted) {
   const torch::Tensor weights = similarity.square();
   return torch::matmul(weights, wanted) / weights.sum(1, /*keepdim=*/true).clamp_min(1e-12);
@@ -48,6 +49,7 @@ ChangeField::ChangeField(FieldPlaces places,
                          torch::Tensor wanted,
                          const torch::Tensor& weights,
                          const torch::Tensor& correction_of_row,
+                         const torch::Tensor& reach_of_row,
                          const ChangeFieldOptions& options)
     : options_(options), places_(std::move(places)), wanted_(std::move(wanted)) {
   if (wanted_.size(0) == 0) return;
@@ -59,6 +61,10 @@ ChangeField::ChangeField(FieldPlaces places,
   const torch::Tensor rows = repeated.logical_not().nonzero().squeeze(1);
   places_ = Rows(places_, rows);
   wanted_ = wanted_.index_select(0, rows);
+  is_last_ =
+      (correction_of_row.index_select(0, rows) == correction_of_row.max()).to(torch::kFloat32);
+  const torch::Tensor reach = reach_of_row.index_select(0, rows);
+  if ((reach != 1.0).any().item<bool>()) narrowing_ = reach.reciprocal();
   covariance = covariance.index_select(0, rows).index_select(1, rows).to(torch::kFloat64);
   const torch::Tensor noise =
       options_.noise / weights.index_select(0, rows).to(torch::kFloat64).clamp_min(kMinWeight);
@@ -83,12 +89,20 @@ torch::Tensor ChangeField::Covariance(const FieldPlaces& a, const FieldPlaces& b
 
 ChangeField::Answer ChangeField::At(const FieldPlaces& places) const {
   const int64_t count = places.features.size(0);
-  if (!inverse_.defined()) return {torch::zeros({count, 2}), torch::zeros({count})};
+  if (!inverse_.defined()) {
+    return {torch::zeros({count, 2}), torch::zeros({count}), torch::zeros({count})};
+  }
   const torch::Tensor similarity = Covariance(places, places_);
   const torch::Tensor explained = (torch::matmul(similarity, inverse_) * similarity).sum(1);
-  return {LimitTo(WeightedTarget(similarity, wanted_) - places.colors,
-                  torch::matmul(similarity, inverse_x_change_)),
-          (explained / (options_.wide + options_.near)).clamp_(0.0, 1.0)};
+  torch::Tensor change = torch::matmul(similarity, inverse_x_change_);
+  torch::Tensor share = (explained / (options_.wide + options_.near)).clamp_(0.0, 1.0);
+  const torch::Tensor pull = share * WeightedTarget(similarity, is_last_.unsqueeze(1)).squeeze(1);
+  if (narrowing_.defined()) {
+    const torch::Tensor power = WeightedTarget(similarity, narrowing_.unsqueeze(1)).squeeze(1);
+    change = change * share.clamp_min(kLeastShare).pow(power - 1.0).unsqueeze(1);
+    share = share.pow(power);
+  }
+  return {LimitTo(WeightedTarget(similarity, wanted_) - places.colors, change), share, pull};
 }
 
 std::vector<ChangeField::Proposal> ChangeField::Propose(const FieldPlaces& places,

@@ -34,19 +34,21 @@ struct ChangeFieldOptions {
 class ChangeField {
  public:
   // `wanted` [n,2], Lab units: target colours of `places`; `weights` [n], 0..1: opacity of the
-  // paint; `correction_of_row` [n]: index of the correction. Places that a later correction shows
-  // too are dropped. n may be 0.
+  // paint; `correction_of_row` [n]: index of the correction; `reach_of_row` [n], > 0: its reach.
+  // Places that a later correction shows too are dropped. n may be 0.
   ChangeField(FieldPlaces places,
               torch::Tensor wanted,
               const torch::Tensor& weights,
               const torch::Tensor& correction_of_row,
+              const torch::Tensor& reach_of_row,
               const ChangeFieldOptions& options = {});
 
   struct Answer {
     // [q,2], Lab units. Never moves a colour past the target colour of the most similar places: a
     // place that already has the target colour does not share the error of the painted ones.
     torch::Tensor change;
-    torch::Tensor share;  // [q], 0..1: explained share of the variance of the errors
+    torch::Tensor share;  // [q], 0..1: explained share of the variance of the errors, ^(1 / reach)
+    torch::Tensor pull;   // [q], 0..1: what the last correction has of it, at a reach of 1
   };
   Answer At(const FieldPlaces& places) const;
 
@@ -69,6 +71,8 @@ class ChangeField {
   torch::Tensor inverse_;           // [n,n], inverse covariance of the painted places
   torch::Tensor wanted_;            // [n,2]
   torch::Tensor inverse_x_change_;  // [n,2]
+  torch::Tensor narrowing_;         // [n], 1 / reach; undefined if all reaches are 1
+  torch::Tensor is_last_;           // [n], 1 for the last correction, else 0
 };
 
 }  // namespace color3d

@@ -29,12 +29,13 @@ FieldPlaces Unknown(int64_t count) {
           torch::zeros({count})};
 }
 
-ChangeField OneStroke(const FieldPlaces& place, double a) {
+ChangeField OneStroke(const FieldPlaces& place, double a, double reach = 1.0) {
   const int64_t count = place.seen.size(0);
   return {place,
           torch::full({count, 2}, a),
           torch::ones({count}),
-          torch::zeros({count}, torch::kInt64)};
+          torch::zeros({count}, torch::kInt64),
+          torch::full({count}, reach)};
 }
 
 double ChangeAt(const ChangeField& field, const FieldPlaces& places, int row = 0) {
@@ -71,7 +72,7 @@ TEST(ChangeFieldTest, KeepsPlacesWithTargetColor) {
 }
 
 TEST(ChangeFieldTest, ChangesNothingWithoutCorrections) {
-  const ChangeField field({}, torch::zeros({0, 2}), {}, {});
+  const ChangeField field({}, torch::zeros({0, 2}), {}, {}, {});
   const ChangeField::Answer answer = field.At(Places({0.0, 1.0}));
   EXPECT_EQ(answer.change.abs().max().item<double>(), 0.0);
   EXPECT_EQ(answer.share.max().item<double>(), 0.0);
@@ -81,9 +82,47 @@ TEST(ChangeFieldTest, UsesLaterOfContradictingStrokes) {
   torch::Tensor changes = torch::zeros({2, 2});
   changes[0][0] = 30.0;
   changes[1][0] = -10.0;
-  const ChangeField field(
-      Places({0.0, 0.0}), changes, torch::ones({2}), torch::tensor({int64_t{0}, int64_t{1}}));
+  const ChangeField field(Places({0.0, 0.0}),
+                          changes,
+                          torch::ones({2}),
+                          torch::tensor({int64_t{0}, int64_t{1}}),
+                          torch::ones({2}));
   EXPECT_NEAR(ChangeAt(field, Places({0.0})), -9.0, 1e-4);
+}
+
+TEST(ChangeFieldTest, ReachIsAPowerOfTheShare) {
+  const FieldPlaces asked = Places({0.0, 0.1, 0.3});
+  const ChangeField::Answer plain = OneStroke(Places({0.0}), 20.0).At(asked);
+  for (const double reach : {0.25, 0.5, 2.0}) {
+    const ChangeField::Answer answer = OneStroke(Places({0.0}), 20.0, reach).At(asked);
+    for (int i = 0; i < 3; ++i) {
+      const double share = plain.share[i].item<double>();
+      EXPECT_NEAR(answer.share[i].item<double>(), std::pow(share, 1.0 / reach), 1e-4);
+      EXPECT_NEAR(answer.pull[i].item<double>(), share, 1e-5);
+      const double change = plain.change[i][0].item<double>();
+      const double wanted = std::min(change * std::pow(share, 1.0 / reach - 1.0), 20.0);
+      EXPECT_NEAR(answer.change[i][0].item<double>(), wanted, 1e-3);
+    }
+  }
+}
+
+TEST(ChangeFieldTest, ReachBelongsToItsOwnStroke) {
+  const auto with_reach = [](double first) {
+    return ChangeField(Places({0.0, 3.0}),
+                       torch::full({2, 2}, 20.0),
+                       torch::ones({2}),
+                       torch::tensor({int64_t{0}, int64_t{1}}),
+                       torch::tensor({first, 1.0}));
+  };
+  const FieldPlaces asked = Places({0.1, 3.1});
+  const torch::Tensor wide = with_reach(1.0).At(asked).share;
+  const torch::Tensor tight = with_reach(0.25).At(asked).share;
+  EXPECT_LT(tight[0].item<double>(), 0.5 * wide[0].item<double>());
+  EXPECT_NEAR(tight[1].item<double>(), wide[1].item<double>(), 0.05);
+  // The pull is that of the last one.
+  const torch::Tensor pull = with_reach(1.0).At(asked).pull;
+  EXPECT_LT(pull[0].item<double>(), 0.05);
+  EXPECT_NEAR(pull[1].item<double>(), wide[1].item<double>(), 0.05);
 }
 
 TEST(ChangeFieldTest, StaysFiniteWithoutPositions) {
@@ -100,7 +139,7 @@ TEST(ChangeFieldTest, ProposesDistinctPlacesByGain) {
   // Five places close together, a single one, and a certain one.
   FieldPlaces places = Places({0.0, 0.01, 0.02, 0.03, 0.04, 2.0, -2.0});
   const torch::Tensor deviation = torch::tensor({1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.01});
-  const ChangeField none({}, torch::zeros({0, 2}), {}, {});
+  const ChangeField none({}, torch::zeros({0, 2}), {}, {}, {});
   const auto proposals = none.Propose(places, deviation, 7);
   ASSERT_GE(proposals.size(), 2U);
   EXPECT_EQ(proposals[0].row, 2);

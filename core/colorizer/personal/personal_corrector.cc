@@ -96,7 +96,7 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
       max_side_px_(max_side_px),
       threads_(threads) {
   torch::NoGradGuard no_grad;
-  std::vector<torch::Tensor> features, colors, positions, seen, wanted, weights, numbers;
+  std::vector<torch::Tensor> features, colors, positions, seen, wanted, weights, numbers, reaches;
   Random random(kSeed);
   const auto count = static_cast<int64_t>(corrections.size());
   for (int64_t number = 0; number < count; ++number) {
@@ -130,9 +130,11 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
     wanted.push_back(observed.colors);
     weights.push_back(observed.weights);
     numbers.push_back(torch::full({rows.size(0)}, number, torch::kInt64));
+    reaches.push_back(torch::full({rows.size(0)}, correction.reach, torch::kFloat32));
   }
   if (corrections.empty()) {
-    field_.emplace(FieldPlaces{}, torch::zeros({0, 2}), torch::Tensor(), torch::Tensor());
+    field_.emplace(
+        FieldPlaces{}, torch::zeros({0, 2}), torch::Tensor(), torch::Tensor(), torch::Tensor());
     return;
   }
   field_.emplace(
@@ -140,7 +142,8 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
           torch::cat(features), torch::cat(colors), torch::cat(positions), torch::cat(seen)},
       torch::cat(wanted),
       torch::cat(weights),
-      torch::cat(numbers));
+      torch::cat(numbers),
+      torch::cat(reaches));
 }
 
 CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samples) const {
@@ -157,9 +160,10 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
         CellPositions(small.position, cells.Count()),
         CellSeenShares(small.seen, cells.Count())};
     const ChangeField::Answer answer = field_->At(places);
-    const Image coarse = ImageFromTensor(torch::cat({answer.change, answer.share.unsqueeze(1)}, 1)
-                                             .t()
-                                             .reshape({3, cells.rows, cells.columns}));
+    const Image coarse =
+        ImageFromTensor(torch::cat({answer.change, torch::stack({answer.share, answer.pull}, 1)}, 1)
+                            .t()
+                            .reshape({4, cells.rows, cells.columns}));
     const int width = picture.luminance.width, height = picture.luminance.height;
     Image fine = Crop(UpsampleGuided(coarse, ImageFromTensor(padded)),
                       0,
@@ -169,12 +173,17 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
     if (fine.width != width || fine.height != height) {
       fine = UpsampleGuided(fine, picture.luminance);
     }
-    CorrectedColor color{Image(width, height, 2), Image(width, height, 1), {}};
+    CorrectedColor color{
+        Image(width, height, 2), Image(width, height, 1), Image(width, height, 1), {}};
     std::copy_n(fine.Plane(0), color.change.data.size(), color.change.Plane(0));
-    std::transform(
-        fine.Plane(2), fine.Plane(2) + fine.PlaneSize(), color.share.Plane(0), [](float value) {
-          return std::clamp(value, 0.0f, 1.0f);
-        });
+    const auto copy_share = [&](int plane, Image* share) {
+      std::transform(fine.Plane(plane),
+                     fine.Plane(plane) + fine.PlaneSize(),
+                     share->Plane(0),
+                     [](float value) { return std::clamp(value, 0.0f, 1.0f); });
+    };
+    copy_share(2, &color.share);
+    copy_share(3, &color.pull);
     color.change = FromRelative(relative_chroma_, picture.luminance, std::move(color.change));
     color.sample = Sample(places, cells.columns, small.luminance, samples);
     return color;

@@ -13,6 +13,8 @@
 
 namespace color3d {
 
+inline constexpr double kMinReach = 0.1, kMaxReach = 2.0;
+
 // Pixels of given colour: a disc, a line, a polygon, or a label of a label picture.
 struct ColorHint {
   double x_px = 0.0;  // centre of a disc, px from the upper left corner of the photo
@@ -28,6 +30,9 @@ struct ColorHint {
   Fill fill = Fill::kColor;
   std::vector<std::array<double, 2>> points_px = {};  // (x, y) of a line or region
   int label = 0;                                      // 0..255
+  // Corrections of a scene only (STILL.md "Corrections"): how far the colour goes to similar
+  // places, kMinReach..kMaxReach, 1: as measured.
+  double reach = 1.0;
 };
 
 struct HintOptions {
@@ -66,8 +71,8 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
 //   {"region": [[10, 20], [80, 25], [40, 90]], "color": "#a0522d"}   a polygon (even-odd)
 //   {"label": 3, "color": "#a0522d"}                         all pixels of that label
 // in px of the key photo. Instead of "color", "keep": "neutral" removes the colour, and
-// "keep": "auto" keeps that of the automatic colourizer. Throws Error{kInvalidArgument} naming the
-// entry.
+// "keep": "auto" keeps that of the automatic colourizer. Each may have a "reach". Throws
+// Error{kInvalidArgument} naming the entry.
 std::vector<ColorHint> ParseHintsJson(const std::string& json);
 
 // Propagates the hints. Throws an error naming a hint that lies outside the picture or covers no

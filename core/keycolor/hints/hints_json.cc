@@ -102,7 +102,16 @@ void ParseFill(const Json& entry, const std::string& name, ColorHint& hint) {
   hint.b = lab.b;
 }
 
-// Fields of an entry by its shape, without "color" and "keep".
+double Reach(const Json& entry, const std::string& name) {
+  const double reach = Number(entry, "reach", name);
+  if (!(reach >= kMinReach && reach <= kMaxReach)) {
+    throw InvalidArgument(
+        "{} has the reach {}; it must be between {} and {}", name, reach, kMinReach, kMaxReach);
+  }
+  return reach;
+}
+
+// Fields of an entry by its shape, without "color", "keep" and "reach".
 std::vector<std::string> AllowedFields(const Json& entry) {
   if (entry.contains("line")) return {"line", "width"};
   if (entry.contains("region")) return {"region"};
@@ -113,7 +122,7 @@ std::vector<std::string> AllowedFields(const Json& entry) {
 ColorHint ParseHint(const Json& entry, const std::string& name) {
   if (!entry.is_object()) throw InvalidArgument("{} is not an object", name);
   std::vector<std::string> fields = AllowedFields(entry);
-  fields.insert(fields.end(), {"color", "keep"});
+  fields.insert(fields.end(), {"color", "keep", "reach"});
   for (const auto& [key, value] : entry.items()) {
     if (std::find(fields.begin(), fields.end(), key) != fields.end()) continue;
     std::string known;
@@ -126,6 +135,7 @@ ColorHint ParseHint(const Json& entry, const std::string& name) {
   ColorHint hint;
   ParseShape(entry, name, hint);
   ParseFill(entry, name, hint);
+  if (entry.contains("reach")) hint.reach = Reach(entry, name);
   return hint;
 }
 

@@ -22,6 +22,9 @@ TEST(HintsJsonTest, ReadsEntries) {
   EXPECT_NEAR(hints[0].b, sienna.b, 1e-9);
   EXPECT_EQ(hints[1].radius_px, 2.0);
   EXPECT_NEAR(hints[1].a, 0.0, 1e-3);
+  EXPECT_EQ(hints[1].reach, 1.0);
+  const auto far = ParseHintsJson(R"([{"line":[[1,2],[3,4]],"color":"#ffffff","reach":0.25}])");
+  EXPECT_EQ(far.at(0).reach, 0.25);
 }
 
 TEST(HintsJsonTest, NamesBadEntry) {
@@ -51,6 +54,8 @@ TEST(HintsJsonTest, NamesBadEntry) {
       R"([{"label":1.5,"color":"#000000"}])",
       R"([{"label":1,"x":1,"color":"#000000"}])",
       R"([{"label":1}])",
+      R"([{"x":1,"y":1,"reach":0.05,"color":"#000000"}])",
+      R"([{"x":1,"y":1,"reach":"far","color":"#000000"}])",
       R"([{"label":1,"keep":"red"}])",
       R"([{"label":1,"keep":"auto","color":"#000000"}])"};
   for (const std::string& json : bad_shapes) EXPECT_THROW(ParseHintsJson(json), Error) << json;

@@ -145,7 +145,7 @@ FusedColor ViewRecolorer::OfOtherView(int view, const Image& lab) const {
       context_, ViewArtifact(artifact::kCarried, scene_.views[view]), lab.width, lab.height);
   if (share.Empty()) share = Image(lab.width, lab.height, 1);
   share = SpreadShare(share, carried.confidence);
-  CorrectedColor by_place{Image(lab.width, lab.height, 2), Image(lab.width, lab.height, 1), {}};
+  CorrectedColor by_place{Image(lab.width, lab.height, 2), Image(lab.width, lab.height, 1), {}, {}};
   if (by_place_) by_place = by_place_->Predict(OwnPicture(view, lab), 0);
   const float share_of_all = by_color_->EditedShareOfAll();
   FusedColor color = UneditedColor(lab);

@@ -277,9 +277,9 @@ ReportSection ColorFacts::SourceSection() const {
   if (!section.rows.empty()) {
     const auto mean = Percentages(MeanShares(/*scored_only=*/false));
     section.legend = {
-        {"seen", "seen in a key view: " + mean[0] + " (plain photo)"},
-        {"inferred", "inferred, as it resembles something there: " + mean[1] + " (blue tint)"},
-        {"guessed", "guessed: " + mean[2] + " (orange hatching)"}};
+        {"seen", "seen in a key view: " + mean[0] + " (teal)"},
+        {"inferred", "inferred, as it resembles something there: " + mean[1] + " (amber)"},
+        {"guessed", "guessed: " + mean[2] + " (purple, hatched)"}};
   }
   return section;
 }

@@ -1,5 +1,6 @@
 #include "core/stage/report/source_overlay.h"
 
+#include <algorithm>
 #include <array>
 
 #include "core/carry/confidence.h"
@@ -8,9 +9,13 @@
 namespace color3d {
 namespace {
 
-constexpr std::array<float, 3> kBlue = {0.25f, 0.50f, 0.82f};
-constexpr std::array<float, 3> kOrange = {0.85f, 0.51f, 0.10f};
+// #6fb7b0, #e0b25f and #b873a0, the shades of the page of a scene (view/page/page.js) and of the
+// studio.
+constexpr std::array<float, 3> kSeenShade = {0.435f, 0.718f, 0.690f};
+constexpr std::array<float, 3> kInferredShade = {0.878f, 0.698f, 0.373f};
+constexpr std::array<float, 3> kGuessedShade = {0.722f, 0.451f, 0.627f};
 constexpr int kStripePx = 4;
+constexpr float kStripe = 0.4f;  // share of the brightness that stripes take away
 
 }  // namespace
 
@@ -21,13 +26,17 @@ Image ShadeBySource(const Image& photo, const Image& provenance) {
     for (int x = 0; x < photo.width; ++x) {
       const float gray =
           0.3f * photo.At(0, y, x) + 0.59f * photo.At(1, y, x) + 0.11f * photo.At(2, y, x);
-      const float base = 0.18f + 0.78f * gray;  // so that shades show on black
-      const float guessed = shares.At(kGuessedPlane, y, x),
+      const float guessed = shares.At(kGuessedPlane, y, x), seen = shares.At(kSeenPlane, y, x),
                   inferred = shares.At(kInferredPlane, y, x);
+      const float all = std::max(guessed + seen + inferred, 1e-3f);
       const bool stripe = (x + y) / kStripePx % 2 == 0;
-      const float orange = guessed * (stripe ? 0.85f : 0.15f), blue = 0.45f * inferred;
+      // So that shades show on black.
+      const float bright =
+          (0.15f + 0.95f * gray) * (stripe ? 1.0f - kStripe * guessed : 1.0f) / all;
       for (int c = 0; c < 3; ++c) {
-        shaded.At(c, y, x) = base + blue * (kBlue[c] - base) + orange * (kOrange[c] - base);
+        const float shade =
+            guessed * kGuessedShade[c] + seen * kSeenShade[c] + inferred * kInferredShade[c];
+        shaded.At(c, y, x) = std::min(bright * shade, 1.0f);
       }
     }
   }

@@ -5,8 +5,8 @@
 
 namespace color3d {
 
-// Seen pixels are grey, inferred ones tinted blue, guessed ones hatched orange; they also differ by
-// lightness and pattern, for colour-blind readers. `photo`: 3 channels, sRGB. `provenance`: 3
+// Seen pixels are teal, inferred ones amber, guessed ones purple and hatched, for colour-blind
+// readers. `photo`: 3 channels, sRGB. `provenance`: 3
 // channels, shares of guessed, seen and inferred. Returns 3 channels, sRGB, of the size of the
 // photo.
 Image ShadeBySource(const Image& photo, const Image& provenance);

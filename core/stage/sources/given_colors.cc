@@ -90,9 +90,11 @@ GivenColors FromHints(const PaintedColors& painted, const Image& srgb, StageCont
   HintPictures pictures;
   if (!labels.Empty()) pictures.labels = &labels;
   if (asks_automatic) pictures.automatic_ab = &automatic;
-  return FromMap(
+  GivenColors colors = FromMap(
       DrawHints(hints, pictures, srgb.width, srgb.height, context.progress(), context.cancel()),
       srgb);
+  colors.reach = std::ranges::max_element(hints, {}, &ColorHint::reach)->reach;
+  return colors;
 }
 
 GivenColors Read(const PaintedColors& painted,

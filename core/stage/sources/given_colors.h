@@ -10,8 +10,9 @@
 namespace color3d {
 
 struct GivenColors {
-  Image ab;     // 2 channels, Lab units, size of the photo as captured
-  Image given;  // 1 channel: 1 where the user gave a colour, else 0
+  Image ab;            // 2 channels, Lab units, size of the photo as captured
+  Image given;         // 1 channel: 1 where the user gave a colour, else 0
+  double reach = 1.0;  // the largest one of the points, lines and regions
 };
 
 // Returns the photo in its present colours, for a user to paint on: 3 channels, sRGB. `srgb`: the

@@ -8,51 +8,6 @@ const pictureOf = (photo) => photo.jpeg ? 'data:image/jpeg;base64,' + photo.jpeg
 const say = (text) => { $('note').textContent = text; };
 const press = (button, on) => button.setAttribute('aria-pressed', String(on));
 
-// Lightness that people see, as sRGB; shades for where a colour comes from, over the grey picture.
-const glsl = (moved) => `
-uniform float uShades;
-uniform vec3 uGuessed;
-uniform vec3 uInferred;
-uniform vec3 uSeen;
-${moved.declare}
-void modifySplatCenter(inout vec3 center) {${moved.center}}
-void modifySplatRotationScale(vec3 before, vec3 after, inout vec4 rotation, inout vec3 scale) {${moved.rotation}}
-void modifySplatColor(vec3 center, inout vec4 color) {${moved.color}
-  if (uShades < 0.5) return;
-  vec3 linear = pow(clamp(color.rgb, 0.0, 1.0), vec3(2.2));
-  float gray = pow(dot(linear, vec3(0.2126, 0.7152, 0.0722)), 1.0 / 2.2);
-  if (uShades < 1.5) {
-    color.rgb = vec3(gray);
-    return;
-  }
-  float sure = loadColorSureness().r;
-  vec3 shade = sure < 0.5 ? mix(uGuessed, uInferred, 2.0 * sure)
-                          : mix(uInferred, uSeen, 2.0 * sure - 1.0);
-  color.rgb = shade * (0.15 + 0.95 * gray);
-}
-`;
-const wgsl = (moved) => `
-uniform uShades: f32;
-uniform uGuessed: vec3f;
-uniform uInferred: vec3f;
-uniform uSeen: vec3f;
-${moved.declare}
-fn modifySplatCenter(center: ptr<function, vec3f>) {${moved.center}}
-fn modifySplatRotationScale(before: vec3f, after: vec3f, rotation: ptr<function, vec4f>, scale: ptr<function, vec3f>) {${moved.rotation}}
-fn modifySplatColor(center: vec3f, color: ptr<function, vec4f>) {${moved.color}
-  if (uniform.uShades < 0.5) { return; }
-  let linear = pow(clamp((*color).rgb, vec3f(0.0), vec3f(1.0)), vec3f(2.2));
-  let gray = pow(dot(linear, vec3f(0.2126, 0.7152, 0.0722)), 1.0 / 2.2);
-  if (uniform.uShades < 1.5) {
-    *color = vec4f(vec3f(gray), (*color).a);
-    return;
-  }
-  let sure = f32(loadColorSureness().r);
-  var shade = mix(uniform.uGuessed, uniform.uInferred, 2.0 * sure);
-  if (sure >= 0.5) { shade = mix(uniform.uInferred, uniform.uSeen, 2.0 * sure - 1.0); }
-  *color = vec4f(shade * (0.15 + 0.95 * gray), (*color).a);
-}
-`;
 const shades = {
   uSeen: ['#6fb7b0', 'seen in a key view'],
   uInferred: ['#e0b25f', 'inferred from it'],
@@ -131,6 +86,7 @@ const cameraOf = (photo) =>
 // ---- the page ---------------------------------------------------------------------------------
 let viewer = null, splats = null;
 let player = null;  // of a scene that moves
+let frame = null;  // connection with the page that shows this one, if one does
 let held = null;  // {photo, from, since}: the camera stands where this photo was taken
 
 const showShades = (mode) => {
@@ -172,6 +128,7 @@ const goTo = (index, { glide = true, keepTime = false } = {}) => {
   viewer.state.animationPaused = true;
   $('photo').src = pictureOf(photo);
   for (const button of $('photos').children) press(button, Number(button.dataset.index) === index);
+  frame?.onHeld(photo);
   say(photo.name + (index === facts.key ? ' (key view)' : photo.held_out ? ' (held out)' : ''));
   layOut();
   viewer.app.renderNextFrame = true;
@@ -185,6 +142,7 @@ const letGo = () => {
     press($('film'), false);
   }
   held = null;
+  frame?.onHeld(null);
   press($('compare'), false);
   for (const button of $('photos').children) press(button, false);
   say('');
@@ -295,6 +253,48 @@ const wireButtons = () => {
   new ResizeObserver(layOut).observe(stage);
 };
 
+// What framed.js needs of this page.
+const hooksOfFrame = () => {
+  const entity = viewer.app.root.findByName('camera');
+  const Vec3 = entity.getPosition().constructor;
+  const numbers = ({ x, y, z }) => [x, y, z];
+  let centers = null;
+  return {
+    photos, stage, canvas: document.querySelector('#viewer canvas'), showShades, goTo,
+    showChanges: (changes) => {
+      ['colorChangeA', 'colorChangeB'].forEach((name, channel) => {
+        if (!changes) return;
+        const texture = splats.resource.getTexture(name), texels = texture.lock();
+        for (let i = 0; 2 * i < changes.length; ++i) texels[i] = changes[2 * i + channel];
+        texture.unlock();
+      });
+      splats.setParameter('uChanged', changes ? 1 : 0);
+      viewer.app.renderNextFrame = true;
+    },
+    showTone: (tone) => {
+      splats.setParameter('uTone', tone);
+      viewer.app.renderNextFrame = true;
+    },
+    held: () => held && !held.film && performance.now() - held.since > 700
+      ? { photo: held.photo, frame: frameOf(held.photo) } : null,
+    eye: () => numbers(entity.getPosition()),
+    ray: (x, y) => {
+      const at = entity.camera.screenToWorld(x, y, 1);
+      return numbers(at.sub(entity.getPosition()).normalize());
+    },
+    centers: () => {
+      if (centers) return centers;
+      const local = splats.resource.centers, world = splats.entity.getWorldTransform(), point = new Vec3();
+      centers = new Float32Array(local.length);
+      for (let i = 0; i < local.length; i += 3) {
+        world.transformPoint(point.set(local[i], local[i + 1], local[i + 2]), point);
+        centers.set(numbers(point), i);
+      }
+      return centers;
+    },
+  };
+};
+
 // The scene stands upright here, and each Gaussian gets its sureness, before anything is drawn.
 const prepare = (entity, confidence) => {
   const { rotation, scale, position } = facts.frame;
@@ -304,7 +304,9 @@ const prepare = (entity, confidence) => {
   entity.setLocalPosition(...position);
   splats = entity.gsplat;
   const resource = splats.resource;
-  resource.format.addExtraStreams([{ name: 'colorSureness', format: 52 /* one byte */ },
+  const kByte = 52;
+  resource.format.addExtraStreams([{ name: 'colorSureness', format: kByte },
+                                   { name: 'colorChangeA', format: kByte }, { name: 'colorChangeB', format: kByte },
                                    ...(player ? color3dMotion.streams : [])]);
   resource.streams.syncWithFormat(resource.format);
   const texture = resource.getTexture('colorSureness');
@@ -313,11 +315,13 @@ const prepare = (entity, confidence) => {
   if (confidence) texels.set(confidence);
   texture.unlock();
   splats.setParameter('uShades', 0);
+  splats.setParameter('uTone', [1, 0, 1, 0]);
+  splats.setParameter('uChanged', 0);
   for (const [name, [hex]] of Object.entries(shades)) splats.setParameter(name, rgb(hex));
   if (player) player.attach(splats, !viewer.app.graphicsDevice.isWebGPU);
   const still = { declare: '', center: '', rotation: '', color: '' };
-  splats.setWorkBufferModifier({ glsl: glsl(player ? color3dMotion.glsl : still),
-                                 wgsl: wgsl(player ? color3dMotion.wgsl : still) });
+  splats.setWorkBufferModifier({ glsl: color3dShading.glsl(player ? color3dMotion.glsl : still),
+                                 wgsl: color3dShading.wgsl(player ? color3dMotion.wgsl : still) });
 };
 
 const start = async () => {
@@ -360,6 +364,7 @@ const start = async () => {
     wireButtons();
     if (player) player.wire();
     goTo(facts.key, { glide: false });
+    if (window.parent !== window) frame = color3dFramed.connect(hooksOfFrame());
     say('Drag to turn, wheel or pinch to come nearer, right drag or two fingers to move');
     document.body.dataset.state = 'ready';
   });

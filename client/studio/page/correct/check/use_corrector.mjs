@@ -1,0 +1,246 @@
+// Corrects a finished scene in headless Chromium by mouse and keyboard, and tells what was seen, as JSON on stdout.
+//   node use_corrector.mjs CHROMIUM ADDRESS [SCREENSHOTS]
+// ADDRESS: of the page of the run, as `color3d studio OUT` printed it. errors: of the console; requests: beyond the
+// studio; wide: states that are wider than a screen of 360 px; faint: texts with a contrast below 4.5; seconds: from a
+// stroke to its heat map, from `Apply` to the colours in the photos and in the scene; frames: ms between frames while
+// the saturation moves. With a third argument every state leaves PNGs there: light, dark and narrow.
+import { mkdirSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+
+import { openBrowser, pause } from '../../../../../tests/support/browser.mjs';
+import { faintTexts } from '../../../faint_texts.mjs';
+
+const [chromium, address, screenshots] = process.argv.slice(2);
+if (screenshots) mkdirSync(screenshots, { recursive: true });
+const flags = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--window-size=1440,1000'];
+const { send, open, evaluate, close, errors, requests } =
+    openBrowser(chromium, flags, (type) => ['error', 'assert'].includes(type));
+const origin = new URL(address).origin;
+const seen = { wide: [], faint: [], seconds: {}, frames: {}, colors: {} };
+
+const waitFor = async (expression, limit = 120000, read = evaluate) => {
+  const end = Date.now() + limit;
+  while (Date.now() < end) {
+    const value = await read(expression);
+    if (value) return value;
+    const problem = await read('document.querySelector(".problem p")?.textContent');
+    if (problem) throw new Error('the page says: ' + problem);
+    await pause(25);
+  }
+  throw new Error('waited in vain for ' + expression + ' at ' + await read('location.href + JSON.stringify(document.querySelector("#corrector")?.dataset)'));
+};
+const boxOf = (selector) => evaluate(`(() => {
+  const element = document.querySelector(${JSON.stringify(selector)});
+  element.scrollIntoView({ block: 'center' });
+  const { x, y, width, height } = element.getBoundingClientRect();
+  return { x, y, width, height };
+})()`);
+const mouse = (type, x, y) => send('Input.dispatchMouseEvent', { type, x, y, button: type === 'mouseMoved' ? 'none' : 'left', buttons: type === 'mouseReleased' ? 0 : 1, clickCount: 1 });
+const clickAt = async (x, y) => {
+  await mouse('mousePressed', x, y);
+  await mouse('mouseReleased', x, y);
+};
+const click = async (selector) => {
+  await waitFor(`!!document.querySelector(${JSON.stringify(selector)})`);
+  const { x, y, width, height } = await boxOf(selector);
+  await clickAt(x + width / 2, y + height / 2);
+};
+const press = async (key, code) => {
+  for (const type of ['keyDown', 'keyUp']) {
+    await send('Input.dispatchKeyEvent', { type, key, code: key, windowsVirtualKeyCode: code, ...(key === 'Enter' && type === 'keyDown' ? { text: '\r' } : {}) });
+  }
+};
+const data = (name) => `document.querySelector('#corrector').dataset.${name} ?? ''`;
+const main = '.co-panes figure:nth-of-type(2) canvas:last-child';
+
+const keep = async (name) => {
+  if (!screenshots) return;
+  const { data: png } = await send('Page.captureScreenshot', { format: 'png' });
+  writeFileSync(join(screenshots, name + '.png'), Buffer.from(png, 'base64'));
+};
+const look = async (name) => {
+  await pause(400);
+  await evaluate('scrollTo(0, 0)');
+  for (const scheme of ['light', 'dark']) {
+    await send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: scheme }] });
+    await pause(200);
+    for (const text of await evaluate(faintTexts)) seen.faint.push(`${name} ${scheme}: ${text}`);
+    await keep(`${name}_${scheme}`);
+  }
+  await send('Emulation.setEmulatedMedia', { features: [] });
+  await send('Emulation.setDeviceMetricsOverride', { width: 360, height: 1600, deviceScaleFactor: 1, mobile: true });
+  await pause(400);
+  if (await evaluate('document.documentElement.scrollWidth') > 360) seen.wide.push(name);
+  await keep(`${name}_narrow`);
+  await send('Emulation.clearDeviceMetricsOverride');
+  await pause(200);
+};
+
+// Mean colour of a part of the coloured photo, in shares of it.
+const colorAt = (x, y) => evaluate(`(() => {
+  const canvas = document.querySelector('.co-panes figure:nth-of-type(2) canvas');
+  const pixels = canvas.getContext('2d').getImageData(Math.round(${x} * canvas.width) - 2, Math.round(${y} * canvas.height) - 2, 5, 5).data;
+  const sum = [0, 0, 0];
+  for (let i = 0; i < pixels.length; ++i) if (i % 4 < 3) sum[i % 4] += pixels[i] / 25;
+  return sum.map(Math.round);
+})()`);
+const setColor = (hex) => evaluate(`(() => {
+  const input = document.querySelector('#co-color');
+  input.value = ${JSON.stringify(hex)};
+  input.dispatchEvent(new Event('input'));
+})()`);
+const draw = async (from, to) => {
+  const { x, y, width, height } = await boxOf(main);
+  const at = ([u, v]) => [x + u * width, y + v * height];
+  await mouse('mousePressed', ...at(from));
+  for (let i = 1; i <= 8; ++i) await mouse('mouseMoved', ...at([from[0] + (to[0] - from[0]) * i / 8, from[1] + (to[1] - from[1]) * i / 8]));
+  await mouse('mouseReleased', ...at(to));
+};
+const seconds = (since) => (Date.now() - since) / 1000;
+const tried = async () => {
+  const begun = Date.now();
+  await waitFor(data('trial'));
+  return seconds(begun);
+};
+// Applies the stroke. Returns seconds to the colours in all photos, and to those in the scene.
+const apply = async () => {
+  const scene = await evaluate(data('scene'));
+  const run = await evaluate(data('run'));
+  await click('#co-apply');
+  const begun = Date.now();
+  await waitFor(data('working'));
+  const photos = seconds(begun);
+  await waitFor(`${data('run')} !== ${JSON.stringify(run)}`);
+  const solved = seconds(begun);
+  await waitFor(`${data('scene')} !== ${JSON.stringify(scene)}`);
+  return { photos, solved, scene: seconds(begun) };
+};
+// Moves a slider by the mouse. Returns the times between frames, ms.
+const drag = async (selector, from, to) => {
+  const { x, y, width, height } = await boxOf(selector);
+  await evaluate(`(() => {
+    window.color3dFrames = [];
+    const tick = (now) => { window.color3dFrames.push(now); window.color3dTick = requestAnimationFrame(tick); };
+    requestAnimationFrame(tick);
+  })()`);
+  await mouse('mousePressed', x + from * width, y + height / 2);
+  for (let i = 1; i <= 30; ++i) await mouse('mouseMoved', x + (from + (to - from) * i / 30) * width, y + height / 2);
+  const frames = await evaluate('cancelAnimationFrame(window.color3dTick), window.color3dFrames.slice(1).map((t, i) => t - window.color3dFrames[i])');
+  await mouse('mouseReleased', x + to * width, y + height / 2);
+  frames.sort((a, b) => a - b);
+  return { median: frames[frames.length >> 1], worst: frames.at(-1), count: frames.length };
+};
+
+const use = async () => {
+  await open();
+  await send('Page.navigate', { url: address });
+  await waitFor('!!document.querySelector("#corrector")');
+  await waitFor(data('scene'), 180000);
+  await waitFor(data('shown'));
+  await look('start');
+  await click('[data-name=source]');
+  await pause(800);
+  await look('where_from');
+  await click('[data-name=color]');
+
+  // A stroke by mouse.
+  await setColor('#c81e1e');
+  seen.colors.before = await colorAt(0.5, 0.7);
+  await draw([0.45, 0.7], [0.55, 0.7]);
+  seen.seconds.tried = await tried();
+  await pause(800);
+  await look('touches');
+  seen.touches = await evaluate('document.querySelector(".co-draft p").textContent');
+  // Its reach by keyboard.
+  const first = await evaluate(data('trial'));
+  await evaluate('document.querySelector("#co-reach").focus()');
+  for (let i = 0; i < 12; ++i) await press('ArrowLeft', 37);
+  await waitFor(`${data('trial')} && ${data('trial')} !== ${JSON.stringify(first)}`);
+  await pause(600);
+  seen.touches_less = await evaluate('document.querySelector(".co-draft p").textContent');
+  seen.seconds.apply = await apply();
+  await waitFor(`${data('corrections')} === '1'`);
+  await pause(1500);
+  seen.colors.after = await colorAt(0.5, 0.7);
+  await look('applied');
+
+  // Another page on the same scene.
+  const { targetId } = await send('Target.createTarget', { url: await evaluate('location.href') }, null);
+  const { sessionId } = await send('Target.attachToTarget', { targetId, flatten: true }, null);
+  const other = async (expression) => {
+    const answer = await send('Runtime.evaluate', { expression, awaitPromise: true, returnByValue: true }, sessionId);
+    if (answer.exceptionDetails) throw new Error(answer.exceptionDetails.exception.description);
+    return answer.result.value;
+  };
+  const theirs = (name) => `document.querySelector('#corrector')?.dataset.${name} ?? ''`;
+  await waitFor(`${theirs('corrections')} === '1'`, 60000, other);
+
+  // A second stroke on another photo, by keyboard.
+  const { targetInfo } = await send('Target.getTargetInfo', {});
+  await send('Target.activateTarget', { targetId: targetInfo.targetId }, null);
+  await click('.co-strip li:nth-child(2) button');
+  await waitFor(`document.querySelector('.co-strip li:nth-child(2) button').getAttribute('aria-pressed') === 'true'`);
+  await pause(500);
+  await setColor('#2b5fc4');
+  await evaluate(`document.querySelector(${JSON.stringify(main)}).focus()`);
+  for (let i = 0; i < 3; ++i) await press('ArrowUp', 38);
+  await press('Enter', 13);
+  seen.seconds.tried_again = await tried();
+  seen.seconds.apply_again = await apply();
+  await waitFor(`${data('corrections')} === '2'`);
+  await waitFor(`${theirs('corrections')} === '2'`, 30000, other);
+  seen.other_page_followed = true;
+
+  // The first one is looked at without, and removed.
+  await click('.co-history li:first-child button');
+  await waitFor(`document.querySelector('.co-history li:first-child button').getAttribute('aria-pressed') === 'true'`);
+  await pause(2500);
+  await look('without');
+  await click('.co-history li:first-child .co-remove');
+  await waitFor(`${data('corrections')} === '1'`);
+  seen.left_over = await evaluate('document.querySelector(".co-history .co-what span").textContent');
+  await waitFor(`${theirs('corrections')} === '1'`, 30000, other);
+  await send('Target.closeTarget', { targetId }, null);
+  await waitFor(`!(${data('working')})`);
+
+  // Saturation by mouse; the scene follows when it is let go of.
+  const run = await evaluate(data('run'));
+  seen.colors.tone_before = await colorAt(0.3, 0.3);
+  seen.frames = await drag('#co-saturation', 0.5, 0.95);
+  seen.colors.tone_after = await colorAt(0.3, 0.3);
+  const begun = Date.now();
+  await waitFor(`${data('run')} !== ${JSON.stringify(run)}`);
+  seen.seconds.tone = seconds(begun);
+  await waitFor(`!(${data('working')})`);
+  // White balance.
+  await click('#co-gray');
+  const { x, y, width, height } = await boxOf(main);
+  await clickAt(x + 0.3 * width, y + 0.3 * height);
+  await pause(300);
+  seen.colors.gray = await colorAt(0.3, 0.3);
+  await waitFor(data('working'));
+  await waitFor(`!(${data('working')})`);
+  await look('gray');
+
+  // A click in the scene.
+  await waitFor(`${data('scene')}.length > 0`);
+  await click('[data-name=color]');
+  const scene = await boxOf('.co-scene');
+  await pause(1500);
+  await clickAt(scene.x + 0.5 * scene.width, scene.y + 0.4 * scene.height);
+  await tried();
+  seen.scene_click = true;
+  await click('#co-discard');
+  return { ...seen, errors, requests: requests.filter((url) => !url.startsWith(origin + '/')) };
+};
+
+let failed = 0;
+try {
+  console.log(JSON.stringify(await use(), null, 1));
+} catch (error) {
+  console.error(error.stack, JSON.stringify({ seen, errors, requests: requests.slice(-5) }));
+  await keep('failed').catch(() => undefined);
+  failed = 1;
+}
+await close();
+process.exit(failed);
