@@ -8,6 +8,7 @@
 #include "core/base/files.h"
 #include "core/base/parallel.h"
 #include "core/base/text/utf8.h"
+#include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/decode_budget.h"
@@ -22,14 +23,17 @@ constexpr int kPhotosOfColor = 12;  // looked at for colour
 constexpr int kJpegQuality = 90;
 constexpr int64_t kBytesPerPhotoPixel = 40;
 
-// As views are called: relative to images/.
+// As views are called: relative to images/ or frames/.
 std::string ViewName(const LocalFile& photo) {
-  return photo.path.starts_with("images/") ? photo.path.substr(7) : photo.path;
+  for (const std::string_view folder : {std::string_view("images/"), kFramesFolder}) {
+    if (photo.path.starts_with(folder)) return photo.path.substr(folder.size());
+  }
+  return photo.path;
 }
 
 const char* KindOf(const PhotoFolder& folder) {
   if (folder.splat) return "splat";
-  if (folder.film) return "film";
+  if (folder.Layout() == CaptureLayout::kFilm) return "film";
   return folder.camera_films.empty() ? "photos" : "films";
 }
 

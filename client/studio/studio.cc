@@ -12,6 +12,8 @@
 #include "client/lib/names.h"
 #include "client/lib/out_folder.h"
 #include "client/lib/photos/photo_folder.h"
+#include "client/studio/film_frames.h"
+#include "client/studio/film_routes.h"
 #include "client/studio/found_photos.h"
 #include "client/studio/page_files.h"
 #include "client/studio/photo_sets.h"
@@ -72,6 +74,7 @@ class Studio::Parts {
   std::optional<StudioGuard> guard_;
   PhotoSets sets_;
   StudioCalls calls_;
+  FilmFrames films_;
   const ScratchFolder downloads_;
   std::atomic<int> streams_{0};
 
@@ -92,7 +95,12 @@ class Studio::Parts {
   void StreamEvents(const Request& request, Response& response);
   void SendArtifact(const Request& request, Response& response);
 
-  PhotoFolder FolderOf(const std::string& id) const { return CollectPhotos(sets_.Get(id).folder); }
+  PhotoFolder FolderOf(const std::string& id) const;
+  // A photo or a frame of the set's film.
+  LocalFile PhotoOf(const PhotoFolder& folder, const std::string& view);
+  // Its file and media type.
+  std::pair<fs::path, std::string> FetchArtifact(const std::string& job,
+                                                 const std::string& name) const;
   // "scenes/..." of the set, uploaded if it is not there yet.
   std::string SceneOf(const std::string& id);
 };
@@ -103,7 +111,8 @@ Studio::Parts::Parts(const StudioOptions& options, const CancellationToken& canc
       http_(options.http),
       port_(http_.Bind(options.port)),
       sets_(options.folder),
-      calls_(options.server, cancel) {
+      calls_(options.server, cancel),
+      films_(cancel) {
   if (port_ < 0) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot listen on port {} of this machine; name another with --port",
@@ -153,6 +162,29 @@ void Studio::Parts::AddRoutes() {
   AddPageRoutes();
   AddSetRoutes();
   AddJobRoutes();
+  AddFilmRoutes({sets_,
+                 calls_,
+                 films_,
+                 [this](const std::string& set) { return FolderOf(set); },
+                 [this](const std::string& set) { return SceneOf(set); },
+                 [this](const std::string& job, const std::string& name) {
+                   return FetchArtifact(job, name).first;
+                 }},
+                {[this](const std::string& pattern, Handler handler) { Get(pattern, handler); },
+                 [this](const std::string& pattern, BodyHandler handler) {
+                   Post(pattern, handler);
+                 }});
+}
+
+PhotoFolder Studio::Parts::FolderOf(const std::string& id) const {
+  const PhotoSet set = sets_.Get(id);
+  PhotoFolder folder = CollectPhotos(set.folder, set.as_frames);
+  if (set.as_frames) UsePhotosAsFrames(&folder);
+  return folder;
+}
+
+LocalFile Studio::Parts::PhotoOf(const PhotoFolder& folder, const std::string& view) {
+  return folder.film ? films_.File(folder, view) : PhotoOfView(folder, view);
 }
 
 void Studio::Parts::AddPageRoutes() {
@@ -176,12 +208,12 @@ void Studio::Parts::AddSetRoutes() {
   Get(Pattern("sets", ""), [this](const Request& request, Response& response) {
     const PhotoSet set = sets_.Get(request.matches[1]);
     Json json = SetJson(set);
-    json["found"] = DescribePhotos(CollectPhotos(set.folder), cancel_);
+    json["found"] = DescribePhotos(FolderOf(set.id), cancel_);
     AnswerJson(json, response);
   });
   Get(Pattern("sets", "/photo"), [this](const Request& request, Response& response) {
     const PhotoFolder folder = FolderOf(request.matches[1]);
-    const LocalFile& photo = PhotoOfView(folder, request.get_param_value("name"));
+    const LocalFile photo = PhotoOf(folder, request.get_param_value("name"));
     const bool gray = request.get_param_value("gray") == "1";
     response.set_content(PhotoJpeg(photo, SideOf(request), gray), "image/jpeg");
   });
@@ -204,7 +236,8 @@ void Studio::Parts::AddSetRoutes() {
          const int count = ReadJsonBody(request, body).value("count", 1);
          const std::string id = request.matches[1];
          const PhotoFolder folder = FolderOf(id);
-         const int most = std::max<int>(1, static_cast<int>(folder.photos.size()));
+         const size_t views = folder.film ? 5 : folder.photos.size();  // one for each shot
+         const int most = std::max<int>(1, static_cast<int>(views));
          const v1::Job job =
              calls_.SelectKeyView(SceneOf(id), std::clamp(count, 1, std::min(most, 5)));
          AnswerJson(JobFacts(job), response);
@@ -218,7 +251,7 @@ void Studio::Parts::AddSetRoutes() {
          if (strokes == json.end()) throw InvalidArgument("strokes are missing");
          response.set_content(
              calls_.PreviewOfStrokes(
-                 PhotoOfView(folder, TextOf(json, "photo")), strokes->dump(), side),
+                 PhotoOf(folder, TextOf(json, "photo")), strokes->dump(), side),
              "image/png");
        });
   Post(Pattern("sets", "/colorize"),
@@ -253,7 +286,7 @@ void Studio::Parts::AddJobRoutes() {
       [this](const Request& request, Response& response) { SendArtifact(request, response); });
   Get(Pattern("jobs", "/preview"), [this](const Request& request, Response& response) {
     const PhotoFolder folder = FolderOf(request.get_param_value("set"));
-    const LocalFile& photo = PhotoOfView(folder, request.get_param_value("name"));
+    const LocalFile photo = PhotoOf(folder, request.get_param_value("name"));
     response.set_content(calls_.PreviewOfRun(request.matches[1], photo, SideOf(request)),
                          "image/png");
   });
@@ -345,11 +378,16 @@ void Studio::Parts::StreamEvents(const Request& request, Response& response) {
       });
 }
 
-void Studio::Parts::SendArtifact(const Request& request, Response& response) {
-  const std::string job = request.matches[1], name = request.get_param_value("name");
+std::pair<fs::path, std::string> Studio::Parts::FetchArtifact(const std::string& job,
+                                                              const std::string& name) const {
   if (!IsSafeRelativePath(name)) throw InvalidArgument("the name of the file is not possible");
   const fs::path file = SafePathBelow(downloads_.path() / job, name);
-  const std::string type = calls_.Fetch(job, name, file);
+  return {file, calls_.Fetch(job, name, file)};
+}
+
+void Studio::Parts::SendArtifact(const Request& request, Response& response) {
+  const std::string job = request.matches[1], name = request.get_param_value("name");
+  const auto [file, type] = FetchArtifact(job, name);
   if (request.has_param("download")) {
     std::string plain = fs::path(name).filename().string();
     std::erase_if(plain, [](char c) { return c == '"' || c == '\\' || c < ' ' || c > '~'; });
@@ -357,7 +395,7 @@ void Studio::Parts::SendArtifact(const Request& request, Response& response) {
   } else if (type == "text/html") {
     return AnswerSandboxed(ReadFile(file), response);
   }
-  response.set_content(ReadFile(file), type);
+  AnswerFile(file, type, response);
 }
 
 void Studio::Parts::Serve() {

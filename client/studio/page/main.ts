@@ -1,5 +1,6 @@
 // The studio's page: which part is shown follows the address (#set/ID, #key/ID, #job/ID).
 import { h, problem, replace } from './dom';
+import { showFilm } from './film/film';
 import { showHome } from './home';
 import { showKey } from './key';
 import { showPhotos } from './photos';
@@ -13,6 +14,7 @@ const pages: Record<string, { show: Show; step: number }> = {
   set: { show: showPhotos, step: 1 },
   key: { show: showKey, step: 2 },
   job: { show: showRun, step: 3 },
+  film: { show: showFilm, step: 0 },
 };
 const stepNames = ['Photos', 'Colours', 'Scene'];
 

@@ -143,6 +143,12 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     replace(result, ...results(run));
     main.dataset.state = 'done';
   };
+  // Films have a page of their own.
+  void getState().then(async ({ sets, jobs }) => {
+    const job = jobs.find((one) => one.id === id);
+    const own = job && sets.find((one) => one.scene === job.scene);
+    if (own && (await describeSet(own.id)).found.kind === 'film' && !left) location.replace(`#film/${own.id}/${id}`);
+  }).catch(() => undefined);
   stop = follow(id, {
     run: show,
     problem: (text) => replace(trouble, problem(text, button('Try again', () => { stop(); showRun(main, id); }))),

@@ -1,0 +1,45 @@
+// The part of the studio's HTTP calls that is about films (README.md "Calls").
+#pragma once
+
+#include <httplib.h>
+
+#include <functional>
+#include <string>
+
+#include "client/studio/film_calls.h"
+#include "client/studio/film_frames.h"
+#include "client/studio/photo_sets.h"
+#include "client/studio/studio_calls.h"
+
+namespace color3d::client {
+
+// How the studio adds calls: errors of the handlers become answers.
+struct RouteTable {
+  using Handler = std::function<void(const httplib::Request&, httplib::Response&)>;
+  using BodyHandler = std::function<void(
+      const httplib::Request&, httplib::Response&, const httplib::ContentReader&)>;
+  std::function<void(const std::string& pattern, Handler)> get;
+  std::function<void(const std::string& pattern, BodyHandler)> post;
+};
+
+// What the calls work with; all must outlive the routes.
+struct FilmRouteParts {
+  PhotoSets& sets;
+  const StudioCalls& calls;
+  FilmFrames& frames;
+  // Files of a set, as frames if it says so.
+  std::function<PhotoFolder(const std::string& set)> folder_of;
+  // "scenes/..." of a set, uploaded if it is not there yet.
+  std::function<std::string(const std::string& set)> scene_of;
+  // Fetches an artifact of a job. Returns its file.
+  std::function<std::filesystem::path(const std::string& job, const std::string& name)> fetch;
+};
+
+void AddFilmRoutes(const FilmRouteParts& parts, const RouteTable& table);
+
+// Answers with a file or the part of it that the request asks for, read as it is sent.
+void AnswerFile(const std::filesystem::path& file,
+                const std::string& media_type,
+                httplib::Response& response);
+
+}  // namespace color3d::client
