@@ -37,13 +37,17 @@ const firstTimes = (found: Found, facts: FilmFacts): FilmTimes => {
 };
 
 const factsOf = (facts: FilmFacts, shots: number | null): string => [
-  `${facts.frames} frames, ${clockOf(facts.seconds, false)} min`,
+  `${facts.frames} frames, ${facts.seconds < 60 ? `${facts.seconds.toFixed(1)} s` : clockOf(Math.round(facts.seconds), false)}`,
   `${Number(facts.frames_per_second.toFixed(2))} a second`,
   `${facts.width} × ${facts.height}`,
   facts.in_color === null ? '' : facts.in_color ? 'in colour (its own colours are not used)' : 'monochrome',
   facts.has_sound ? 'with sound' : 'silent',
   shots === null ? '' : shots === 1 ? 'one shot' : `${shots} shots`,
 ].filter(Boolean).join(' · ');
+
+// What a stage does, said of a film.
+const doing = (kind: string): string => kind === 'import_scene' ? 'Look for shots'
+  : stageName(kind).replace('photos', 'frames').replace('photo', 'frame').replace('scene', 'film');
 
 export const showFilm = (main: HTMLElement, set: string): (() => void) => {
   adoptFilmStyle();
@@ -79,11 +83,11 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
   const undo = button('Undo', () => plan?.undo(), { id: 'film-undo', 'aria-keyshortcuts': 'Control+Z' });
   const redo = button('Redo', () => plan?.redo(), { id: 'film-redo' });
   const changes = h('p', { class: 'row', hidden: true }, undo, redo);
-  const wishes = h('div', { class: 'panel', id: 'film-wishes' }, status, share.element, trouble, changes, options, actions, h('p', {}, start));
+  const wishes = h('div', { class: 'panel', id: 'film-wishes' }, status, share.element, trouble, changes, options, actions, h('p', { hidden: true }, start));
 
   const updateActions = (): void => {
     const isOver = !run || isFinished(run.state);
-    start.hidden = !plan || !isOver || plan.keys.length === 0 || (job !== '' && !plan.isChanged());
+    start.parentElement!.hidden = !plan || !isOver || plan.keys.length === 0 || (job !== '' && !plan.isChanged());
     start.textContent = job ? 'Colour again with these changes' : 'Colour the film';
     changes.hidden = !plan || !(plan.canUndo || plan.canRedo);
     undo.disabled = !plan?.canUndo;
@@ -187,7 +191,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
       run: (next) => {
         last = next;
         const now = next.stages.find((stage) => stage.state === 'RUNNING');
-        status.textContent = now ? `${now.kind === 'import_scene' ? 'Looking for shots' : stageName(now.kind)} …` : 'Waiting …';
+        status.textContent = now ? `${doing(now.kind)} …` : 'Waiting …';
         share.set(now && now.share > 0 ? now.share : null);
       },
       problem: (text) => failed(new Error(text)),
@@ -246,7 +250,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
     const waits = next.queue_position > 0 ? `Place ${next.queue_position} in the queue. ` : next.waits_for ? `Waits for ${next.waits_for}. ` : '';
     const time = next.seconds_left === null || isOver ? '' : ` About ${seconds(next.seconds_left)} left.`;
     status.textContent = isOver ? (next.state === 'SUCCEEDED' ? 'The film is coloured.' : `${stateName(next.state)}.`)
-      : `${waits}${working ? stageName(working.kind) : 'Getting ready'} …${time}`;
+      : `${waits}${working ? doing(working.kind) : 'Getting ready'} …${time}`;
     document.title = `${title.textContent} – Color3D Studio`;
     share.element.hidden = isOver;
     const stages = next.stages.filter((stage) => stage.state !== 'SKIPPED');
@@ -257,7 +261,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
       !isOver && h('span', { class: 'soft small' }, 'You may close this page; the work goes on.'),
       ['FAILED', 'CANCELLED'].includes(next.state) && button('Go on from where it stopped', () => void act(retryJob(job), true), { class: 'main-button' }));
     replace(trouble, next.state === 'FAILED' && error ? problem(error) : null);
-    say(isOver || !working ? status.textContent : stageName(working.kind));
+    say(isOver || !working ? status.textContent : doing(working.kind));
   };
   const act = async (what: Promise<unknown>, again = false): Promise<void> => {
     try {

@@ -2,7 +2,7 @@
 // forbids inline styles.
 const rules = `
 .page-film{max-width:94rem}
-.film-facts{margin:0 0 1rem}
+.page-film>.film-facts{margin:0 0 1rem}
 .film-layout{display:grid;grid-template-columns:minmax(0,1fr) minmax(17rem,21rem);gap:1.4rem;align-items:start}
 .film-stage{min-width:0}
 .film-screen{position:relative;overflow:hidden;background:#0d0e10;border-radius:var(--radius) var(--radius) 0 0;
@@ -23,7 +23,8 @@ position:relative;top:calc(50% - 1.2rem)}
 .film-bar button,.film-bar select,.film-tools button{padding:.3rem .8rem}
 .film-bar .main-button{min-width:5.4rem;justify-content:center}
 .film-bar button[aria-pressed=true]{background:var(--wash);border-color:var(--accent)}
-.film-clock{font-variant-numeric:tabular-nums;padding-inline:.4rem;min-width:9.5rem}
+#film-wishes>:last-child{margin:0}
+.film-clock{white-space:nowrap;font-variant-numeric:tabular-nums;padding-inline:.4rem;min-width:9.5rem}
 .film-gap{flex:1}
 .film-timeline{border:1px solid var(--line);border-top:0;border-radius:0 0 var(--radius) var(--radius);background:var(--card);padding:.4rem .9rem .9rem}
 .film-tools{display:flex;align-items:center;gap:.4rem}
@@ -78,7 +79,7 @@ border-radius:0;font-size:.82rem;justify-content:flex-start;white-space:nowrap}
 .film-painting .film-layout{grid-template-columns:minmax(0,1fr)}
 #film-start{width:100%;justify-content:center;font-size:1.06rem}
 @media(max-width:60rem){.film-layout{grid-template-columns:minmax(0,1fr)}.film-screen{width:min(100%,calc(56vh*var(--shape)))}}
-@media(max-width:34rem){.film-gap{display:none}.film-bar{gap:.3rem}.film-timeline{padding-inline:.4rem}.film-clock{min-width:0;flex:1;text-align:right}
+@media(max-width:34rem){.film-gap{display:none}.film-bar{gap:.3rem}.film-timeline{padding-inline:.4rem}.film-clock{min-width:0;flex:1;text-align:right;font-size:.93rem}
 .film-bar select{flex:1}}
 `;
 
