@@ -168,8 +168,8 @@ const use = async () => {
   facts.proposals = await evaluate('[...document.querySelectorAll(".film-key.proposed")].map((mark) => mark.title)');
   await click('#film-start');
   await waitFor('location.hash.split("/").length === 3');
-  await waitFor('document.querySelector(".film-early:not([hidden])") || document.querySelector("[data-colored=early]") || document.querySelector("main").dataset.state === "done"', 120000);
-  facts.early = await evaluate('document.querySelectorAll("[data-colored=early]").length');
+  await waitFor('document.querySelector(".film-early:not([hidden])") || document.querySelector("[data-pictures=early] img[src]") || document.querySelector("main").dataset.state === "done"', 120000);
+  facts.early = await evaluate("document.querySelectorAll(\"[data-pictures=early] img\").length");
   await look('running');
   await waitFor('document.querySelector("main").dataset.state === "done"', 240000);
   await waitFor('document.querySelector(".film-video").readyState >= 2 || document.querySelector(".film-screen").dataset.movie === "no"');

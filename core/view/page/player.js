@@ -139,8 +139,8 @@ const wire = (soundAddress) => {
   $('time').hidden = false;
   $('sound').hidden = !soundAddress;
   if (soundAddress) {
-    sound = new Audio(soundAddress);
-    sound.preload = 'auto';
+    sound = $('heard');
+    sound.src = soundAddress;
     $('sound').onclick = () => {
       press($('sound'), !pressed($('sound')));
       hear();

@@ -6,7 +6,7 @@ import {
 import { bar, button, h, problem, replace, say } from '../dom';
 import { bytes, day, errorInWords, isFinished, seconds, stageName, stateName } from '../words';
 import {
-  changeFilm, colorizeFilm, describeFilm, filmUrl, frameUrl, movieFrameUrl, movieUrl, timelineOf, type FilmFacts, type JobTimeline,
+  changeFilm, colorizeFilm, describeFilm, earlyUrl, filmUrl, frameUrl, movieFrameUrl, movieUrl, timelineOf, type FilmFacts, type JobTimeline,
 } from './film_api';
 import { FilmPlan } from './film_plan';
 import type { FilmSource } from './screen';
@@ -16,7 +16,7 @@ import { clockOf, evenTimes, frameOfName, runsOf, type FilmTimes } from './timel
 import { Workspace } from './workspace';
 
 const mostKeys = 4; // that are proposed before the first run
-const earlySide = 960, earlyPictureSide = 160; // px
+const earlySide = 960, pictureSide = 160; // px
 const takeAway: [RegExp, string][] = [
   [/^(film|scene)\.mp4$/, 'The coloured film'],
   [/^view\.html$/, 'The scene as one page for any browser'],
@@ -139,7 +139,9 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
       set, facts, plan: () => plan!, proposals, source,
       allowsParts: isReady && finished?.poses === false,
       whyNoParts: !isReady ? '' : finished?.poses ? 'This film has become a scene in 3D. Parts in other colours are for films without it.' : '',
-      picturesOf: (frame) => source.isColored ? source.frame(frame, earlyPictureSide) : frameUrl(set, film.names[frame]!, earlyPictureSide, true),
+      pictures: () => source.isColored ? { name: 'colored', address: (frame) => source.frame(frame, pictureSide) }
+        : isWorking() ? { name: 'early', address: (frame) => earlyUrl(job, set, film.names[frame]!, pictureSide) }
+          : { name: 'gray', address: (frame) => frameUrl(set, film.names[frame]!, pictureSide, true) },
       onPause: (frame) => void showEarly(frame),
       side: [wishes],
     });
@@ -148,7 +150,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
     updateActions();
   };
 
-  // First colours while the run goes on: the frame that stands, then the small pictures one by one.
+  // First colours while the run goes on: of the frame that stands, and of the small pictures.
   let hasFirstColors = false, early: string | null = null;
   const dropEarly = (): void => {
     if (early) URL.revokeObjectURL(early);
@@ -167,21 +169,11 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
       // A preview is not worth a message: the run itself tells what is wrong.
     }
   };
-  const showFirstColors = async (): Promise<void> => {
-    if (hasFirstColors || !workspace || !plan) return;
+  const showFirstColors = (): void => {
+    if (hasFirstColors || !workspace) return;
     hasFirstColors = true;
+    workspace.showPictures();
     void showEarly(workspace.now);
-    for (const image of workspace.timeline.pictures) {
-      if (!isWorking()) return;
-      try {
-        const url = URL.createObjectURL(await previewOfRun(job, set, plan.film.names[Number(image.dataset.frame)]!, earlyPictureSide));
-        image.onload = () => URL.revokeObjectURL(url);
-        image.src = url;
-        image.dataset.colored = 'early';
-      } catch {
-        return;
-      }
-    }
   };
 
   // ---- before the first run --------------------------------------------------------------------
@@ -295,7 +287,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
     const key = next.pictures.find(({ kind, name }) => kind === 'colorize_key_view' && name === 'key_view_colored.png');
     const isNewEnd = isFinished(next.state) && before !== next.state;
     if (asked && !isNewEnd) {
-      if (key) void showFirstColors();
+      if (key) showFirstColors();
       return;
     }
     // The shots are known after the import, the rest at the end.
@@ -313,7 +305,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
       text: `the expected colour error falls from ${wish.error_now.toFixed(1)} to ${wish.error_with.toFixed(1)}`,
     }].filter(({ frame }) => frame >= 0) : [];
     build(timeline);
-    if (key) void showFirstColors();
+    if (key) showFirstColors();
     if (next.state === 'SUCCEEDED') {
       dropEarly();
       void showResults(jobs);

@@ -35,3 +35,6 @@ export const filmUrl = (set: string): string => `/api/sets/${set}/film/video`;
 export const movieUrl = (job: string, name: string): string => `/api/jobs/${job}/film/video?${query({ name })}`;
 export const movieFrameUrl = (job: string, name: string, frame: number, side: number): string =>
   `/api/jobs/${job}/film/frame?${query({ name, frame, side })}`;
+// A frame in first colours, from the coloured frame of a run that goes on.
+export const earlyUrl = (job: string, set: string, name: string, side: number): string =>
+  `/api/jobs/${job}/preview?${query({ set, name, side })}`;

@@ -64,6 +64,7 @@ export class Timeline {
     const count = Math.max(2, Math.min(60, Math.round(this.width / pictureWidth), this.film.times.length));
     if (this.picturesFor === `${name} ${count}`) return;
     this.picturesFor = `${name} ${count}`;
+    this.strip.dataset.pictures = name;
     const images = Array.from({ length: count }, (_, i) =>
       h('img', { alt: '', draggable: 'false', 'data-frame': this.frameAtShare((i + 0.5) / count) }));
     replace(this.strip, ...images);
@@ -76,9 +77,6 @@ export class Timeline {
     };
     load(0);
   }
-  // The frames of the small pictures, in order.
-  get pictures(): HTMLImageElement[] { return [...this.strip.querySelectorAll('img')]; }
-
   showMoment(frame: number, text: string): void {
     this.slider.value = String(frame);
     this.slider.setAttribute('aria-valuetext', text);

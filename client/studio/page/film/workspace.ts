@@ -17,7 +17,7 @@ export interface WorkspaceOptions {
   readonly source: FilmSource;
   readonly allowsParts: boolean;
   readonly whyNoParts: string;
-  readonly picturesOf: (frame: number) => string; // of the timeline
+  readonly pictures: () => { name: string; address: (frame: number) => string }; // of the timeline
   readonly onPause: (frame: number) => void; // stands still at this frame
   readonly side: readonly (Node | null)[]; // below the panel
 }
@@ -67,7 +67,7 @@ export class Workspace {
       add: (list) => this.add(list),
       takeProposal: (frame) => this.take(frame),
     });
-    this.timeline.root.addEventListener('laid-out', () => this.timeline.showPictures(String(this.isColored), options.picturesOf));
+    this.timeline.root.addEventListener('laid-out', () => this.showPictures());
     this.player = h('div', {}, h('div', { class: 'film-wrap' }, this.screen.root), this.bar.root, this.timeline.root, this.trouble);
     replace(this.stage, this.player);
     replace(this.root, this.stage, h('div', { class: 'film-side' }, this.panel.root, ...options.side));
@@ -77,6 +77,10 @@ export class Workspace {
     addEventListener('keydown', this.onKey);
   }
 
+  showPictures(): void {
+    const { name, address } = this.options.pictures();
+    this.timeline.showPictures(name, address);
+  }
   get now(): number { return this.screen.now; }
 
   update(): void {
