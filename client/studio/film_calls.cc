@@ -34,7 +34,9 @@ std::optional<double> SecondsOf(const nlohmann::json& entry, const char* field) 
   return value->get<double>();
 }
 
-FilmFrameColor ReadFrameColor(const nlohmann::json& entry, const std::string& set, PhotoSets& sets) {
+FilmFrameColor ReadFrameColor(const nlohmann::json& entry,
+                              const std::string& set,
+                              PhotoSets& sets) {
   if (!entry.is_object()) throw InvalidArgument("a frame of the film is not a JSON object");
   FilmFrameColor frame;
   frame.begin_s = SecondsOf(entry, "begin_s");

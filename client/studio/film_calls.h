@@ -28,7 +28,7 @@ struct FilmFrameColor {
 
 struct FilmChoices {
   std::string preset = "fast";
-  bool poses = false;             // also a scene in 3D that moves
+  bool poses = false;  // also a scene in 3D that moves
   bool steady_exposure = false;
   double frames_per_second = 0.0;  // of films that are pictures; 0: the default
   // The first one is the key view; at least one for a new job.
@@ -51,8 +51,8 @@ class FilmCalls {
   nlohmann::ordered_json Timeline(const std::string& job) const;
 
   v1::Job Colorize(const std::string& scene, const FilmChoices& choices) const;
-  // Colours the film of a job again, with these lists in place of its own. Stages that do not depend
-  // on a change are not repeated.
+  // Colours the film of a job again, with these lists in place of its own. Stages that do not
+  // depend on a change are not repeated.
   v1::Job Change(const std::string& job, const FilmChoices& choices) const;
 
  private:

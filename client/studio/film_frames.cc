@@ -65,10 +65,6 @@ struct FilmFrames::OpenFilm {
   std::optional<FilmReader> reader COLOR3D_GUARDED_BY(mutex);
 };
 
-bool FilmFrames::IsFilm(const PhotoFolder& folder) {
-  return folder.Layout() == CaptureLayout::kFilm;
-}
-
 std::shared_ptr<FilmFrames::OpenFilm> FilmFrames::Open(const fs::path& film) {
   std::error_code error;
   const auto changed = fs::last_write_time(film, error);

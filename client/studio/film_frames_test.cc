@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "client/studio/film_calls.h"
+#include "client/studio/found_photos.h"
 #include "core/base/error.h"
 #include "core/image/codec.h"
 #include "core/video/mp4_writer.h"
@@ -53,7 +54,7 @@ class FilmFramesTest : public ::testing::Test {
 
 TEST_F(FilmFramesTest, DescribesAVideoFile) {
   const PhotoFolder film = Film();
-  ASSERT_TRUE(FilmFrames::IsFilm(film));
+  ASSERT_TRUE(IsFilm(film));
   const auto facts = films_.Describe(film);
   EXPECT_EQ(facts.at("frames"), kFrames);
   EXPECT_NEAR(facts.at("seconds"), 1.5, 1e-3);
@@ -66,7 +67,7 @@ TEST_F(FilmFramesTest, DescribesAVideoFile) {
 
 TEST_F(FilmFramesTest, DescribesPicturesAsAFilm) {
   const PhotoFolder pictures = Pictures();
-  ASSERT_TRUE(FilmFrames::IsFilm(pictures));
+  ASSERT_TRUE(IsFilm(pictures));
   const auto facts = films_.Describe(pictures);
   EXPECT_EQ(facts.at("frames"), kFrames);
   EXPECT_EQ(facts.at("is_video"), false);
@@ -95,7 +96,8 @@ TEST_F(FilmFramesTest, GivesFramesAsFiles) {
 
 TEST_F(FilmFramesTest, RefusesFramesThatAreNotThere) {
   const PhotoFolder film = Film();
-  for (const char* name : {"f000012", "f-1", "f", "", "../f000001", "x000001", "f1x", "f99999999999"}) {
+  for (const char* name :
+       {"f000012", "f-1", "f", "", "../f000001", "x000001", "f1x", "f99999999999"}) {
     EXPECT_THROW(films_.Jpeg(film, name, 0, false), Error) << name;
   }
   EXPECT_THROW(films_.JpegOfFile(scratch_.path() / "none.mp4", 0, 0, false), Error);

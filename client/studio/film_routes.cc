@@ -5,6 +5,7 @@
 #include <fstream>
 #include <memory>
 
+#include "client/studio/found_photos.h"
 #include "client/studio/run_progress.h"
 #include "client/studio/studio_answers.h"
 #include "client/studio/studio_requests.h"
@@ -45,7 +46,7 @@ int NumberOf(const Request& request, const char* field) {
 }
 
 const PhotoFolder& RequireFilm(const PhotoFolder& folder) {
-  if (FilmFrames::IsFilm(folder)) return folder;
+  if (IsFilm(folder)) return folder;
   throw Error(ErrorCode::kFailedPrecondition,
               "{} is not a film of one camera; drop one film, or the pictures of one",
               folder.Name());

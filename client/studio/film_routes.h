@@ -1,4 +1,4 @@
-// The part of the studio's HTTP calls that is about films (README.md "Calls").
+// The part of the studio's HTTP calls that is about films (client/studio/README.md).
 #pragma once
 
 #include <httplib.h>

@@ -33,7 +33,7 @@ std::string ViewName(const LocalFile& photo) {
 
 const char* KindOf(const PhotoFolder& folder) {
   if (folder.splat) return "splat";
-  if (folder.Layout() == CaptureLayout::kFilm) return "film";
+  if (IsFilm(folder)) return "film";
   return folder.camera_films.empty() ? "photos" : "films";
 }
 
@@ -66,6 +66,13 @@ Image GrayOf(const Image& photo) {
 }
 
 }  // namespace
+
+bool IsFilm(const PhotoFolder& folder) {
+  if (folder.film || folder.photos.empty()) return folder.film.has_value();
+  // Frames of several cameras lie in folders of their own.
+  const fs::path frame = folder.photos.front().path;
+  return frame.parent_path() / "" == fs::path(kFramesFolder);
+}
 
 Json DescribePhotos(const PhotoFolder& folder, const CancellationToken& cancel) {
   int64_t bytes = 0;

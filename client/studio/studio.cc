@@ -162,18 +162,17 @@ void Studio::Parts::AddRoutes() {
   AddPageRoutes();
   AddSetRoutes();
   AddJobRoutes();
-  AddFilmRoutes({sets_,
-                 calls_,
-                 films_,
-                 [this](const std::string& set) { return FolderOf(set); },
-                 [this](const std::string& set) { return SceneOf(set); },
-                 [this](const std::string& job, const std::string& name) {
-                   return FetchArtifact(job, name).first;
-                 }},
-                {[this](const std::string& pattern, Handler handler) { Get(pattern, handler); },
-                 [this](const std::string& pattern, BodyHandler handler) {
-                   Post(pattern, handler);
-                 }});
+  AddFilmRoutes(
+      {sets_,
+       calls_,
+       films_,
+       [this](const std::string& set) { return FolderOf(set); },
+       [this](const std::string& set) { return SceneOf(set); },
+       [this](const std::string& job, const std::string& name) {
+         return FetchArtifact(job, name).first;
+       }},
+      {[this](const std::string& pattern, Handler handler) { Get(pattern, handler); },
+       [this](const std::string& pattern, BodyHandler handler) { Post(pattern, handler); }});
 }
 
 PhotoFolder Studio::Parts::FolderOf(const std::string& id) const {
@@ -250,8 +249,7 @@ void Studio::Parts::AddSetRoutes() {
          const auto strokes = json.find("strokes");
          if (strokes == json.end()) throw InvalidArgument("strokes are missing");
          response.set_content(
-             calls_.PreviewOfStrokes(
-                 PhotoOf(folder, TextOf(json, "photo")), strokes->dump(), side),
+             calls_.PreviewOfStrokes(PhotoOf(folder, TextOf(json, "photo")), strokes->dump(), side),
              "image/png");
        });
   Post(Pattern("sets", "/colorize"),

@@ -17,8 +17,9 @@ const { send, open, evaluate, close, errors, requests } =
 const origin = new URL(address).origin;
 const seen = { texts: {}, wide: [], facts: {} };
 
+const slow = Number(process.env.COLOR3D_SLOW) || 1;  // times as long to wait, on a busy machine
 const waitFor = async (expression, limit = 60000) => {
-  const end = Date.now() + limit;
+  const end = Date.now() + slow * limit;
   while (Date.now() < end) {
     const value = await evaluate(expression);
     if (value) return value;

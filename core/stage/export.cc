@@ -106,8 +106,7 @@ class Exporter {
     if (HasViewer() && !page_file_.name.empty()) {
       contents.movie = MakePageMovie(scene_, in_time_, context_);
     }
-    WriteViewPage(
-        scene_, shown_, model_, in_time_.IsDynamic(), std::move(contents), context_);
+    WriteViewPage(scene_, shown_, model_, in_time_.IsDynamic(), std::move(contents), context_);
   }
 
   // The one list of writers.

@@ -23,10 +23,10 @@ struct ViewPageContents {
   PageMovie movie;
 };
 
-// Writes artifact::kViewPage, which opens at the key view. `moves`: the model is that of the time of
-// the key view, and the page has the photos of this time only. Returns false and writes nothing if
-// there is no file or, with a warning, if this build has no viewer. Throws Error{kCancelled} and the
-// errors of reading the photos.
+// Writes artifact::kViewPage, which opens at the key view. `moves`: the model is that of the time
+// of the key view, and the page has the photos of this time only. Returns false and writes nothing
+// if there is no file or, with a warning, if this build has no viewer. Throws Error{kCancelled} and
+// the errors of reading the photos.
 bool WriteViewPage(const Scene& scene,
                    int key_view,
                    const GaussianModel& model,

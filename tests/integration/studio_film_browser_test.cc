@@ -1,5 +1,5 @@
-// The studio's page for films in a real browser, on a rendered film of two shots with sound: from the file to the
-// coloured film, and a part of it in other colours.
+// The studio's page for films in a real browser, on a rendered film of two shots with sound: from
+// the file to the coloured film, and a part of it in other colours.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -38,7 +38,8 @@ Image FilmFrame(int frame) {
   Image lab = WallPan(kWidth, kHeight, second ? 5000 + 3 * frame : frame);
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
-      if (second) lab.At(0, y, x) = 30.0f + 40.0f * ((x / 24 + y / 24) % 2) + 0.2f * lab.At(0, y, x);
+      if (second)
+        lab.At(0, y, x) = 30.0f + 40.0f * ((x / 24 + y / 24) % 2) + 0.2f * lab.At(0, y, x);
       lab.At(1, y, x) = lab.At(2, y, x) = 0.0f;
     }
   }
@@ -55,9 +56,8 @@ class StudioFilmTest : public ServiceTest {
   }
   std::string WriteFilm() {
     ThreadPool pool(1);
-    Mp4Writer writer(
-        Path("silent.mp4"),
-        {.width = kWidth, .height = kHeight, .frames_per_second = kFramesPerSecond});
+    Mp4Writer writer(Path("silent.mp4"),
+                     {.width = kWidth, .height = kHeight, .frames_per_second = kFramesPerSecond});
     for (int i = 0; i < 2 * kFramesOfShot; ++i) writer.Add(FilmFrame(i), pool);
     writer.Finish();
     AddSound(Path("silent.mp4"),
@@ -103,7 +103,8 @@ TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
   EXPECT_EQ(facts.at("pause_holds"), true);
   const double before = facts.at("heap").at(0), after = facts.at("heap").at(1);
   EXPECT_LT(after, 1.05 * before + 500'000);
-  // A second to either side of the frame, in its shot; then its end is dragged, and its begin moved by a key.
+  // A second to either side of the frame, in its shot; then its end is dragged, and its begin moved
+  // by a key.
   EXPECT_THAT(facts.at("part_first"), ElementsAre(0, 13));
   const int end = facts.at("part_dragged").at(1);
   EXPECT_LT(end, 13);

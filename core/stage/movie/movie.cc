@@ -364,7 +364,8 @@ bool RenderMovieFile(const RenderOptions& options,
   const Filming filming = FilmingOf(options, scene, model, context);
   Mp4Writer movie(file, filming.movie);
   if (movie.encoder() == kOtherCodec) return false;
-  Shoot(filming, model, &movie, [](int64_t, const Image&) {}, context);
+  Shoot(
+      filming, model, &movie, [](int64_t, const Image&) {}, context);
   return true;
 }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr int kTurnSidePx = 400, kFilmSidePx = 480;  // longer side
 constexpr int kTurnFrames = 72;
 constexpr double kTurnFramesPerSecond = 12.0;
-constexpr size_t kMostFilmFrames = 600;  // longer films are thinned out, and silent
+constexpr size_t kMostFilmFrames = 600;        // longer films are thinned out, and silent
 constexpr double kFilmFramesPerSecond = 25.0;  // where times are not seconds
 
 RenderOptions OptionsOf(const Scene& scene, bool moves, int key_view) {
@@ -41,8 +41,7 @@ PageMovie MakePageMovie(const Scene& scene, const GaussianModel& model, StageCon
   const std::filesystem::path file = context.scratch_folder() / "page.mp4";
   PageMovie movie;
   movie.shows_motion = model.IsDynamic() && scene.HasTimes();
-  const RenderOptions options =
-      OptionsOf(scene, movie.shows_motion, ReadKeyView(context, scene));
+  const RenderOptions options = OptionsOf(scene, movie.shows_motion, ReadKeyView(context, scene));
   try {
     if (RenderMovieFile(options, scene, model, file, context)) {
       movie.has_sound = FilmReader(file, &context.cancel()).facts().has_sound;

@@ -1,5 +1,5 @@
-// The small movie inside of view.html: for browsers that cannot draw the scene, for motion that the page
-// cannot play, and as the sound of a film (EXPORT.md "Viewer"). For the export stage only.
+// The small movie inside of view.html: for browsers that cannot draw the scene, for motion that the
+// page cannot play, and as the sound of a film (EXPORT.md "Viewer"). For the export stage only.
 #pragma once
 
 #include <string>
@@ -16,8 +16,8 @@ struct PageMovie {
   bool shows_motion = false;  // else the scene stands, and the camera turns
 };
 
-// Scenes with times: the film of the key view's camera, with its sound. Others: a turn around the key
-// view. Empty where this machine has no encoder, and for pictures that are too narrow. Throws
+// Scenes with times: the film of the key view's camera, with its sound. Others: a turn around the
+// key view. Empty where this machine has no encoder, and for pictures that are too narrow. Throws
 // Error{kCancelled} and the errors of placing the cameras.
 PageMovie MakePageMovie(const Scene& scene, const GaussianModel& model, StageContext& context);
 
