@@ -6,7 +6,7 @@ import {
 import { bar, button, h, problem, replace, say } from '../dom';
 import { bytes, day, errorInWords, isFinished, seconds, stageName, stateName } from '../words';
 import {
-  changeFilm, colorizeFilm, describeFilm, earlyUrl, filmUrl, frameUrl, movieFrameUrl, movieUrl, timelineOf, type FilmFacts, type JobTimeline,
+  changeFilm, colorizeFilm, describeFilm, earlyUrl, filmUrl, frameUrl, movieFrameUrl, movieUrl, setAsFrames, timelineOf, type FilmFacts, type JobTimeline,
 } from './film_api';
 import { FilmPlan } from './film_plan';
 import type { FilmSource } from './screen';
@@ -321,7 +321,12 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
       found = described.found;
       title.textContent = described.name;
       summary.textContent = factsOf(facts, null);
-      replace(notes, facts.notes.length > 0 && h('details', { class: 'note' }, h('summary', {}, 'Worth knowing'), h('ul', {}, ...facts.notes.map((note) => h('li', {}, note)))));
+      const notFrames = async (): Promise<void> => {
+        await setAsFrames(set, false);
+        selections.delete(set);
+        location.hash = `set/${set}`;
+      };
+      replace(notes, described.as_frames && !job && button('These are photos of a place, not a film', () => void act(notFrames()), { class: 'quiet', id: 'not-frames' }), facts.notes.length > 0 && h('details', { class: 'note' }, h('summary', {}, 'Worth knowing'), h('ul', {}, ...facts.notes.map((note) => h('li', {}, note)))));
       const times = firstTimes(found, facts);
       plan = new FilmPlan(times, { keys: [], parts: [] }, changed);
       build(times);

@@ -124,6 +124,9 @@ export class Screen {
     this.loops = on;
     this.video.loop = on;
   }
+  setSound(on: boolean): void {
+    this.video.muted = !on;
+  }
   setCompare(on: boolean): void {
     this.compares = on;
     this.layOut();
@@ -220,7 +223,8 @@ export class Screen {
 
 export const playerBar = (
   screen: { step: (frames: number) => void; toggle: () => void; speed: (value: number) => void; loop: (on: boolean) => void;
-    compare: (on: boolean) => void },
+    compare: (on: boolean) => void; sound: (on: boolean) => void },
+  hasSound: boolean,
 ): { root: HTMLElement; show: (state: { playing: boolean; clock: string; canCompare: boolean }) => void } => {
   const toggle = (text: string, id: string, on: boolean, act: (on: boolean) => void): HTMLButtonElement => {
     const button = h('button', { type: 'button', id, 'aria-pressed': String(on) }, text);
@@ -240,7 +244,8 @@ export const playerBar = (
   const back = h('button', { type: 'button', id: 'film-back', 'aria-keyshortcuts': ',', title: 'One frame back (,)', onclick: () => screen.step(-1) }, '‹', h('span', { class: 'said' }, 'One frame back'));
   const on = h('button', { type: 'button', id: 'film-on', 'aria-keyshortcuts': '.', title: 'One frame on (.)', onclick: () => screen.step(1) }, '›', h('span', { class: 'said' }, 'One frame on'));
   const root = h('div', { class: 'film-bar', role: 'group', 'aria-label': 'Playing' }, play, back, on, clock,
-    h('span', { class: 'film-gap' }), speed, toggle('Loop', 'film-loop', true, screen.loop), compare);
+    h('span', { class: 'film-gap' }), speed, toggle('Loop', 'film-loop', true, screen.loop),
+    ...(hasSound ? [toggle('Sound', 'film-sound', true, screen.sound)] : []), compare);
   return {
     root,
     show: ({ playing, clock: text, canCompare }) => {

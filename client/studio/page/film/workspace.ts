@@ -53,7 +53,8 @@ export class Workspace {
       speed: (value) => this.screen.setSpeed(value),
       loop: (on) => this.screen.setLoop(on),
       compare: (on) => this.screen.setCompare(on),
-    });
+      sound: (on) => this.screen.setSound(on),
+    }, facts.has_sound);
     this.timeline = new Timeline(plan.film, plan, {
       seek: (frame) => this.seek(frame),
       pickKey: (index) => this.pick('keys', index),
