@@ -11,6 +11,7 @@
 #include "core/base/files.h"
 #include "core/base/parallel.h"
 #include "core/base/text/utf8.h"
+#include "core/catalogue/scene_files.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/decode_budget.h"
@@ -29,14 +30,17 @@ constexpr int kEnoughSidePx = 6000;
 constexpr size_t kManyPhotos = 300;
 constexpr size_t kNamed = 3;  // of odd photos
 
-// As views are called: relative to images/.
+// As views are called: relative to images/ or frames/.
 std::string ViewName(const LocalFile& photo) {
-  return photo.path.starts_with("images/") ? photo.path.substr(7) : photo.path;
+  for (const std::string_view folder : {std::string_view("images/"), kFramesFolder}) {
+    if (photo.path.starts_with(folder)) return photo.path.substr(folder.size());
+  }
+  return photo.path;
 }
 
 const char* KindOf(const PhotoFolder& folder) {
   if (folder.splat) return "splat";
-  if (folder.film) return "film";
+  if (IsFilm(folder)) return "film";
   return folder.camera_films.empty() ? "photos" : "films";
 }
 
@@ -76,6 +80,13 @@ Image GrayOf(const Image& photo) {
 }
 
 }  // namespace
+
+bool IsFilm(const PhotoFolder& folder) {
+  if (folder.film || folder.photos.empty()) return folder.film.has_value();
+  // Frames of several cameras lie in folders of their own.
+  const fs::path frame = folder.photos.front().path;
+  return frame.parent_path() / "" == fs::path(kFramesFolder);
+}
 
 Json DescribePhotos(const PhotoFolder& folder, const CancellationToken& cancel) {
   int64_t bytes = 0;
@@ -161,7 +172,8 @@ PhotoFolder CollectSet(const PhotoSet& set) {
     return text;
   };
   try {
-    PhotoFolder folder = CollectPhotos(set.folder);
+    PhotoFolder folder = CollectPhotos(set.folder, set.as_frames);
+    if (set.as_frames) UsePhotosAsFrames(&folder);
     for (std::string& note : folder.notes) note = by_name(note);
     return folder;
   } catch (const Error& e) {

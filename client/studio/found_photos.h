@@ -12,6 +12,9 @@
 
 namespace color3d::client {
 
+// One film of one camera, as a video file or as pictures.
+bool IsFilm(const PhotoFolder& folder);
+
 // kind ("photos", "film", "films", "splat"), name, bytes, has_poses, in_color (true, false, or null
 // if unsure), notes on what is odd (by name), and photos: for each its name as a view, width and
 // height in px (0: not a picture that can be used, with the problem). Reads the headers of at most

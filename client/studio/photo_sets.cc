@@ -97,6 +97,7 @@ PhotoSet Read(const fs::path& folder) {
   set.scene = json.value("scene", "");
   set.created_s = json.value("created_s", int64_t{0});
   set.is_own = json.value("is_own", false);
+  set.as_frames = json.value("as_frames", false);
   return set;
 }
 
@@ -107,7 +108,8 @@ void PhotoSets::Write(const PhotoSet& set) const {
                                        {"folder", set.folder.string()},
                                        {"scene", set.scene},
                                        {"created_s", set.created_s},
-                                       {"is_own", set.is_own}};
+                                       {"is_own", set.is_own},
+                                       {"as_frames", set.as_frames}};
   WriteFileAtomic(root_ / set.id / kFacts,
                   json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
@@ -182,6 +184,15 @@ void PhotoSets::SetScene(const std::string& id, const std::string& scene) {
   PhotoSet set = Get(id);
   if (set.scene == scene) return;
   set.scene = scene;
+  Write(set);
+}
+
+void PhotoSets::SetAsFrames(const std::string& id, bool as_frames) {
+  const MutexLock lock(mutex_);
+  PhotoSet set = Get(id);
+  if (set.as_frames == as_frames) return;
+  set.as_frames = as_frames;
+  set.scene.clear();
   Write(set);
 }
 

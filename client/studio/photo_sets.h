@@ -19,6 +19,7 @@ struct PhotoSet {
   std::string scene;             // "scenes/..." once uploaded to the service
   int64_t created_s = 0;         // seconds since 1970
   bool is_own = false;           // the studio's copy, which files may be added to
+  bool as_frames = false;        // its pictures are frames of a film, in the order of their names
 };
 
 class PhotoSets {
@@ -34,6 +35,8 @@ class PhotoSets {
   // The newest first.
   std::vector<PhotoSet> List() const;
   void SetScene(const std::string& id, const std::string& scene);
+  // Forgets the scene if this changes.
+  void SetAsFrames(const std::string& id, bool as_frames);
 
   // Receives one file. `name`: a safe relative path, as browsers give for a dropped folder. `fill`
   // passes the bytes to the sink in pieces and returns false if they end early; then nothing is

@@ -14,6 +14,8 @@
 #include "client/lib/out_folder.h"
 #include "client/lib/photos/photo_folder.h"
 #include "client/studio/correct/correct_routes.h"
+#include "client/studio/film_frames.h"
+#include "client/studio/film_routes.h"
 #include "client/studio/found_photos.h"
 #include "client/studio/page_files.h"
 #include "client/studio/photo_sets.h"
@@ -79,6 +81,7 @@ class Studio::Parts {
   ShareCalls share_;
   QueueCalls queue_;
   Corrections corrections_{calls_};
+  FilmFrames films_;
   const ScratchFolder downloads_;
   std::atomic<int> streams_{0};
   std::atomic<Steady::time_point> last_request_{Steady::now()};
@@ -103,6 +106,11 @@ class Studio::Parts {
   void SendArtifact(const Request& request, Response& response);
 
   PhotoFolder FolderOf(const std::string& id) const { return CollectSet(sets_.Get(id)); }
+  // A photo or a frame of the set's film.
+  LocalFile PhotoOf(const PhotoFolder& folder, const std::string& view);
+  // Its file and media type.
+  std::pair<fs::path, std::string> FetchArtifact(const std::string& job,
+                                                 const std::string& name) const;
   // "scenes/..." of the set, uploaded if it is not there yet.
   std::string SceneOf(const std::string& id);
 };
@@ -115,7 +123,8 @@ Studio::Parts::Parts(const StudioOptions& options, const CancellationToken& canc
       sets_(options.folder),
       calls_(options.server, cancel),
       share_(options.server, cancel),
-      queue_(options.server, cancel) {
+      queue_(options.server, cancel),
+      films_(cancel) {
   if (port_ < 0) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "cannot listen on port {} of this machine; name another with --port",
@@ -174,15 +183,24 @@ void Studio::Parts::AddRoutes() {
       [this](Response& response, std::function<void(const StudioRoutes::Send&)> watch) {
         Stream(response, std::move(watch));
       }};
-  AddShareRoutes(routes,
-                 {options_.folder,
-                  downloads_.path(),
-                  [this](const std::string& set) { return FolderOf(set); },
-                  &calls_,
-                  &cancel_},
-                 share_);
+  const auto folder_of = [this](const std::string& set) { return FolderOf(set); };
+  AddShareRoutes(
+      routes, {options_.folder, downloads_.path(), folder_of, &calls_, &cancel_}, share_);
   AddQueueRoutes(routes, queue_);
   AddCorrectRoutes(corrections_, routes);
+  AddFilmRoutes({sets_,
+                 calls_,
+                 films_,
+                 folder_of,
+                 [this](const std::string& set) { return SceneOf(set); },
+                 [this](const std::string& job, const std::string& name) {
+                   return FetchArtifact(job, name).first;
+                 }},
+                routes);
+}
+
+LocalFile Studio::Parts::PhotoOf(const PhotoFolder& folder, const std::string& view) {
+  return folder.film ? films_.File(folder, view) : PhotoOfView(folder, view);
 }
 
 void Studio::Parts::AddPageRoutes() {
@@ -219,7 +237,7 @@ void Studio::Parts::AddSetRoutes() {
   });
   Get(Pattern("sets", "/photo"), [this](const Request& request, Response& response) {
     const PhotoFolder folder = FolderOf(request.matches[1]);
-    const LocalFile& photo = PhotoOfView(folder, request.get_param_value("name"));
+    const LocalFile photo = PhotoOf(folder, request.get_param_value("name"));
     const bool gray = request.get_param_value("gray") == "1";
     response.set_content(PhotoJpeg(photo, SideOf(request), gray), "image/jpeg");
   });
@@ -242,7 +260,8 @@ void Studio::Parts::AddSetRoutes() {
          const int count = ReadJsonBody(request, body).value("count", 1);
          const std::string id = request.matches[1];
          const PhotoFolder folder = FolderOf(id);
-         const int most = std::max<int>(1, static_cast<int>(folder.photos.size()));
+         const size_t views = folder.film ? 5 : folder.photos.size();  // one for each shot
+         const int most = std::max<int>(1, static_cast<int>(views));
          const v1::Job job =
              calls_.SelectKeyView(SceneOf(id), std::clamp(count, 1, std::min(most, 5)));
          AnswerJson(JobFacts(job), response);
@@ -255,8 +274,7 @@ void Studio::Parts::AddSetRoutes() {
          const auto strokes = json.find("strokes");
          if (strokes == json.end()) throw InvalidArgument("strokes are missing");
          response.set_content(
-             calls_.PreviewOfStrokes(
-                 PhotoOfView(folder, TextOf(json, "photo")), strokes->dump(), side),
+             calls_.PreviewOfStrokes(PhotoOf(folder, TextOf(json, "photo")), strokes->dump(), side),
              "image/png");
        });
   Post(Pattern("sets", "/colorize"),
@@ -291,7 +309,7 @@ void Studio::Parts::AddJobRoutes() {
       [this](const Request& request, Response& response) { SendArtifact(request, response); });
   Get(Pattern("jobs", "/preview"), [this](const Request& request, Response& response) {
     const PhotoFolder folder = FolderOf(request.get_param_value("set"));
-    const LocalFile& photo = PhotoOfView(folder, request.get_param_value("name"));
+    const LocalFile photo = PhotoOf(folder, request.get_param_value("name"));
     response.set_content(calls_.PreviewOfRun(request.matches[1], photo, SideOf(request)),
                          "image/png");
   });
@@ -389,17 +407,22 @@ void Studio::Parts::Stream(Response& response,
       });
 }
 
-void Studio::Parts::SendArtifact(const Request& request, Response& response) {
-  const std::string job = request.matches[1], name = request.get_param_value("name");
+std::pair<fs::path, std::string> Studio::Parts::FetchArtifact(const std::string& job,
+                                                              const std::string& name) const {
   if (!IsSafeRelativePath(name)) throw InvalidArgument("the name of the file is not possible");
   const fs::path file = SafePathBelow(downloads_.path() / job, name);
-  const std::string type = calls_.Fetch(job, name, file);
+  return {file, calls_.Fetch(job, name, file)};
+}
+
+void Studio::Parts::SendArtifact(const Request& request, Response& response) {
+  const std::string job = request.matches[1], name = request.get_param_value("name");
+  const auto [file, type] = FetchArtifact(job, name);
   if (request.has_param("download")) {
     SetDownloadName(fs::path(name).filename().string(), response);
   } else if (type == "text/html") {
     return AnswerSandboxed(ReadFile(file), response);
   }
-  response.set_content(ReadFile(file), type);
+  AnswerFile(file, type, response);
 }
 
 void Studio::Parts::Serve(const std::function<void(bool entered)>& look) {

@@ -72,7 +72,8 @@ void AnswerException(const std::exception& exception, httplib::Response& respons
 void AddSafetyHeaders(httplib::Response& response) {
   SetOnce(kCsp,
           "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-          "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; "
+          "media-src 'self' blob:; connect-src 'self'; frame-src 'self'; base-uri 'none'; "
+          "form-action 'none'; "
           "frame-ancestors 'none'",
           response);
   SetOnce("Cache-Control", "no-store", response);

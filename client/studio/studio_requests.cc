@@ -58,7 +58,8 @@ Json SetJson(const PhotoSet& set) {
           {"name", set.name},
           {"scene", set.scene.empty() ? "" : IdOf(set.scene)},
           {"created_s", set.created_s},
-          {"is_own", set.is_own}};
+          {"is_own", set.is_own},
+          {"as_frames", set.as_frames}};
 }
 
 RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {

@@ -97,16 +97,16 @@ class Exporter {
       scores_["page"] = ScoresOf(rgb, view_names_);
       playable = EncodePlayable(seen, rgb.harmonics, frame_, context_.pool());
     } else if (in_time_.IsDynamic() && HasViewer() && !page_file_.name.empty()) {
-      context_.Warn("the deformation of this scene is a field: {} shows the time of the key view",
-                    artifact::kViewPage);
+      context_.Warn(
+          "the deformation of this scene is a field: in 3D {} shows the time of the key view, and "
+          "its motion as a movie",
+          artifact::kViewPage);
     }
-    WriteViewPage(scene_,
-                  shown_,
-                  model_,
-                  in_time_.IsDynamic(),
-                  page_file_,
-                  playable ? &*playable : nullptr,
-                  context_);
+    ViewPageContents contents{page_file_, playable ? &*playable : nullptr, {}};
+    if (HasViewer() && !page_file_.name.empty()) {
+      contents.movie = MakePageMovie(scene_, in_time_, context_);
+    }
+    WriteViewPage(scene_, shown_, model_, in_time_.IsDynamic(), std::move(contents), context_);
   }
 
   // The one list of writers.

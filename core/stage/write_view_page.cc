@@ -101,9 +101,9 @@ bool WriteViewPage(const Scene& scene,
                    int key_view,
                    const GaussianModel& model,
                    bool moves,
-                   const ExportedFile& file,
-                   const PlayableScene* playable,
+                   ViewPageContents contents,
                    StageContext& context) {
+  const auto& [file, playable, movie] = contents;
   if (file.name.empty()) return false;
   if (!HasViewer()) {
     context.Warn(
@@ -126,6 +126,7 @@ bool WriteViewPage(const Scene& scene,
   page.focus = FocusOf(key, camera, rendered.median_depth);
   page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);
   page.photos = PhotosOf(scene, key_view, moves, context);
+  page.movie = {movie.bytes, movie.has_sound, movie.shows_motion};
   const std::string html = RenderViewPage(scene, page);
   if (playable != nullptr && html.size() > kLargeBytes) {
     context.Warn("{} has {} MB; fewer Gaussians (max_gaussians) make it smaller",

@@ -16,9 +16,9 @@ TEST_F(StageTest, ViewPageHasTheExportedFile) {
   GaussianModel model = SmallModel();
   model.confidence.assign(model.size(), 0.5f);
   StageContext context = MakeContext();
-  EXPECT_FALSE(WriteViewPage(scene, 1, model, false, {}, nullptr, context));
+  EXPECT_FALSE(WriteViewPage(scene, 1, model, false, {}, context));
   const ExportedFile ply{artifact::kPly, "the bytes of the exported file"};
-  EXPECT_EQ(WriteViewPage(scene, 1, model, false, ply, nullptr, context), HasViewer());
+  EXPECT_EQ(WriteViewPage(scene, 1, model, false, {ply}, context), HasViewer());
   if (!HasViewer()) {
     EXPECT_NE(observer_.text.find("npm"), std::string::npos) << observer_.text;
     return;
@@ -28,7 +28,7 @@ TEST_F(StageTest, ViewPageHasTheExportedFile) {
   EXPECT_NE(html.find(Base64(Gzip("the bytes of the exported file"))), std::string::npos);
   StageContext compressed = MakeContext();
   const ExportedFile sog{artifact::kSog, "the bytes of the smaller file"};
-  ASSERT_TRUE(WriteViewPage(scene, 1, model, false, sog, nullptr, compressed));
+  ASSERT_TRUE(WriteViewPage(scene, 1, model, false, {sog}, compressed));
   EXPECT_NE(ReadFile(scratch_.path() / "out/view.html").find(Base64("the bytes of the smaller")),
             std::string::npos);
   for (const View& view : scene.views) {
@@ -44,7 +44,7 @@ TEST_F(StageTest, ViewPageHasPhotosOfItsTimeOnly) {
   StageContext context = MakeContext();
   const ExportedFile ply{artifact::kPly, "the bytes of the exported file"};
   for (const bool moves : {true, false}) {
-    ASSERT_TRUE(WriteViewPage(scene, 1, SmallModel(), moves, ply, nullptr, context));
+    ASSERT_TRUE(WriteViewPage(scene, 1, SmallModel(), moves, {ply}, context));
     const std::string html = ReadFile(scratch_.path() / "out/view.html");
     for (int i = 0; i < 3; ++i) {
       EXPECT_EQ(html.find("\"name\":\"" + scene.views[i].name) != std::string::npos,

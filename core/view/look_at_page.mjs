@@ -2,7 +2,7 @@
 //   node look_at_page.mjs CHROMIUM PAGE [SCREENSHOTS]
 // state: data-state of the page; note: its text; errors: of the console; requests: other than for
 // what is inside of the page; seen: for each step the mean colours (0..255) of the stage's left and
-// right part. With a third argument every step leaves a PNG there.
+// right part; movie: seconds that the movie of the page has played, and its width. With a third argument every step leaves a PNG there.
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 
@@ -46,10 +46,16 @@ const look = async () => {
   while (await state() === 'loading' && Date.now() - began < 60000) await pause(200);
   const result = { state: await state(), seconds: (Date.now() - began) / 1000, errors, requests };
   result.note = await evaluate('document.getElementById("note").textContent');
+  const movie = 'document.getElementById("movie")';
+  if (await evaluate(`!${movie}.hidden`)) {
+    await pause(1500);
+    result.movie = await evaluate(`({ seconds: ${movie}.currentTime, width: ${movie}.videoWidth })`);
+  }
   const steps = {
     color: '', gray: '[data-shades="1"]', where_from: '[data-shades="2"]',
     back_in_color: '[data-shades="0"]', photo: '#compare',
   };
+  if (await evaluate('!document.getElementById("see-movie").hidden')) steps.film = '#see-movie';
   result.seen = {};
   for (const [name, button] of Object.entries(steps)) {
     if (button) await evaluate(`document.querySelector('${button}').click()`);

@@ -3,7 +3,7 @@
 //   node play_page.mjs CHROMIUM PAGE FOLDER WIDTH HEIGHT STOP...
 // The stage gets WIDTH x HEIGHT px. FOLDER gets the stage at each STOP of the time slider as
 // STOP.png, and once more while the scene plays as playing.png. clocks: the text of the clock at each stop; keys: what keys
-// changed; heap: bytes of JavaScript after the second and after the tenth of ten loops; errors,
+// changed; heard: how the sound runs along; heap: bytes of JavaScript after the second and after the tenth of ten loops; errors,
 // requests: as look_at_page.mjs. A page of a still scene takes no stops: still.png.
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
@@ -67,6 +67,26 @@ const playLoops = async (count) => {
   return evaluate('window.seenLoops');
 };
 
+// Largest distance of the sound from the picture, as shares of the time, while it plays at speed 1; and whether the
+// button switches it off.
+const hear = async () => {
+  const sound = 'document.getElementById("heard")';
+  await evaluate('document.getElementById("speed").value = "1"');
+  let apart = 0;
+  for (let i = 0; i < 20; ++i) {
+    await pause(60);
+    const share = await evaluate(`(() => {
+      const moment = document.getElementById('moment'), facts = JSON.parse(document.getElementById('facts').textContent);
+      return Math.abs(moment.value / moment.max - ${sound}.currentTime / facts.motion.seconds);
+    })()`);
+    if (share < 0.5) apart = Math.max(apart, share);  // else it loops just now
+  }
+  const plays = await evaluate(`!${sound}.paused`);
+  await evaluate('document.getElementById("sound").click()');
+  await pause(300);
+  return { apart, plays, stops: await evaluate(`${sound}.paused`) };
+};
+
 const look = async () => {
   await open();
   await send('Performance.enable');
@@ -102,6 +122,7 @@ const look = async () => {
   await playLoops(2);
   const before = await heap();
   result.loops = await playLoops(8);
+  if (await evaluate('!document.getElementById("sound").hidden')) result.heard = await hear();
   result.heap = [before, await heap()];
   save('playing', await picture());
   await key(' ');

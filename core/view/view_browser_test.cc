@@ -8,6 +8,7 @@
 #include "core/image/codec.h"
 #include "core/splat/export/export.h"
 #include "core/splat/export/sog/sog.h"
+#include "core/video/mp4_writer.h"
 #include "core/view/browser_fixture.h"
 #include "core/view/view_page.h"
 
@@ -76,8 +77,11 @@ Scene WallScene() {
   return scene;
 }
 
-std::string PageOfWall(const ScratchFolder& folder, const std::string& file_name) {
+std::string PageOfWall(const ScratchFolder& folder,
+                       const std::string& file_name,
+                       const ViewPageMovie& movie = {}) {
   ViewPage page;
+  page.movie = movie;
   TakeWall(file_name, &page);
   page.focus = {0.0, 0.0, 2.0};
   page.poster = EncodeJpeg(Image(120, 80, 3, 0.5f));
@@ -91,8 +95,21 @@ std::string PageOfWall(const ScratchFolder& folder, const std::string& file_name
 class BrowserTest : public BrowserFixture {
  protected:
   nlohmann::json Look(const std::string& file_name,
-                      const std::vector<std::string>& environment = {}) {
-    return RunInBrowser(COLOR3D_LOOK_AT_PAGE, PageOfWall(scratch_, file_name), {}, environment);
+                      const std::vector<std::string>& environment = {},
+                      const ViewPageMovie& movie = {}) {
+    return RunInBrowser(
+        COLOR3D_LOOK_AT_PAGE, PageOfWall(scratch_, file_name, movie), {}, environment);
+  }
+  // Two seconds of green.
+  ViewPageMovie GreenMovie(bool shows_motion) {
+    ThreadPool pool(1);
+    const auto file = scratch_.path() / "green.mp4";
+    Mp4Writer writer(file, {.width = 120, .height = 80, .frames_per_second = 10});
+    Image green(120, 80, 3, 0.1f);
+    for (int i = 0; i < 120 * 80; ++i) green.data[120 * 80 + i] = 0.8f;
+    for (int i = 0; i < 20; ++i) writer.Add(green, pool);
+    writer.Finish();
+    return {ReadFile(file), false, shows_motion};
   }
 };
 
@@ -143,6 +160,27 @@ TEST_F(BrowserTest, ShowsPictureWithoutWebGl) {
   EXPECT_NE(looked.at("note").get<std::string>().find("picture"), std::string::npos);
   const auto poster = Seen(looked, "color", "left");
   EXPECT_NEAR(poster[0], 128, 6);
+}
+
+TEST_F(BrowserTest, PlaysMovieWithoutWebGl) {
+  const nlohmann::json looked =
+      Look("scene.sog", {"COLOR3D_BROWSER_FLAGS=--disable-3d-apis"}, GreenMovie(false));
+  SCOPED_TRACE(looked.dump(1));
+  EXPECT_EQ(looked.at("state"), "failed");
+  EXPECT_NE(looked.at("note").get<std::string>().find("movie"), std::string::npos);
+  EXPECT_GT(looked.at("movie").at("seconds"), 0.3);
+  EXPECT_EQ(looked.at("movie").at("width"), 120);
+  const auto green = Seen(looked, "color", "left");
+  EXPECT_GT(green[1], green[0] + 80);
+}
+
+TEST_F(BrowserTest, SaysWhyMotionOfAFieldDoesNotPlay) {
+  const nlohmann::json looked = Look("scene.sog", {}, GreenMovie(true));
+  SCOPED_TRACE(looked.dump(1));
+  ASSERT_EQ(looked.at("state"), "ready");
+  EXPECT_TRUE(looked.at("errors").empty());
+  EXPECT_NE(looked.at("note").get<std::string>().find("stands at one moment"), std::string::npos);
+  EXPECT_GT(Seen(looked, "film", "left")[1], Seen(looked, "film", "left")[0] + 80);
 }
 
 }  // namespace

@@ -11,7 +11,9 @@
 #include "core/splat/export/sog/sog.h"
 #include "core/splat/motion/geometry_in_time.h"
 #include "core/splat/raster/render.h"
+#include "core/video/mp4_writer.h"
 #include "core/view/browser_fixture.h"
+#include "tests/support/formats/sound_film.h"
 
 namespace color3d {
 namespace {
@@ -142,6 +144,18 @@ class ViewMotionTest : public BrowserFixture {
     return RunInBrowser(COLOR3D_PLAY_PAGE, page, arguments);
   }
 
+  // Grey pictures with a tone, as long as the motion.
+  ViewPageMovie Film() {
+    const auto silent = scratch_.path() / "silent.mp4", film = scratch_.path() / "film.mp4";
+    Mp4Writer writer(silent, {.width = 64, .height = 48, .frames_per_second = 10});
+    for (int i = 0; i < 21; ++i) writer.Add(Image(64, 48, 3, 0.5f), pool_);
+    writer.Finish();
+    AddSound(silent,
+             {.seconds = 2.1, .level = [](double t) { return 0.3 * std::sin(2765.0 * t); }},
+             film);
+    return {ReadFile(film), true, true};
+  }
+
   Image Seen(const std::string& name) const {
     return DecodeImage(ReadFile(pictures_ + "/" + name + ".png"), name + ".png");
   }
@@ -170,6 +184,7 @@ TEST_F(ViewMotionTest, PlaysAsOurRendererDraws) {
   page.motion->seconds = kEndS;
   page.motion->steps = kTimeSteps;
   page.motion->film = {0, 1, 2, 3, 4};
+  page.movie = Film();
   const std::vector<int> steps = {0, 1, 2, 4};
   std::vector<std::string> stops;
   for (const int step : steps) stops.push_back(std::to_string(kStopsOfStep * step));
@@ -186,6 +201,9 @@ TEST_F(ViewMotionTest, PlaysAsOurRendererDraws) {
   EXPECT_EQ(played.at("keys").at("space_pauses"), "false");
   EXPECT_EQ(played.at("keys").at("pause_holds"), true);
   EXPECT_GE(played.at("loops"), 8);
+  EXPECT_LT(played.at("heard").at("apart"), 0.2);  // of 2 s, in a browser that draws without a GPU
+  EXPECT_EQ(played.at("heard").at("plays"), true);
+  EXPECT_EQ(played.at("heard").at("stops"), true);
   const double before = played.at("heap").at(0), after = played.at("heap").at(1);
   EXPECT_LT(after, 1.05 * before + 500'000);
 

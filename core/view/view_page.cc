@@ -135,6 +135,9 @@ std::string Facts(const Scene& scene, const ViewPage& page) {
       {"about", fmt::format(kAbout, ViewerName(), ViewerLicense())},
       {"photos", std::move(photos)}};
   if (page.motion) facts["motion"] = MotionJson(scene, placement, *page.motion);
+  if (!page.movie.bytes.empty()) {
+    facts["movie"] = {{"sound", page.movie.has_sound}, {"moves", page.movie.shows_motion}};
+  }
   return InHtml(facts);
 }
 
@@ -152,12 +155,14 @@ std::string RenderViewPage(const Scene& scene, const ViewPage& page) {
   const std::string facts = Facts(scene, page);
   const std::string program = Base64(ViewerProgram());
   const std::string motion = page.motion ? Base64(Gzip(page.motion->file)) : "";
+  const std::string movie = Base64(page.movie.bytes);
   std::string player = fmt::format("{}\n{}", PageShadingScript(), PageFramedScript());
   if (page.motion) player += fmt::format("\n{}\n{}", PageMotionScript(), PagePlayerScript());
   const std::pair<std::string_view, std::string_view> parts[] = {{"@STYLE@", PageStyle()},
                                                                  {"@FACTS@", facts},
                                                                  {"@SCENE@", scene_text},
                                                                  {"@MOTION@", motion},
+                                                                 {"@MOVIE@", movie},
                                                                  {"@PROGRAM@", program},
                                                                  {"@PLAYER@", player},
                                                                  {"@SCRIPT@", PageScript()}};

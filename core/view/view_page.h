@@ -32,6 +32,14 @@ struct ViewPageMotion {
   std::vector<int> film;        // views of the film of the key view's camera, in order of time
 };
 
+// A small MP4 that the page shows where it cannot draw the scene; its sound goes along with the
+// motion.
+struct ViewPageMovie {
+  std::string bytes;  // empty: none
+  bool has_sound = false;
+  bool shows_motion = false;  // else the scene stands, and the camera turns
+};
+
 struct ViewPage {
   // The exported file and the transform of its coordinates: file = scale * scene + offset.
   std::string file_name;  // its extension gives the format: .ply, .sog
@@ -46,6 +54,7 @@ struct ViewPage {
   Eigen::Vector3d focus = Eigen::Vector3d::Zero();  // its focus, in the scene's units
   std::string poster;                               // JPEG of the scene from the key view
   std::optional<ViewPageMotion> motion;             // nullopt: a still scene
+  ViewPageMovie movie;
   std::vector<ViewPagePhoto> photos;
 };
 

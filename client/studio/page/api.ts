@@ -6,7 +6,7 @@ export class StudioError extends Error {
   }
 }
 
-export interface PhotoSet { id: string; name: string; scene: string; created_s: number; is_own: boolean }
+export interface PhotoSet { id: string; name: string; scene: string; created_s: number; is_own: boolean; as_frames: boolean }
 export interface FoundPhoto { name: string; width?: number; height?: number; problem?: string }
 export interface Found {
   kind: string; name: string; bytes: number; has_poses: boolean; in_color: boolean | null;
@@ -120,3 +120,6 @@ export const follow = (
   };
   return () => source.close();
 };
+
+// For the calls of film/.
+export { get as getJson, post as postJson, query };

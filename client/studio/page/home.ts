@@ -2,6 +2,7 @@
 import { getState, makeSet, photoUrl, sendFile, describeSet, type Job, type PhotoSet } from './api';
 import { bar, button, h, problem, replace, say } from './dom';
 import { filesOfDrop, filesOfInput, type Drop } from './drops';
+import { frameUrl } from './film/film_api';
 import { queueView } from './queue/queue';
 import { bytes, day, isFinished, stateName } from './words';
 
@@ -44,6 +45,7 @@ const card = (set: PhotoSet | undefined, job: Job | undefined): HTMLElement => {
   if (set) {
     void describeSet(set.id).then(({ found }) => {
       const first = found.photos.find((photo) => photo.name === job?.key_view) ?? found.photos[0];
+      if (!first && found.kind === 'film') picture.append(h('img', { src: frameUrl(set.id, 'f000000', 320, false), alt: '', loading: 'lazy' }));
       if (first) picture.append(h('img', { src: photoUrl(set.id, first.name, 320), alt: '', loading: 'lazy' }));
     }).catch(() => undefined);
   }

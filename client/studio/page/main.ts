@@ -1,6 +1,7 @@
 // The studio's page: which part is shown follows the address (#set/ID, #key/ID, #job/ID, #sheet/ID).
 import { stayAlive } from './alive';
 import { h, problem, replace } from './dom';
+import { showFilm } from './film/film';
 import { showHome } from './home';
 import { showKey } from './key';
 import { showPhotos } from './photos';
@@ -16,6 +17,7 @@ const pages: Record<string, { show: Show; step: number }> = {
   key: { show: showKey, step: 2 },
   job: { show: showRun, step: 3 },
   sheet: { show: showSheet, step: 3 },
+  film: { show: showFilm, step: 0 },
 };
 const stepNames = ['Photos', 'Colours', 'Scene'];
 

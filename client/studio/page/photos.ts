@@ -1,6 +1,7 @@
 // What was found in the photos and what will be done.
 import { describeSet, photoUrl, planRun, type Found, type FoundPhoto, type Plan } from './api';
 import { button, h, problem, replace, say } from './dom';
+import { setAsFrames } from './film/film_api';
 import { bytes, kindName, seconds, stageName } from './words';
 
 const shownAtFirst = 24;
@@ -23,6 +24,10 @@ const facts = (found: Found): HTMLElement => {
     : [fact('Found', `${kindName(found.kind)}, ${bytes(found.bytes)}`)];
   return h('dl', { class: 'facts' }, ...rows);
 };
+
+// Pictures of one size with numbers in their names.
+const mayBeFrames = (found: Found): boolean => found.kind === 'photos' && found.photos.length > 2
+  && found.photos.every(({ name, width, height }) => /\d[^/]*$/.test(name) && width === found.photos[0]!.width && height === found.photos[0]!.height);
 
 const grid = (set: string, photos: FoundPhoto[]): HTMLElement => {
   const list = h('ul', { class: 'thumbs' });
@@ -53,11 +58,23 @@ export const showPhotos = (main: HTMLElement, set: string): (() => void) => {
   const body = h('div', { class: 'stack' }, h('p', { class: 'soft' }, 'Looking at the photos …'));
   const title = h('h1', {}, 'Photos');
   replace(main, title, body);
+  const asFilm = async (): Promise<void> => {
+    try {
+      await setAsFrames(set, true);
+      location.hash = `film/${set}`;
+    } catch (error) {
+      body.append(problem((error as Error).message));
+    }
+  };
   const load = async (): Promise<void> => {
     try {
       const { name, found } = await describeSet(set);
       if (left) return;
       isLooking = false;
+      if (found.kind === 'film') {
+        location.replace(`#film/${set}`);
+        return;
+      }
       title.textContent = name;
       const bad = found.photos.filter((photo) => photo.problem);
       const plan = h('div', {});
@@ -66,7 +83,7 @@ export const showPhotos = (main: HTMLElement, set: string): (() => void) => {
         facts(found),
         found.notes.length > 0 && h('div', { class: 'note' }, h('h2', {}, 'Worth knowing'), h('ul', {}, ...found.notes.map((note) => h('li', {}, note)))),
         bad.length > 0 && problem(`${bad.length === 1 ? 'One photo cannot' : `${bad.length} photos cannot`} be used. Take ${bad.length === 1 ? 'it' : 'them'} out and drop the others again.`),
-        plan, h('p', { class: 'row' }, bad.length === 0 && go), found.photos.length > 0 && grid(set, found.photos));
+        plan, h('p', { class: 'row' }, bad.length === 0 && go, mayBeFrames(found) && button('These are the frames of a film', () => void asFilm(), { id: 'as-film' })), found.photos.length > 0 && grid(set, found.photos));
       say(`${found.photos.length} photos found`);
       replace(plan, planTable(await planRun(set, 'fast')));
     } catch (error) {

@@ -167,6 +167,12 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     void showShare(run);
     main.dataset.state = 'done';
   };
+  // Films have a page of their own.
+  void getState().then(async ({ sets, jobs }) => {
+    const job = jobs.find((one) => one.id === id);
+    const own = job && sets.find((one) => one.scene === job.scene);
+    if (own && (await describeSet(own.id)).found.kind === 'film' && !left) location.replace(`#film/${own.id}/${id}`);
+  }).catch(() => undefined);
   // A service that went away is started again, or comes back: the page goes on by itself.
   let timer: number | undefined;
   const watch = (): void => {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -271,13 +272,60 @@ Mp4Options MovieOf(const RenderOptions& options,
   return movie;
 }
 
+constexpr char kOtherCodec[] = "mpeg4";  // FFmpeg's own, for machines without H.264
+
 void WarnOf(const Mp4Writer& movie, StageContext& context) {
-  if (movie.encoder() == "mpeg4") {
+  if (movie.encoder() == kOtherCodec) {
     context.Warn(
         "this machine's libavcodec has no H.264 encoder (libx264): the movie is MPEG-4 part 2, "
         "which browsers do not show");
   }
   if (!movie.sound_warning().empty()) context.Warn(movie.sound_warning());
+}
+
+// The frames of a movie, the time of each, and how they are encoded.
+struct Filming {
+  std::vector<PathCamera> frames;
+  std::optional<FilmClock> clock;
+  Mp4Options movie;
+};
+
+Filming FilmingOf(const RenderOptions& options,
+                  const Scene& scene,
+                  const GaussianModel& model,
+                  StageContext& context) {
+  if (!scene.HasTimes() && (options.path == RenderOptions::Path::kStill || options.time_s)) {
+    throw InvalidArgument("this scene has no times: path still and time_s need a dynamic scene");
+  }
+  const int home = HomeView(scene, context);
+  Filming filming{.frames = FramesOf(options, scene, home, model, context)};
+  filming.clock = ClockOfScene(options, scene, filming.frames, context);
+  filming.movie = MovieOf(options, scene, home, filming.frames, filming.clock, context);
+  return filming;
+}
+
+// Renders all frames, and passes each to `movie`, if there is one, and to `on_picture`.
+void Shoot(const Filming& filming,
+           const GaussianModel& model,
+           Mp4Writer* movie,
+           const std::function<void(int64_t, const Image&)>& on_picture,
+           StageContext& context) {
+  const int64_t count = std::ssize(filming.frames);
+  for (int64_t i = 0; i < count; ++i) {
+    context.ThrowIfCancelled();
+    const PathCamera& frame = filming.frames[i];
+    const Image srgb = SrgbFromLab(
+        RenderView(model, frame.camera, frame.cam_from_world, context.pool(), 0.0f, frame.time_s)
+            .lab);
+    if (movie != nullptr && filming.clock) {
+      movie->AddAt(filming.clock->time_s[i], filming.clock->seconds[i], srgb, context.pool());
+    } else if (movie != nullptr) {
+      movie->Add(srgb, context.pool());
+    }
+    on_picture(i, srgb);
+    context.ReportProgress(i + 1, count, "rendering frames");
+  }
+  if (movie != nullptr) movie->Finish();
 }
 
 }  // namespace
@@ -286,45 +334,39 @@ void RenderMovie(const RenderOptions& options,
                  const Scene& scene,
                  const GaussianModel& model,
                  StageContext& context) {
-  if (!scene.HasTimes() && (options.path == RenderOptions::Path::kStill || options.time_s)) {
-    throw InvalidArgument("this scene has no times: path still and time_s need a dynamic scene");
-  }
-  const int home = HomeView(scene, context);
-  const std::vector<PathCamera> frames = FramesOf(options, scene, home, model, context);
-  if (options.pictures && frames.size() > kMaxMoviePictures) {
+  const Filming filming = FilmingOf(options, scene, model, context);
+  if (options.pictures && filming.frames.size() > kMaxMoviePictures) {
     throw InvalidArgument(
         "{} frames are too many to keep as pictures; the limit is {}: ask for "
         "fewer frames, or for the video only",
-        frames.size(),
+        filming.frames.size(),
         kMaxMoviePictures);
   }
   const std::filesystem::path file = context.scratch_folder() / artifact::kMovie;
-  const std::optional<FilmClock> clock = ClockOfScene(options, scene, frames, context);
   std::optional<Mp4Writer> movie;
   if (options.video) {
-    movie.emplace(file, MovieOf(options, scene, home, frames, clock, context));
+    movie.emplace(file, filming.movie);
     WarnOf(*movie, context);
   }
-  const int64_t count = std::ssize(frames);
-  for (int64_t i = 0; i < count; ++i) {
-    context.ThrowIfCancelled();
-    const PathCamera& frame = frames[i];
-    const Image srgb = SrgbFromLab(
-        RenderView(model, frame.camera, frame.cam_from_world, context.pool(), 0.0f, frame.time_s)
-            .lab);
-    if (movie && clock) {
-      movie->AddAt(clock->time_s[i], clock->seconds[i], srgb, context.pool());
-    } else if (movie) {
-      movie->Add(srgb, context.pool());
-    }
-    if (options.pictures) {
-      context.WriteOutput(fmt::format("{}{:05}.png", artifact::kFrames, i + 1), EncodePng8(srgb));
-    }
-    context.ReportProgress(i + 1, count, "rendering frames");
-  }
-  if (!movie) return;
-  movie->Finish();
-  context.MoveOutput(artifact::kMovie, file);
+  const auto keep = [&](int64_t i, const Image& srgb) {
+    if (!options.pictures) return;
+    context.WriteOutput(fmt::format("{}{:05}.png", artifact::kFrames, i + 1), EncodePng8(srgb));
+  };
+  Shoot(filming, model, movie ? &*movie : nullptr, keep, context);
+  if (movie) context.MoveOutput(artifact::kMovie, file);
+}
+
+bool RenderMovieFile(const RenderOptions& options,
+                     const Scene& scene,
+                     const GaussianModel& model,
+                     const std::filesystem::path& file,
+                     StageContext& context) {
+  const Filming filming = FilmingOf(options, scene, model, context);
+  Mp4Writer movie(file, filming.movie);
+  if (movie.encoder() == kOtherCodec) return false;
+  Shoot(
+      filming, model, &movie, [](int64_t, const Image&) {}, context);
+  return true;
 }
 
 }  // namespace color3d

@@ -1,6 +1,8 @@
 // Renders a scene along a camera path, as a movie or as pictures. For the render stage only.
 #pragma once
 
+#include <filesystem>
+
 #include "core/scene/scene.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/context/stage_context.h"
@@ -15,5 +17,13 @@ void RenderMovie(const RenderOptions& options,
                  const Scene& scene,
                  const GaussianModel& model,
                  StageContext& context);
+
+// Writes the movie alone, to `file`. Returns false if this machine encodes no H.264, which browsers
+// play; there may be a file of another codec then. Throws as RenderMovie.
+bool RenderMovieFile(const RenderOptions& options,
+                     const Scene& scene,
+                     const GaussianModel& model,
+                     const std::filesystem::path& file,
+                     StageContext& context);
 
 }  // namespace color3d

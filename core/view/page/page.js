@@ -182,6 +182,37 @@ const placeCamera = () => {
   if (t < 1) viewer.app.renderNextFrame = true;
 };
 
+// ---- the movie in the page ----------------------------------------------------------------------
+let movieUrl = null;
+const movieAddress = async () => {
+  if (!movieUrl) {
+    const bytes = await (await bytesOf($('movie-file').textContent)).arrayBuffer();
+    movieUrl = URL.createObjectURL(new Blob([bytes], { type: 'video/mp4' }));
+  }
+  return movieUrl;
+};
+const showMovie = async (on) => {
+  const movie = $('movie');
+  if (on && !movie.src) movie.src = await movieAddress();
+  movie.hidden = !on;
+  press($('see-movie'), on);
+  if (on) movie.play().catch(() => {});  // where pages may not play by themselves, people do
+  else movie.pause();
+};
+// What moves here cannot be played in 3D: it follows a field, not windows of time.
+const wireMovie = () => {
+  if (!facts.movie || !facts.movie.moves || facts.motion) return;
+  const button = $('see-movie');
+  button.hidden = false;
+  button.onclick = () => {
+    const on = button.getAttribute('aria-pressed') !== 'true';
+    showMovie(on);
+    say(on ? 'The film, drawn from the scene' : kStands);
+  };
+};
+const kStands = 'This scene moves in a way that cannot be played in 3D here: it stands at one moment. ' +
+  'Film shows how it moves';
+
 const fillPhotos = () => {
   photos.forEach((photo, index) => {
     const button = document.createElement('button');
@@ -359,13 +390,15 @@ const start = async () => {
   });
   viewer.app.on('update', placeCamera);
   if (player) viewer.app.scene.on('gsplat:sorted', player.onSorted);
-  viewer.events.on('loaded:changed', () => {
+  viewer.events.on('loaded:changed', async () => {
     viewer.state.cameraMode = 'orbit';
     wireButtons();
-    if (player) player.wire();
+    if (player) player.wire(facts.movie && facts.movie.sound ? await movieAddress() : null);
+    wireMovie();
     goTo(facts.key, { glide: false });
     if (window.parent !== window) frame = color3dFramed.connect(hooksOfFrame());
-    say('Drag to turn, wheel or pinch to come nearer, right drag or two fingers to move');
+    say(facts.movie && facts.movie.moves && !facts.motion ? kStands
+      : 'Drag to turn, wheel or pinch to come nearer, right drag or two fingers to move');
     document.body.dataset.state = 'ready';
   });
   hand(packed($('scene').textContent));
@@ -374,7 +407,8 @@ const start = async () => {
 const fail = (error) => {
   document.body.dataset.state = 'failed';
   for (const button of document.querySelectorAll('nav button:not(#info)')) button.disabled = true;
-  say(`${error.message || error}. Here is a picture from the key view instead.`);
+  say(`${error.message || error}. Here is a ${facts.movie ? 'movie' : 'picture from the key view'} instead.`);
+  if (facts.movie) showMovie(true);
 };
 start().catch(fail);
 })();

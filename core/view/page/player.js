@@ -43,9 +43,23 @@ const showShare = (value, fromSlider = false) => {
   again = 1;
 };
 
+// The sound of the film runs along: it is set right when it is off by more than kHeard seconds.
+const kHeard = 0.15;
+let sound = null;
+const hear = () => {
+  if (!sound) return;
+  const now = share * facts.seconds;
+  const on = playing && pressed($('sound'));
+  sound.playbackRate = Number($('speed').value);
+  if (Math.abs(sound.currentTime - now) > kHeard * Math.max(1, sound.playbackRate)) sound.currentTime = now;
+  if (on && sound.paused && !sound.ended) sound.play().catch(() => {});
+  else if (!on && !sound.paused) sound.pause();
+};
+
 const play = (on) => {
   if (on && share >= 1) showShare(0);
   playing = on;
+  hear();
   last = performance.now();
   press($('play'), on);
   $('play').textContent = on ? 'Pause' : 'Play';
@@ -73,6 +87,7 @@ const tick = () => {
       showShare(1);
       play(false);
     }
+    hear();
   }
   last = now;
   sort(now);
@@ -119,8 +134,18 @@ const camera = () => {
            tan: (1 - part) * from.tan + part * to.tan, center: mix(from.center, to.center) };
 };
 
-const wire = () => {
+// `soundAddress`: of the film's sound; null: it has none.
+const wire = (soundAddress) => {
   $('time').hidden = false;
+  $('sound').hidden = !soundAddress;
+  if (soundAddress) {
+    sound = $('heard');
+    sound.src = soundAddress;
+    $('sound').onclick = () => {
+      press($('sound'), !pressed($('sound')));
+      hear();
+    };
+  }
   slider.oninput = () => {
     play(false);
     showShare(slider.value / slider.max, true);
