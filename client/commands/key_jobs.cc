@@ -83,6 +83,7 @@ std::string DescribeSource(const v1::Job& job) {
   if (field->cpp_type() == google::protobuf::FieldDescriptor::CPPTYPE_STRING) {
     text += " \"" + source.GetReflection()->GetString(source, field) + "\"";
   }
+  if (source.has_points_above()) text += ", points above it";
   return text;
 }
 

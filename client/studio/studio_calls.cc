@@ -4,6 +4,7 @@
 #include <chrono>
 
 #include "client/commands/follow.h"
+#include "client/commands/key_jobs.h"
 #include "client/commands/results.h"
 #include "client/lib/blob_transfer.h"
 #include "client/lib/job_watch.h"
@@ -101,6 +102,48 @@ std::string LivePng(Connection& connection,
   return png;
 }
 
+KeyColorFlags FlagsOf(const ColorChoice& color, const std::filesystem::path& strokes) {
+  KeyColorFlags flags;
+  flags.hints = strokes;
+  switch (color.from) {
+    case ColorChoice::From::kNothing:
+      break;
+    case ColorChoice::From::kAutomatic:
+      flags.automatic = true;
+      break;
+    case ColorChoice::From::kPicture:
+      flags.image = color.picture;
+      break;
+    case ColorChoice::From::kReference:
+      flags.references = {color.picture};
+      break;
+    case ColorChoice::From::kWords:
+      flags.prompt = color.words;
+      break;
+  }
+  return flags;
+}
+
+// Weights that understand words, by their name on the server.
+std::string ModelOfWords(Connection& connection) {
+  for (const v1::ModelInfo& model : GetServerInfo(connection).models()) {
+    if (model.kind() == "clip") return model.name();
+  }
+  throw Error(ErrorCode::kFailedPrecondition,
+              "this service has no model that understands words; start it with --model NAME=FILE, "
+              "the weights of CLIP, or choose another source of colours");
+}
+
+// Uploads what the choice names. `strokes`: file with its strokes; empty: without them.
+v1::KeyColorSource SourceOf(Connection& connection,
+                            const ColorChoice& color,
+                            const std::filesystem::path& strokes) {
+  KeyColorFlags flags = FlagsOf(color, strokes);
+  if (color.from == ColorChoice::From::kWords) flags.model = ModelOfWords(connection);
+  flags.Check();
+  return UploadKeyColor(connection, flags);
+}
+
 // The stage of a run that coloured its key view; nullopt if it has not ended yet.
 std::optional<v1::Job> ColoredKey(Connection& connection, const v1::Job& run) {
   std::vector<v1::Job> jobs = ListChildren(connection, run.name());
@@ -119,9 +162,11 @@ std::optional<v1::Job> ColoredKey(Connection& connection, const v1::Job& run) {
 Json StudioCalls::ServerFacts() const {
   Connection connection = Connect();
   const v1::ServerInfo info = GetServerInfo(connection);
+  const bool knows_words = std::ranges::any_of(
+      info.models(), [](const v1::ModelInfo& model) { return model.kind() == "clip"; });
   Json presets = Json::array();
   for (const v1::PresetInfo& preset : info.presets()) presets.push_back(preset.name());
-  return {{"version", info.version()}, {"address", connection.address()}, {"presets", presets}};
+  return {{"version", info.version()}, {"address", connection.address()}, {"presets", presets}, {"knows_words", knows_words}};
 }
 
 Json StudioCalls::Plan(const PhotoFolder& folder, const RunChoices& choices) const {
@@ -181,17 +226,14 @@ Json StudioCalls::KeyViews(const std::string& job) const {
 }
 
 v1::Job StudioCalls::Colorize(const std::string& scene, const RunChoices& choices) const {
-  KeyColorFlags color;
-  color.automatic = choices.automatic;
-  if (!choices.automatic) (choices.is_strokes ? color.hints : color.image) = choices.picture;
-  color.Check();
-  if (!choices.automatic && choices.key_view.empty()) {
+  if (choices.color.from != ColorChoice::From::kAutomatic && choices.key_view.empty()) {
     throw InvalidArgument("choose the photo that the colours belong to");
   }
   Connection connection = Connect();
   v1::JobSpec spec = ColorizeSpec(OptionsOf(choices), ResourceName(scene, "scenes"));
   spec.mutable_colorize_scene()->set_key_view(choices.key_view);
-  *spec.mutable_colorize_scene()->mutable_key_color() = UploadKeyColor(connection, color);
+  *spec.mutable_colorize_scene()->mutable_key_color() =
+      SourceOf(connection, choices.color, choices.strokes_file);
   return SubmitJob(connection, spec);
 }
 
@@ -295,17 +337,54 @@ std::string StudioCalls::PreviewOfRun(const std::string& job,
   return LivePng(connection, source, {photo.path, photo.file, std::nullopt}, max_side_px);
 }
 
-std::string StudioCalls::PreviewOfStrokes(const LocalFile& photo,
-                                          const std::string& strokes,
-                                          int max_side_px) const {
-  const ScratchFolder scratch;
-  const SmallPhoto small = MakeSmallPhoto(photo, max_side_px);
-  const auto file = scratch.path() / "photo.png";
-  WriteFileAtomic(file, small.png);
-  LiveSource source;
-  source.points = ScaleStrokes(strokes, small.scale);
+std::string StudioCalls::Preview(const LocalFile& photo,
+                                 const ColorChoice& color,
+                                 const std::string& made_by,
+                                 int max_side_px) const {
+  using From = ColorChoice::From;
   Connection connection = Connect();
-  return LivePng(connection, source, {photo.path, file, std::nullopt}, 0);
+  LiveSource source;
+  source.points = color.strokes;
+  source.automatic = color.from == From::kAutomatic;
+  if (color.from == From::kReference || color.from == From::kWords) {
+    const v1::Job made = GetJob(connection, ResourceName(made_by, "jobs"));
+    source.below = FindArtifact(made, artifact::kKeyViewColored).digest();
+  }
+  const auto ask = [&] {
+    if (color.from == From::kPicture) source.below = blobs_.Of(connection, color.picture);
+    const v1::Digest digest = blobs_.Of(connection, photo.file);
+    return LivePng(connection, source, {photo.path, {}, digest}, max_side_px);
+  };
+  try {
+    return ask();
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::kNotFound && e.code() != ErrorCode::kFailedPrecondition) throw;
+    blobs_.Forget();  // another service, or it has removed what nothing used
+    return ask();
+  }
+}
+
+v1::Job StudioCalls::ColorBelow(const std::string& scene,
+                                const std::string& view,
+                                const ColorChoice& color) const {
+  if (view.empty()) throw InvalidArgument("choose the photo that the colours belong to");
+  Connection connection = Connect();
+  v1::JobSpec select;
+  select.set_scene(ResourceName(scene, "scenes"));
+  select.mutable_select_key_view()->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+  select.mutable_select_key_view()->set_view(view);
+  v1::JobSpec spec;
+  spec.set_scene(select.scene());
+  *spec.mutable_colorize_key_view()->mutable_source() = SourceOf(connection, color, {});
+  const v1::Job selected = SubmitJob(connection, select);
+  for (const std::string& input : JobAndInputs(connection, selected)) spec.add_inputs(input);
+  return SubmitJob(connection, spec);
+}
+
+Connection StudioCalls::Connect() const {
+  const MutexLock lock(mutex_);
+  if (!kept_ || !kept_->IsAlive()) kept_ = std::make_unique<const Connection>(server_, cancel_);
+  return kept_->Share();
 }
 
 }  // namespace color3d::client

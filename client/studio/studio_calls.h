@@ -1,29 +1,40 @@
 // What the page asks of the service, one function each: the same calls as the commands make.
-// Thread-safe; each function makes its own connection, so that a server that ended is found or
-// started again.
+// Thread-safe; all functions share one channel, and a server that ended is found or started again.
 #pragma once
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/lib/connection.h"
 #include "client/lib/photos/photo_folder.h"
+#include "client/studio/kept_blobs.h"
 #include "client/studio/photo_sets.h"
 #include "color3d/v1/job.pb.h"
+#include "core/base/mutex.h"
 
 namespace color3d::client {
+
+// Where the colours of a key photo come from, and strokes above them.
+struct ColorChoice {
+  enum class From { kNothing, kAutomatic, kPicture, kReference, kWords };
+  From from = From::kAutomatic;
+  std::filesystem::path picture;  // kPicture: the photo, coloured; kReference: another picture
+  std::string words;              // kWords
+  std::string strokes;            // JSON as for `key color --hints`; empty: none
+};
 
 // What the page chose for a run.
 struct RunChoices {
   std::string preset = "fast";
-  std::string key_view;              // empty: the service selects it
-  bool automatic = true;             // else `picture`
-  std::filesystem::path picture;     // a coloured key view, or its strokes
-  bool is_strokes = false;           // `picture` holds points as JSON, as for `key color --hints`
-  double time_budget_seconds = 0.0;  // 0: none
+  std::string key_view;  // empty: the service selects it
+  ColorChoice color;
+  std::filesystem::path strokes_file;  // `color.strokes`; empty: none
+  double time_budget_seconds = 0.0;    // 0: none
 };
 
 class StudioCalls {
@@ -31,7 +42,7 @@ class StudioCalls {
   StudioCalls(ServerTarget server, const CancellationToken& cancel)
       : server_(std::move(server)), cancel_(cancel) {}
 
-  Connection Connect() const { return Connection(server_, cancel_); }
+  Connection Connect() const;
 
   nlohmann::ordered_json ServerFacts() const;
   nlohmann::ordered_json Plan(const PhotoFolder& folder, const RunChoices& choices) const;
@@ -64,14 +75,23 @@ class StudioCalls {
 
   // Colours a photo at screen size as PNG, from the coloured key view of a run.
   std::string PreviewOfRun(const std::string& job, const LocalFile& photo, int max_side_px) const;
-  // The same from strokes on this photo (JSON of `key color --hints`, px of the whole photo).
-  std::string PreviewOfStrokes(const LocalFile& photo,
-                               const std::string& strokes,
-                               int max_side_px) const;
+  // Colours a photo from a choice as PNG, at most `max_side_px` on its longer side; 0: at full size,
+  // exactly as a run does. kReference and kWords need `made_by`, the job of ColorBelow.
+  std::string Preview(const LocalFile& photo,
+                      const ColorChoice& color,
+                      const std::string& made_by,
+                      int max_side_px) const;
+  // Submits the colouring of one photo without its strokes.
+  v1::Job ColorBelow(const std::string& scene,
+                     const std::string& view,
+                     const ColorChoice& color) const;
 
  private:
   const ServerTarget server_;
   const CancellationToken& cancel_;
+  mutable Mutex mutex_;
+  mutable std::unique_ptr<const Connection> kept_ COLOR3D_GUARDED_BY(mutex_);
+  mutable KeptBlobs blobs_;
 };
 
 }  // namespace color3d::client

@@ -1,6 +1,7 @@
 #include "client/studio/studio_requests.h"
 
 #include <cstdlib>
+#include <map>
 
 #include "client/studio/run_progress.h"
 #include "core/base/error.h"
@@ -11,6 +12,16 @@ namespace {
 using httplib::Request;
 using Json = nlohmann::ordered_json;
 constexpr int kMaxSidePx = 8192;
+
+// The text of a file of strokes, as it is: the service gets the bytes that a saved file has. Empty
+// without strokes.
+std::string StrokesOf(const nlohmann::json& body) {
+  const std::string text = TextOf(body, "strokes");
+  if (text.empty()) return "";
+  const auto list = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (!list.is_array()) throw InvalidArgument("the strokes are not a JSON list");
+  return list.empty() ? "" : text;
+}
 
 }  // namespace
 
@@ -39,6 +50,36 @@ Json SetJson(const PhotoSet& set) {
           {"is_own", set.is_own}};
 }
 
+ColorChoice ReadColor(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
+  using From = ColorChoice::From;
+  static const std::map<std::string, From> kNames = {{"", From::kAutomatic},
+                                                     {"automatic", From::kAutomatic},
+                                                     {"nothing", From::kNothing},
+                                                     {"picture", From::kPicture},
+                                                     {"reference", From::kReference},
+                                                     {"words", From::kWords}};
+  ColorChoice choice;
+  const auto from = kNames.find(TextOf(body, "color"));
+  if (from == kNames.end()) {
+    throw InvalidArgument("color is automatic, nothing, picture, reference or words");
+  }
+  choice.from = from->second;
+  if (choice.from == From::kPicture || choice.from == From::kReference) {
+    choice.picture = sets.KeptPicture(set, TextOf(body, "picture"));
+  }
+  if (choice.from == From::kWords) {
+    choice.words = TextOf(body, "words");
+    if (choice.words.empty()) {
+      throw InvalidArgument("there are no words yet; name things with their colours");
+    }
+  }
+  choice.strokes = StrokesOf(body);
+  if (choice.strokes.empty() && choice.from == From::kNothing) {
+    throw InvalidArgument("there are no strokes yet; draw one, or choose automatic colours");
+  }
+  return choice;
+}
+
 RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
   RunChoices choices;
   const std::string preset = TextOf(body, "preset");
@@ -47,21 +88,10 @@ RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, Photo
   }
   if (!preset.empty()) choices.preset = preset;
   choices.key_view = TextOf(body, "key_view");
-  const std::string color = TextOf(body, "color");
-  if (color.empty() || color == "automatic") return choices;
-  choices.automatic = false;
-  if (color == "strokes") {
-    const auto strokes = body.find("strokes");
-    if (strokes == body.end() || !strokes->is_array() || strokes->empty()) {
-      throw InvalidArgument("there are no strokes yet; draw one, or choose automatic colours");
-    }
-    choices.is_strokes = true;
-    choices.picture = sets.KeepPicture(set, ".json", strokes->dump());
-    return choices;
+  choices.color = ReadColor(body, set, sets);
+  if (!choices.color.strokes.empty()) {
+    choices.strokes_file = sets.KeepPicture(set, ".json", choices.color.strokes);
   }
-  if (color != "picture") throw InvalidArgument("color is automatic, picture or strokes");
-  const std::string picture = TextOf(body, "picture");
-  choices.picture = sets.KeptPicture(set, picture);
   return choices;
 }
 

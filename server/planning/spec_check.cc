@@ -119,8 +119,15 @@ void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& pa
   if (source.has_backend_input() && source.source_case() != v1::KeyColorSource::kBackend) {
     Reject(path + ".backend_input", " is set, but the source is no backend; leave it out");
   }
-  if (source.has_labels() && source.source_case() != v1::KeyColorSource::kPoints) {
+  const bool is_points = source.source_case() == v1::KeyColorSource::kPoints;
+  if (source.has_labels() && !is_points && !source.has_points_above()) {
     Reject(path + ".labels", " is set, but only points refer to labels; leave it out");
+  }
+  if (source.has_points_above() &&
+      (is_points || source.source_case() == v1::KeyColorSource::kStrokes)) {
+    Reject(path + ".points_above",
+           " is set, but points and strokes have nothing below them; give all as points, or "
+           "another source");
   }
   if (source.has_backend_input() && !source.backend_input().prompt().empty()) {
     CheckPrompt(source.backend_input().prompt(), path + ".backend_input.prompt");
@@ -242,6 +249,10 @@ void CheckCorrections(const v1::CorrectColorsSpec& spec, const std::string& path
       continue;
     }
     CheckKeyColorExtras(correction.color(), entry + ".color");
+    if (correction.color().has_points_above()) {
+      Reject(entry + ".color.points_above",
+             " is set, but a correction has one layer; give the points as a correction of their own");
+    }
     switch (correction.color().source_case()) {
       case v1::KeyColorSource::kImage:
       case v1::KeyColorSource::kStrokes:

@@ -102,6 +102,11 @@ TEST(KeyColorSpec, RefusesOptionsOfOtherSources) {
                 *s->mutable_labels() = SomeDigest("l");
               }),
               HasSubstr("key_color.labels"));
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                *s->mutable_points() = SomeDigest("p");
+                *s->mutable_points_above() = SomeDigest("a");
+              }),
+              HasSubstr("key_color.points_above is set, but points and strokes have nothing below"));
 }
 
 // The refusal of the paper's preset with these options, or "accepted".

@@ -35,12 +35,13 @@ export interface KeyViews {
   views: { name: string; expected_error: number | null; saves: number | null }[];
 }
 export interface State {
-  server: { version: string; address: string; presets: string[] }; sets: PhotoSet[]; jobs: Job[];
+  server: { version: string; address: string; presets: string[]; knows_words: boolean }; sets: PhotoSet[]; jobs: Job[];
 }
-export interface Choices {
-  preset: string; key_view: string; color: 'automatic' | 'picture' | 'strokes';
-  picture?: string; strokes?: readonly unknown[];
-}
+// Where the colours of a photo come from, and strokes above them. picture: a kept one; made_by: the job that coloured the
+// photo by a reference or words; strokes: the text of a file of strokes.
+export type Source = 'automatic' | 'picture' | 'reference' | 'words' | 'nothing';
+export interface Colors { color: Source; picture?: string; words?: string; made_by?: string; strokes?: string }
+export interface Choices extends Colors { preset: string; key_view: string }
 
 const answerOf = async (request: Promise<Response>): Promise<Response> => {
   let response: Response;
@@ -75,13 +76,16 @@ export const planRun = (id: string, preset: string): Promise<Plan> => post(`/api
 export const selectKey = (id: string, count: number): Promise<Job> => post(`/api/sets/${id}/key`, { count });
 export const keyViews = (job: string): Promise<KeyViews> => get(`/api/jobs/${job}/key-views`);
 export const colorize = (id: string, choices: Choices): Promise<Job> => post(`/api/sets/${id}/colorize`, choices);
-export const previewStrokes = async (
-  id: string, photo: string, strokes: readonly unknown[], maxSide: number, signal: AbortSignal,
-): Promise<ImageBitmap> => {
-  const body = JSON.stringify({ photo, strokes, max_side: maxSide });
-  const response = await answerOf(fetch(`/api/sets/${id}/preview`, { method: 'POST', body, signal }));
-  return createImageBitmap(await response.blob());
+// A PNG of the coloured photo; maxSide 0: at full size, as a run colours it.
+export const previewColors = async (
+  id: string, photo: string, colors: Colors, maxSide: number, signal?: AbortSignal,
+): Promise<Blob> => {
+  const body = JSON.stringify({ photo, ...colors, max_side: maxSide });
+  return (await answerOf(fetch(`/api/sets/${id}/preview`, { method: 'POST', body, signal }))).blob();
 };
+// Colours one photo by a reference or words: a job.
+export const colorBelow = (id: string, photo: string, colors: Colors): Promise<Job> =>
+  post(`/api/sets/${id}/below`, { photo, ...colors });
 export const cancelJob = (id: string): Promise<Job> => post(`/api/jobs/${id}/cancel`);
 export const retryJob = (id: string): Promise<Job> => post(`/api/jobs/${id}/retry`);
 export const artifactUrl = (job: string, name: string, download = false): string =>

@@ -26,28 +26,6 @@ void CheckLuminance(const Image& luminance) {
   }
 }
 
-// The hints on a smaller grid. A cell with any hinted pixel is hinted, so that thin strokes
-// survive, and has their mean colour.
-HintMap Reduce(const HintMap& full, int width, int height) {
-  Image weighted(full.ab.width, full.ab.height, 3);
-  for (size_t i = 0; i < full.hinted.size(); ++i) {
-    if (!full.hinted[i]) continue;
-    weighted.Plane(0)[i] = full.ab.Plane(0)[i];
-    weighted.Plane(1)[i] = full.ab.Plane(1)[i];
-    weighted.Plane(2)[i] = 1.0f;
-  }
-  weighted = Resize(weighted, width, height);
-  HintMap small{std::vector<uint8_t>(weighted.PlaneSize(), 0), Image(width, height, 2)};
-  for (size_t i = 0; i < small.hinted.size(); ++i) {
-    const float share = weighted.Plane(2)[i];
-    if (share < 1e-4f) continue;
-    small.hinted[i] = 1;
-    small.ab.Plane(0)[i] = weighted.Plane(0)[i] / share;
-    small.ab.Plane(1)[i] = weighted.Plane(1)[i] / share;
-  }
-  return small;
-}
-
 // Propagates hints over a picture of the same size. Sets all of the solution but hinted_pixels.
 HintSolution SolveAtSize(const Image& luminance,
                          HintMap hints,
@@ -91,7 +69,7 @@ HintSolution Solve(const Image& luminance,
     solution = SolveAtSize(luminance, std::move(hints), options, control);
   } else {
     const Image small = FitWithin(luminance, options.max_side_px);
-    solution = SolveAtSize(small, Reduce(hints, small.width, small.height), options, control);
+    solution = SolveAtSize(small, ReduceHints(hints, small.width, small.height), options, control);
     solution.ab = UpsampleGuided(solution.ab, luminance);
     for (size_t i = 0; i < hints.hinted.size(); ++i) {
       if (!hints.hinted[i]) continue;
@@ -153,6 +131,23 @@ HintSolution KeyColorFromHints(const Image& luminance,
           hints, pictures, luminance.width, luminance.height, control.progress, control.cancel),
       options,
       control);
+}
+
+std::vector<ColorHint> ScaleHints(std::vector<ColorHint> hints, double x, double y) {
+  // Thinner ones would cover a pixel here and there.
+  constexpr double kLeastRadiusPx = 0.75;
+  const double mean = std::sqrt(x * y);
+  for (ColorHint& hint : hints) {
+    hint.x_px *= x;
+    hint.y_px *= y;
+    if (mean < 1.0) {
+      hint.radius_px = std::max(std::min(kLeastRadiusPx, hint.radius_px), hint.radius_px * mean);
+    } else {
+      hint.radius_px *= mean;
+    }
+    for (auto& point : hint.points_px) point = {point[0] * x, point[1] * y};
+  }
+  return hints;
 }
 
 }  // namespace color3d

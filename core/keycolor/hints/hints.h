@@ -50,6 +50,9 @@ struct HintSolution {
 struct HintPictures {
   const Image* labels = nullptr;        // 1 channel, value * 255 is the label
   const Image* automatic_ab = nullptr;  // 2 channels, for Fill::kAutomatic
+  // The hints were made for a larger picture (ScaleHints): those that are too small for a pixel get
+  // one.
+  bool is_reduced = false;
 };
 
 // Strokes as a picture of the key photo's size: 4 channels (pixels with alpha > 0.5 are hints), or
@@ -69,6 +72,9 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
 // "keep": "auto" keeps that of the automatic colourizer. Throws Error{kInvalidArgument} naming the
 // entry.
 std::vector<ColorHint> ParseHintsJson(const std::string& json);
+
+// The hints for a copy of the picture whose sides are these shares of the picture's, above 0.
+std::vector<ColorHint> ScaleHints(std::vector<ColorHint> hints, double x, double y);
 
 // Propagates the hints. Throws an error naming a hint that lies outside the picture or covers no
 // pixel. Where hints overlap, the last one wins; warns if they contradict each other.

@@ -57,6 +57,21 @@ void TakePicture(const RpcParts& parts,
   call->set_max_side_px(side);
 }
 
+void TakeStrokes(const RpcParts& parts,
+                 const ProjectStore& store,
+                 v1::ColorizeImagesRequest* request,
+                 internal::v1::ColorizeImageRequest* call) {
+  if (request->points().size() > kMaxPointsBytes) {
+    throw InvalidArgument("points has {} bytes; at most 1 MiB is allowed; merge strokes",
+                          request->points().size());
+  }
+  call->mutable_points()->swap(*request->mutable_points());
+  call->set_automatic(request->automatic());
+  if (request->has_below()) {
+    call->set_below_sha256(RequireBlob(parts, store, request->below(), "below"));
+  }
+}
+
 ColorizerRecord NewestOf(const ProjectStore& store, const std::string& scene) {
   CheckName(scene, "scenes");
   const auto newest = store.ListColorizers(scene, 0, 1);
@@ -105,19 +120,16 @@ void ResolveColorizeRequest(const RpcParts& parts,
   }
   response->set_request_id(request->request_id());
   const bool trained = !request->colorizer().empty() || !request->scene().empty();
-  const bool has_points = !request->points().empty();
-  if (int{trained} + int{request->has_example()} + int{has_points} != 1) {
-    throw InvalidArgument("set one of colorizer, scene, example and points");
+  const bool paints = !request->points().empty() || request->automatic();
+  if (int{trained} + int{request->has_example()} + int{paints} != 1) {
+    throw InvalidArgument(
+        "set one of colorizer, scene, example and points; automatic alone or with points");
   }
   TakePicture(parts, store, request, call);
-  if (has_points) {
-    if (request->points().size() > kMaxPointsBytes) {
-      throw InvalidArgument("points has {} bytes; at most 1 MiB is allowed; merge strokes",
-                            request->points().size());
-    }
-    call->mutable_points()->swap(*request->mutable_points());
-    return;
+  if (request->has_below() && (request->points().empty() || request->automatic())) {
+    throw InvalidArgument("below is a picture under points, in place of automatic colours");
   }
+  if (paints) return TakeStrokes(parts, store, request, call);
   if (request->has_example()) {
     call->set_example_sha256(RequireBlob(parts, store, request->example(), "example"));
     return;
