@@ -191,26 +191,6 @@ Connection::Connection(const CancellationToken& cancel, const ServerTarget& serv
                 UnreachableReason(channel_));
   }
   if (!connected) throw UnreachableError(server.address);
-  MakeStubs();
-}
-
-Connection::Connection(const Connection& other)
-    : address_(other.address_),
-      on_wait_(other.on_wait_),
-      patience_(other.patience_),
-      cancel_(other.cancel_),
-      channel_(other.channel_) {
-  MakeStubs();
-}
-
-Connection Connection::Share() const { return Connection(*this); }
-
-bool Connection::IsAlive() const {
-  const grpc_connectivity_state state = channel_->GetState(/*try_to_connect=*/false);
-  return state == GRPC_CHANNEL_READY;
-}
-
-void Connection::MakeStubs() {
   scenes_ = v1::SceneService::NewStub(channel_);
   jobs_ = v1::JobService::NewStub(channel_);
   blobs_ = v1::BlobService::NewStub(channel_);

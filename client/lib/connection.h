@@ -70,12 +70,6 @@ class Connection {
   // another machine, and for files that cannot be read. Throws what `own_server` throws.
   Connection(const ServerTarget& server, const CancellationToken& cancel);
 
-  // Another connection over the same channel: made at once, for use by another thread or call.
-  Connection Share() const;
-  // Whether the channel is connected. False: make a new connection, which finds or starts a server
-  // again.
-  bool IsAlive() const;
-
   const std::string& address() const { return address_; }
   const CancellationToken& cancel() const { return cancel_; }
   // Returns a Backoff with the target's patience.
@@ -111,8 +105,6 @@ class Connection {
 
  private:
   Connection(const CancellationToken& cancel, const ServerTarget& found);
-  Connection(const Connection& other);  // of Share
-  void MakeStubs();
   void Retry(const std::function<grpc::Status(grpc::ClientContext*)>& call,
              std::chrono::seconds time_limit);
 

@@ -56,8 +56,6 @@ v1::ColorizeImagesRequest LiveRound::RequestFor(const LivePicture& picture, size
   request.set_scene(source_.scene);
   if (source_.example) *request.mutable_example() = *source_.example;
   request.set_points(source_.points);
-  request.set_automatic(source_.automatic);
-  if (source_.below) *request.mutable_below() = *source_.below;
   request.set_max_side_px(options_.max_side_px);
   if (picture.stored) {
     *request.mutable_image_digest() = *picture.stored;

@@ -160,7 +160,7 @@ v1::KeyColorSource MakeSource(const KeyColorFlags& flags, Uploads* uploads) {
     *source.mutable_strokes() = uploads->Add(flags.hints);
   }
   if (HasHintsAbove(flags)) {
-    *source.mutable_points_above() = uploads->Add(flags.hints);
+    *source.mutable_backend_input()->mutable_points() = uploads->Add(flags.hints);
     if (!flags.labels.empty()) *source.mutable_labels() = uploads->Add(flags.labels);
   }
   return source;

@@ -9,6 +9,7 @@
 #include "client/lib/blob_transfer.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/live_coloring.h"
+#include "client/lib/local_server.h"
 #include "client/lib/names.h"
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
@@ -160,13 +161,17 @@ std::optional<v1::Job> ColoredKey(Connection& connection, const v1::Job& run) {
 }  // namespace
 
 Json StudioCalls::ServerFacts() const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::ServerInfo info = GetServerInfo(connection);
   const bool knows_words = std::ranges::any_of(
       info.models(), [](const v1::ModelInfo& model) { return model.kind() == "clip"; });
   Json presets = Json::array();
   for (const v1::PresetInfo& preset : info.presets()) presets.push_back(preset.name());
-  return {{"version", info.version()}, {"address", connection.address()}, {"presets", presets}, {"knows_words", knows_words}};
+  return {{"version", info.version()},
+          {"address", connection.address()},
+          {"presets", presets},
+          {"knows_words", knows_words}};
 }
 
 Json StudioCalls::Plan(const PhotoFolder& folder, const RunChoices& choices) const {
@@ -176,12 +181,14 @@ Json StudioCalls::Plan(const PhotoFolder& folder, const RunChoices& choices) con
   // Every source of colour takes about the same time.
   request.mutable_spec()->mutable_colorize_scene()->mutable_key_color()->set_automatic(true);
   *request.mutable_facts() = CaptureFactsOf(folder);
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return PlanJson(connection.Call(&v1::JobService::Stub::PlanJob, connection.jobs(), request));
 }
 
 std::string StudioCalls::Upload(const PhotoFolder& folder) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const auto entries = BuildManifest(folder, MaxFileBytes(connection), cancel_);
   return UploadScene(connection, entries, folder.Name(), [](int64_t, int64_t) {}).name();
 }
@@ -191,12 +198,14 @@ v1::Job StudioCalls::SelectKeyView(const std::string& scene, int count) const {
   spec.set_scene(ResourceName(scene, "scenes"));
   spec.mutable_select_key_view();
   if (count > 1) spec.mutable_select_key_view()->set_count(count);
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return SubmitJob(connection, spec);
 }
 
 Json StudioCalls::KeyViews(const std::string& job) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::Job select = GetJob(connection, ResourceName(job, "jobs"));
   const Json found = Json::parse(
       ReadArtifact(connection, select, artifact::kKeyView), nullptr, /*allow_exceptions=*/false);
@@ -229,7 +238,8 @@ v1::Job StudioCalls::Colorize(const std::string& scene, const RunChoices& choice
   if (choices.color.from != ColorChoice::From::kAutomatic && choices.key_view.empty()) {
     throw InvalidArgument("choose the photo that the colours belong to");
   }
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   v1::JobSpec spec = ColorizeSpec(OptionsOf(choices), ResourceName(scene, "scenes"));
   spec.mutable_colorize_scene()->set_key_view(choices.key_view);
   *spec.mutable_colorize_scene()->mutable_key_color() =
@@ -241,7 +251,8 @@ v1::Job StudioCalls::Cancel(const std::string& job) const {
   v1::CancelJobRequest request;
   request.set_name(ResourceName(job, "jobs"));
   request.set_request_id(NewUuid());
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), request);
 }
 
@@ -249,17 +260,20 @@ v1::Job StudioCalls::Retry(const std::string& job) const {
   v1::RetryJobRequest request;
   request.set_name(ResourceName(job, "jobs"));
   request.set_request_id(NewUuid());
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return connection.Call(&v1::JobService::Stub::RetryJob, connection.jobs(), request);
 }
 
 v1::Job StudioCalls::Job(const std::string& job) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return GetJob(connection, ResourceName(job, "jobs"));
 }
 
 Json StudioCalls::Jobs() const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   v1::ListJobsRequest request;
   request.set_page_size(kJobsInPage);
   Json list = Json::array();
@@ -277,7 +291,8 @@ Json StudioCalls::Jobs() const {
 
 void StudioCalls::Watch(const std::string& job,
                         const std::function<bool(const std::string&)>& send) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   v1::PlanJobRequest plan;
   *plan.mutable_spec() = run.spec();
@@ -314,7 +329,8 @@ void StudioCalls::Watch(const std::string& job,
 std::string StudioCalls::Fetch(const std::string& job,
                                const std::string& artifact,
                                const std::filesystem::path& file) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::Job made = GetJob(connection, ResourceName(job, "jobs"));
   const v1::Artifact& found = FindArtifact(made, artifact);
   DownloadBlob(
@@ -325,7 +341,8 @@ std::string StudioCalls::Fetch(const std::string& job,
 std::string StudioCalls::PreviewOfRun(const std::string& job,
                                       const LocalFile& photo,
                                       int max_side_px) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   const std::optional<v1::Job> colored = ColoredKey(connection, run);
   if (!colored) {
@@ -342,16 +359,17 @@ std::string StudioCalls::Preview(const LocalFile& photo,
                                  const std::string& made_by,
                                  int max_side_px) const {
   using From = ColorChoice::From;
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   LiveSource source;
   source.points = color.strokes;
-  source.automatic = color.from == From::kAutomatic;
+  if (color.from == From::kAutomatic) source.colorizer = kAutomaticColorizer;
   if (color.from == From::kReference || color.from == From::kWords) {
     const v1::Job made = GetJob(connection, ResourceName(made_by, "jobs"));
-    source.below = FindArtifact(made, artifact::kKeyViewColored).digest();
+    source.example = FindArtifact(made, artifact::kKeyViewColored).digest();
   }
   const auto ask = [&] {
-    if (color.from == From::kPicture) source.below = blobs_.Of(connection, color.picture);
+    if (color.from == From::kPicture) source.example = blobs_.Of(connection, color.picture);
     const v1::Digest digest = blobs_.Of(connection, photo.file);
     return LivePng(connection, source, {photo.path, {}, digest}, max_side_px);
   };
@@ -368,7 +386,8 @@ v1::Job StudioCalls::ColorBelow(const std::string& scene,
                                 const std::string& view,
                                 const ColorChoice& color) const {
   if (view.empty()) throw InvalidArgument("choose the photo that the colours belong to");
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   v1::JobSpec select;
   select.set_scene(ResourceName(scene, "scenes"));
   select.mutable_select_key_view()->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
@@ -381,10 +400,12 @@ v1::Job StudioCalls::ColorBelow(const std::string& scene,
   return SubmitJob(connection, spec);
 }
 
-Connection StudioCalls::Connect() const {
+std::shared_ptr<Connection> StudioCalls::Kept() const {
   const MutexLock lock(mutex_);
-  if (!kept_ || !kept_->IsAlive()) kept_ = std::make_unique<const Connection>(server_, cancel_);
-  return kept_->Share();
+  // A server of the user's own ends when it is idle: then another one is started.
+  const bool has_ended = kept_ && server_.own_server && !AcceptsConnections(kept_->address());
+  if (!kept_ || has_ended) kept_ = std::make_shared<Connection>(server_, cancel_);
+  return kept_;
 }
 
 }  // namespace color3d::client

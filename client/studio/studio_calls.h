@@ -42,7 +42,8 @@ class StudioCalls {
   StudioCalls(ServerTarget server, const CancellationToken& cancel)
       : server_(std::move(server)), cancel_(cancel) {}
 
-  Connection Connect() const;
+  // A connection of its own, over a channel of its own.
+  Connection Connect() const { return Connection(server_, cancel_); }
 
   nlohmann::ordered_json ServerFacts() const;
   nlohmann::ordered_json Plan(const PhotoFolder& folder, const RunChoices& choices) const;
@@ -75,8 +76,8 @@ class StudioCalls {
 
   // Colours a photo at screen size as PNG, from the coloured key view of a run.
   std::string PreviewOfRun(const std::string& job, const LocalFile& photo, int max_side_px) const;
-  // Colours a photo from a choice as PNG, at most `max_side_px` on its longer side; 0: at full size,
-  // exactly as a run does. kReference and kWords need `made_by`, the job of ColorBelow.
+  // Colours a photo from a choice as PNG, at most `max_side_px` on its longer side; 0: at full
+  // size, exactly as a run does. kReference and kWords need `made_by`, the job of ColorBelow.
   std::string Preview(const LocalFile& photo,
                       const ColorChoice& color,
                       const std::string& made_by,
@@ -87,10 +88,13 @@ class StudioCalls {
                      const ColorChoice& color) const;
 
  private:
+  // The connection that all calls share. Finds or starts a server where the user's own has ended.
+  std::shared_ptr<Connection> Kept() const;
+
   const ServerTarget server_;
   const CancellationToken& cancel_;
   mutable Mutex mutex_;
-  mutable std::unique_ptr<const Connection> kept_ COLOR3D_GUARDED_BY(mutex_);
+  mutable std::shared_ptr<Connection> kept_ COLOR3D_GUARDED_BY(mutex_);
   mutable KeptBlobs blobs_;
 };
 

@@ -55,7 +55,8 @@ GridSystem SystemWith(const Image& luminance, const PerSigma& per_sigma, ThreadP
 
 GridSystem SystemOfLuminance(const Image& luminance, double sigma, ThreadPool& pool) {
   const auto per_sigma = static_cast<float>(1.0 / sigma);
-  return SystemWith(luminance, [&](int64_t, int64_t) { return per_sigma; }, pool);
+  return SystemWith(
+      luminance, [&](int64_t, int64_t) { return per_sigma; }, pool);
 }
 
 GridSystem SystemOfLuminance(const Image& luminance, const Image& sigma, ThreadPool& pool) {

@@ -90,7 +90,7 @@ ColorizeKeyViewOptions SourceOptionsFrom(const v1::KeyColorSource& source, BlobS
 ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, BlobSource& blobs) {
   const v1::KeyColorSource& source = spec.source();
   ColorizeKeyViewOptions options = SourceOptionsFrom(source, blobs);
-  options.above = FetchIf(source.has_points_above(), source.points_above(), blobs);
+  options.above = FetchIf(HasPointsAbove(source), source.backend_input().points(), blobs);
   options.labels = FetchIf(source.has_labels(), source.labels(), blobs);
   options.hints = HintOptionsFrom(spec);
   options.view = spec.view();

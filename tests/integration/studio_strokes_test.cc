@@ -73,10 +73,10 @@ class StudioStrokesTest : public ServiceTest {
   // The picture that `color3d key color` writes.
   std::string FromCommandLine(const std::vector<std::string>& flags) {
     const fs::path out = Path("out") / std::to_string(++runs_);
-    const ProcessResult result = Client(
-        std::vector<std::string>{
-            "key", "color", Path("room").string(), "--view", kView, "-o", out.string()} +
-        flags);
+    const ProcessResult result =
+        Client(std::vector<std::string>{
+                   "key", "color", Path("room").string(), "--view", kView, "-o", out.string()} +
+               flags);
     EXPECT_EQ(result.exit_code, 0) << result.err;
     return ReadFile(out / "key_view_colored.png");
   }
@@ -114,7 +114,7 @@ TEST_F(StudioStrokesTest, GiveTheBytesOfTheCommandLine) {
       NewestJob("colorize_scene").spec().colorize_scene().key_color();
   EXPECT_EQ(from_studio.SerializeAsString(), from_command.SerializeAsString());
   EXPECT_TRUE(from_studio.automatic());
-  EXPECT_TRUE(from_studio.has_points_above());
+  EXPECT_TRUE(from_studio.backend_input().has_points());
   Client({"job", "cancel", "jobs/" + job["id"].get<std::string>()});
 }
 

@@ -37,9 +37,9 @@ struct HintLayer {
   int iterations = 0;
 };
 
-// `below`: 2 channels, Lab units, size of `luminance`. Hinted pixels have the share 1 and their hint
-// exactly; hints of Fill::kAutomatic keep what lies below: share 0. `pictures`: automatic_ab is
-// ignored. Throws what KeyColorFromHints throws.
+// `below`: 2 channels, Lab units, size of `luminance`. Hinted pixels have the share 1 and their
+// hint exactly; hints of Fill::kAutomatic keep what lies below: share 0. `pictures`: automatic_ab
+// is ignored. Throws what KeyColorFromHints throws.
 HintLayer LayerOfHints(const Image& luminance,
                        const Image& below,
                        const std::vector<ColorHint>& hints,

@@ -70,8 +70,7 @@ TEST(HintLayerTest, StrokeFillsItsThingAndLeavesTheRestAlone) {
 
 TEST(HintLayerTest, PullFadesWithTheDistanceOnOneThing) {
   const Image luminance(600, 100, 1, 50.0f);
-  const HintLayer layer =
-      LayerOf(luminance, Green(luminance), {Stroke(5, 5, 5, 95, 50, 10)});
+  const HintLayer layer = LayerOf(luminance, Green(luminance), {Stroke(5, 5, 5, 95, 50, 10)});
   EXPECT_GT(layer.share.At(0, 50, 20), 0.99f);
   float before = 1.0f;
   for (int x = 20; x < 600; x += 20) {
@@ -171,8 +170,8 @@ TEST(ScaleHintsTest, KeepsSmallHintsVisible) {
   NullObserver silent;
   HintPictures pictures;
   const Image luminance(40, 30, 1, 50.0f);
-  EXPECT_THROW(
-      KeyColorFromHints(luminance, {scaled[1]}, {}, {pool, none, silent, {}}, pictures), Error);
+  EXPECT_THROW(KeyColorFromHints(luminance, {scaled[1]}, {}, {pool, none, silent, {}}, pictures),
+               Error);
   pictures.is_reduced = true;
   EXPECT_NEAR(
       KeyColorFromHints(luminance, {scaled[1]}, {}, {pool, none, silent, {}}, pictures).ab.data[0],

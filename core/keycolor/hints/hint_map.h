@@ -11,8 +11,8 @@
 namespace color3d {
 
 struct HintMap {
-  std::vector<uint8_t> hinted;  // 1 where the colour is given
-  Image ab;                     // 2 channels; valid where hinted
+  std::vector<uint8_t> hinted;     // 1 where the colour is given
+  Image ab;                        // 2 channels; valid where hinted
   std::vector<uint8_t> kept = {};  // 1 where hinted by Fill::kAutomatic; empty: nowhere
   bool IsKept(size_t i) const { return !kept.empty() && kept[i] != 0; }
 };

@@ -27,8 +27,8 @@ struct ColorizeKeyViewOptions {
   std::filesystem::path mask;                     // edit and backend; empty: everywhere
   std::filesystem::path labels;                   // points, above: what labels refer to
   std::filesystem::path above;  // points (JSON) above the colours of the source; empty: none
-  std::string prompt;                             // prompt; backend, may be empty
-  std::string name;  // weights, script or backend by name; empty: the embedded model
+  std::string prompt;           // prompt; backend, may be empty
+  std::string name;             // weights, script or backend by name; empty: the embedded model
   HintOptions hints;
   std::string view;  // additional key view: name or unique file stem; empty: the chosen key view
   bool operator==(const ColorizeKeyViewOptions&) const = default;

@@ -10,6 +10,8 @@ namespace color3d {
 namespace {
 
 constexpr size_t kMaxImageBytes = 3 << 20;
+// Name of the colorizer that no job made.
+constexpr char kAutomaticColorizer[] = "colorizers/automatic";
 constexpr size_t kMaxPointsBytes = 1 << 20;
 constexpr size_t kMaxRequestIdBytes = 128;
 constexpr int kMinSidePx = 16;
@@ -66,9 +68,8 @@ void TakeStrokes(const RpcParts& parts,
                           request->points().size());
   }
   call->mutable_points()->swap(*request->mutable_points());
-  call->set_automatic(request->automatic());
-  if (request->has_below()) {
-    call->set_below_sha256(RequireBlob(parts, store, request->below(), "below"));
+  if (request->has_example()) {
+    call->set_below_sha256(RequireBlob(parts, store, request->example(), "example"));
   }
 }
 
@@ -120,16 +121,20 @@ void ResolveColorizeRequest(const RpcParts& parts,
   }
   response->set_request_id(request->request_id());
   const bool trained = !request->colorizer().empty() || !request->scene().empty();
-  const bool paints = !request->points().empty() || request->automatic();
-  if (int{trained} + int{request->has_example()} + int{paints} != 1) {
+  const bool automatic = request->colorizer() == kAutomaticColorizer;
+  const bool has_points = !request->points().empty();
+  const int sources = int{trained} + int{request->has_example()};
+  if (sources > 1 || (sources == 0 && !has_points) || (has_points && trained && !automatic)) {
     throw InvalidArgument(
-        "set one of colorizer, scene, example and points; automatic alone or with points");
+        "set one of colorizer, scene, example and points, or points besides an example or {}",
+        kAutomaticColorizer);
   }
   TakePicture(parts, store, request, call);
-  if (request->has_below() && (request->points().empty() || request->automatic())) {
-    throw InvalidArgument("below is a picture under points, in place of automatic colours");
+  if (has_points || automatic) {
+    call->set_automatic(automatic);
+    response->set_colorizer(request->colorizer());
+    return TakeStrokes(parts, store, request, call);
   }
-  if (paints) return TakeStrokes(parts, store, request, call);
   if (request->has_example()) {
     call->set_example_sha256(RequireBlob(parts, store, request->example(), "example"));
     return;

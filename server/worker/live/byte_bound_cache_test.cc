@@ -4,7 +4,6 @@
 
 #include "core/base/error.h"
 
-
 namespace color3d {
 namespace {
 

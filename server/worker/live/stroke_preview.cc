@@ -28,7 +28,9 @@ constexpr double kSameShape = 0.02;  // relative difference of aspect ratios
 // Residual at which an answer that is smaller than the picture is shown; exact ones go on.
 constexpr double kPreviewTolerance = 2e-3;
 
-int64_t BytesOf(const Image& image) { return static_cast<int64_t>(image.data.size() * sizeof(float)); }
+int64_t BytesOf(const Image& image) {
+  return static_cast<int64_t>(image.data.size() * sizeof(float));
+}
 
 }  // namespace
 
@@ -73,10 +75,10 @@ StrokePreview::Shared StrokePreview::Below(const Request& request,
   const std::string& sha256 = request.below_sha256();
   return cache_.Get(fmt::format("below {} {}x{}", sha256, width, height), [&] {
     const std::string bytes = read_blob(sha256);
-    const PictureSize own = OrientedSize(ProbeImage(bytes, "the picture below the strokes"),
-                                         ReadOrientation(bytes));
-    const double shape = static_cast<double>(own.width) * luminance.own_height / own.height /
-                         luminance.own_width;
+    const PictureSize own =
+        OrientedSize(ProbeImage(bytes, "the picture below the strokes"), ReadOrientation(bytes));
+    const double shape =
+        static_cast<double>(own.width) * luminance.own_height / own.height / luminance.own_width;
     if (std::abs(shape - 1.0) > kSameShape) {
       throw InvalidArgument(
           "the picture below the strokes has {}x{} px, the photo {}x{}; bring one of its shape",
@@ -88,10 +90,8 @@ StrokePreview::Shared StrokePreview::Below(const Request& request,
     const Image srgb =
         DecodeImageWithin(bytes, "the picture below the strokes", std::max(width, height));
     if (srgb.channels != 3) throw InvalidArgument("the picture below the strokes has no colour");
-    Prepared prepared{ChromaOfLab(LabFromSrgb(Resize(srgb, width, height))),
-                      own.width,
-                      own.height,
-                      0};
+    Prepared prepared{
+        ChromaOfLab(LabFromSrgb(Resize(srgb, width, height))), own.width, own.height, 0};
     prepared.bytes = BytesOf(prepared.planes);
     return prepared;
   });

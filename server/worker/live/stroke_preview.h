@@ -27,8 +27,8 @@ class StrokePreview {
   }
 
   // Returns the coloured picture, sRGB: at the picture's own size as colorize_key_view makes it, at
-  // a smaller one with strokes that are reduced like the picture. Throws Error{kInvalidArgument} for
-  // malformed strokes and pictures of other shapes.
+  // a smaller one with strokes that are reduced like the picture. Throws Error{kInvalidArgument}
+  // for malformed strokes and pictures of other shapes.
   Image Colorize(const Request& request, const ReadBlob& read_blob);
 
  private:
