@@ -84,11 +84,10 @@ Image MeansNearby(const Image& weighted) {
 }
 
 // Screening of each pixel: the weight that holds its pull at 0.
-void SetScreening(const Image& luminance,
-                  const Image& below,
-                  const HintMap& hints,
-                  const LayerOptions& options,
-                  GridSystem* system) {
+GridPlane Screening(const Image& luminance,
+                    const Image& below,
+                    const HintMap& hints,
+                    const LayerOptions& options) {
   const Image like = Likeness(luminance, below);
   Image weighted(like.width, like.height, 5);
   for (size_t i = 0; i < hints.hinted.size(); ++i) {
@@ -101,6 +100,7 @@ void SetScreening(const Image& luminance,
   const auto base = static_cast<float>(kAxisCoupling / (reach_px * reach_px));
   const auto per_l = static_cast<float>(options.unlike_luminance * options.unlike_luminance);
   const auto per_ab = static_cast<float>(options.unlike_chroma * options.unlike_chroma);
+  GridPlane screening(luminance.width, luminance.height);
   for (size_t i = 0; i < like.PlaneSize(); ++i) {
     const float mean = strokes.Plane(0)[i];
     const float variance = std::max(0.0f, strokes.Plane(1)[i] - mean * mean);
@@ -108,23 +108,9 @@ void SetScreening(const Image& luminance,
     const float a = like.Plane(2)[i] - strokes.Plane(2)[i];
     const float b = like.Plane(3)[i] - strokes.Plane(3)[i];
     const float unlike = l * l / (per_l + variance) + (a * a + b * b) / per_ab;
-    system->data[static_cast<int64_t>(i)] = base * (1.0f + kScreeningOfUnlike * unlike);
+    screening[static_cast<int64_t>(i)] = base * (1.0f + kScreeningOfUnlike * unlike);
   }
-}
-
-GridSolution SolvePull(GridSystem system,
-                       const std::vector<float>& target,
-                       const LayerOptions& options,
-                       const RunControl& control) {
-  return SolveGridSystem(
-      std::move(system),
-      target,
-      {options.tolerance, options.max_iterations},
-      control.pool,
-      [&](int iteration, double) {
-        control.progress.OnProgress(iteration, 0, "laying the strokes above the colours");
-      },
-      control.cancel);
+  return screening;
 }
 
 float ShareOfPull(float pull) {
@@ -136,12 +122,11 @@ float ShareOfPull(float pull) {
 // colours over the pull are their weighted mean.
 HintLayer LayerAtSize(const Image& luminance,
                       const Image& below,
-                      HintMap hints,
+                      const HintMap& hints,
                       const LayerOptions& options,
-                      const RunControl& control) {
-  GridSystem system =
-      SystemOfLuminance(luminance, SigmaOfTexture(luminance, options), control.pool);
-  SetScreening(luminance, below, hints, options, &system);
+                      const RunControl& control,
+                      GridHierarchy& prepared) {
+  const GridPlane screening = Screening(luminance, below, hints, options);
   const size_t n = luminance.PlaneSize();
   std::vector<float> colors(2 * n, 0.0f), pulls(2 * n, 0.0f);
   for (size_t i = 0; i < n; ++i) {
@@ -151,9 +136,18 @@ HintLayer LayerAtSize(const Image& luminance,
     pulls[i] = 1.0f;
   }
   // The data term holds all pixels but the pinned ones at 0.
-  system.pinned = std::move(hints.hinted);
-  const GridSolution color = SolvePull(system, colors, options, control);
-  const GridSolution pull = SolvePull(std::move(system), pulls, options, control);
+  const auto solve = [&](const std::vector<float>& target) {
+    return prepared.Solve(
+        hints.hinted,
+        &screening,
+        target,
+        {options.tolerance, options.max_iterations},
+        [&](int iteration, double) {
+          control.progress.OnProgress(iteration, 0, "laying the strokes above the colours");
+        },
+        control.cancel);
+  };
+  const GridSolution color = solve(colors), pull = solve(pulls);
   HintLayer layer{Image(luminance.width, luminance.height, 2),
                   Image(luminance.width, luminance.height, 1),
                   0,
@@ -217,7 +211,8 @@ HintLayer LayerOfHints(const Image& luminance,
                        const std::vector<ColorHint>& hints,
                        const LayerOptions& options,
                        const RunControl& control,
-                       const HintPictures& pictures) {
+                       const HintPictures& pictures,
+                       GridHierarchy* prepared) {
   options.Validate();
   RequireLuminance(luminance, "the strokes above other colours");
   if (!IsFinite(luminance)) {
@@ -227,20 +222,32 @@ HintLayer LayerOfHints(const Image& luminance,
   above.automatic_ab = &below;
   HintMap map =
       DrawHints(hints, above, luminance.width, luminance.height, control.progress, control.cancel);
+  std::unique_ptr<GridHierarchy> own;
+  if (prepared == nullptr) own = PrepareLayer(luminance, options, control.pool);
+  GridHierarchy& hierarchy = prepared != nullptr ? *prepared : *own;
   HintLayer layer;
   if (std::max(luminance.width, luminance.height) <= options.max_side_px) {
-    layer = LayerAtSize(luminance, below, map, options, control);
+    layer = LayerAtSize(luminance, below, map, options, control, hierarchy);
   } else {
     const Image small = FitWithin(luminance, options.max_side_px);
     layer = Enlarge(LayerAtSize(small,
                                 Resize(below, small.width, small.height),
                                 ReduceHints(map, small.width, small.height),
                                 options,
-                                control),
+                                control,
+                                hierarchy),
                     luminance);
   }
   SetHintedPixels(map, &layer);
   return layer;
+}
+
+std::unique_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
+                                            const LayerOptions& options,
+                                            ThreadPool& pool) {
+  const Image small = FitWithin(luminance, options.max_side_px);
+  return std::make_unique<GridHierarchy>(
+      SystemOfLuminance(small, SigmaOfTexture(small, options), pool), pool, CancellationToken());
 }
 
 void LayAbove(const HintLayer& layer, Image* below) {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/base/image.h"
@@ -39,13 +40,21 @@ struct HintLayer {
 
 // `below`: 2 channels, Lab units, size of `luminance`. Hinted pixels have the share 1 and their
 // hint exactly; hints of Fill::kAutomatic keep what lies below: share 0. `pictures`: automatic_ab
-// is ignored. Throws what KeyColorFromHints throws.
+// is ignored. `prepared`: of the same picture and options; null: made. Throws what
+// KeyColorFromHints throws.
 HintLayer LayerOfHints(const Image& luminance,
                        const Image& below,
                        const std::vector<ColorHint>& hints,
                        const LayerOptions& options,
                        const RunControl& control,
-                       const HintPictures& pictures = {});
+                       const HintPictures& pictures = {},
+                       GridHierarchy* prepared = nullptr);
+
+// What LayerOfHints needs of the picture alone, for quick answers to changing hints, with the same
+// result. The pool must outlive it.
+std::unique_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
+                                            const LayerOptions& options,
+                                            ThreadPool& pool);
 
 // Replaces `below` by the colours of the layer, by its share.
 void LayAbove(const HintLayer& layer, Image* below);

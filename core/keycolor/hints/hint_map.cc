@@ -11,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
+#include "core/image/codec.h"
 
 namespace color3d {
 namespace {

@@ -30,19 +30,23 @@ void CheckLuminance(const Image& luminance) {
 HintSolution SolveAtSize(const Image& luminance,
                          HintMap hints,
                          const HintOptions& options,
-                         const RunControl& control) {
-  GridSystem system = SystemOfLuminance(luminance, options.sigma, control.pool);
-  system.pinned = std::move(hints.hinted);
-  GridSolution solved = SolveGridSystem(
-      std::move(system),
-      hints.ab.data,
-      {options.tolerance, options.max_iterations},
-      control.pool,
-      [&](int iteration, double residual) {
-        control.progress.OnError(iteration, "relative_residual", residual);
-        control.progress.OnProgress(iteration, 0, "spreading the colour hints");
-      },
-      control.cancel);
+                         const RunControl& control,
+                         GridHierarchy* prepared = nullptr) {
+  const GridSolveOptions until{options.tolerance, options.max_iterations};
+  const auto report = [&](int iteration, double residual) {
+    control.progress.OnError(iteration, "relative_residual", residual);
+    control.progress.OnProgress(iteration, 0, "spreading the colour hints");
+  };
+  GridSolution solved;
+  if (prepared != nullptr) {
+    solved = prepared->Solve(
+        std::move(hints.hinted), nullptr, hints.ab.data, until, report, control.cancel);
+  } else {
+    GridSystem system = SystemOfLuminance(luminance, options.sigma, control.pool);
+    system.pinned = std::move(hints.hinted);
+    solved = SolveGridSystem(
+        std::move(system), hints.ab.data, until, control.pool, report, control.cancel);
+  }
   if (!solved.converged) {
     control.progress.OnWarning(fmt::format(
         "colour hints: the solver stopped after {} iterations at a relative residual of {:.3g}",
@@ -62,11 +66,12 @@ HintSolution SolveAtSize(const Image& luminance,
 HintSolution Solve(const Image& luminance,
                    HintMap hints,
                    const HintOptions& options,
-                   const RunControl& control) {
+                   const RunControl& control,
+                   GridHierarchy* prepared = nullptr) {
   const int64_t hinted = std::count(hints.hinted.begin(), hints.hinted.end(), 1);
   HintSolution solution;
   if (std::max(luminance.width, luminance.height) <= options.max_side_px) {
-    solution = SolveAtSize(luminance, std::move(hints), options, control);
+    solution = SolveAtSize(luminance, std::move(hints), options, control, prepared);
   } else {
     const Image small = FitWithin(luminance, options.max_side_px);
     solution = SolveAtSize(small, ReduceHints(hints, small.width, small.height), options, control);
@@ -122,7 +127,8 @@ HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,
                                const RunControl& control,
-                               const HintPictures& pictures) {
+                               const HintPictures& pictures,
+                               GridHierarchy* prepared) {
   options.Validate();
   CheckLuminance(luminance);
   return Solve(
@@ -130,7 +136,17 @@ HintSolution KeyColorFromHints(const Image& luminance,
       DrawHints(
           hints, pictures, luminance.width, luminance.height, control.progress, control.cancel),
       options,
-      control);
+      control,
+      prepared);
+}
+
+std::unique_ptr<GridHierarchy> PrepareHints(const Image& luminance,
+                                            const HintOptions& options,
+                                            ThreadPool& pool) {
+  options.Validate();
+  CheckLuminance(luminance);
+  return std::make_unique<GridHierarchy>(
+      SystemOfLuminance(luminance, options.sigma, pool), pool, CancellationToken());
 }
 
 std::vector<ColorHint> ScaleHints(std::vector<ColorHint> hints, double x, double y) {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "core/base/run_control.h"
 
 namespace color3d {
+
+class GridHierarchy;
 
 // Pixels of given colour: a disc, a line, a polygon, or a label of a label picture.
 struct ColorHint {
@@ -78,10 +81,18 @@ std::vector<ColorHint> ScaleHints(std::vector<ColorHint> hints, double x, double
 
 // Propagates the hints. Throws an error naming a hint that lies outside the picture or covers no
 // pixel. Where hints overlap, the last one wins; warns if they contradict each other.
+// `prepared`: of the same picture and sigma, see PrepareHints; null: none.
 HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,
                                const RunControl& control,
-                               const HintPictures& pictures = {});
+                               const HintPictures& pictures = {},
+                               GridHierarchy* prepared = nullptr);
+
+// What KeyColorFromHints needs of the picture alone, for quick solutions with changing hints, equal
+// within the tolerance. The pool must outlive it. Requires: sides of at most options.max_side_px.
+std::unique_ptr<GridHierarchy> PrepareHints(const Image& luminance,
+                                            const HintOptions& options,
+                                            ThreadPool& pool);
 
 }  // namespace color3d

@@ -25,8 +25,10 @@ namespace {
 // Colouring at a picture's own size takes about 60 bytes per pixel.
 constexpr ImageLimits kWholeLimits{.max_pixels = 25'000'000, .max_side_px = 30'000};
 constexpr double kSameShape = 0.02;  // relative difference of aspect ratios
-// Residual at which an answer that is smaller than the picture is shown; exact ones go on.
-constexpr double kPreviewTolerance = 2e-3;
+// Residual of previews: 0.3 Lab units from the exact colours on average.
+constexpr double kPreviewTolerance = 3e-3;
+// Size at which previews of strokes above other colours are solved.
+constexpr int kPreviewLayerSidePx = 500;
 
 int64_t BytesOf(const Image& image) {
   return static_cast<int64_t>(image.data.size() * sizeof(float));
@@ -59,10 +61,8 @@ StrokePreview::Shared StrokePreview::Luminance(const Request& request,
 
 StrokePreview::Shared StrokePreview::Automatic(const Prepared& luminance, const std::string& key) {
   return cache_.Get("automatic " + key, [&] {
-    Prepared prepared{AutomaticColorizer::Embedded()->Colorize(luminance.planes).ab,
-                      luminance.own_width,
-                      luminance.own_height,
-                      0};
+    Prepared prepared;
+    prepared.planes = AutomaticColorizer::Embedded()->Colorize(luminance.planes).ab;
     prepared.bytes = BytesOf(prepared.planes);
     return prepared;
   });
@@ -98,35 +98,87 @@ StrokePreview::Shared StrokePreview::Below(const Request& request,
 }
 
 Image StrokePreview::Spread(const Prepared& luminance,
-                            const Prepared* below,
                             const std::vector<ColorHint>& hints,
+                            bool is_preview,
                             const std::string& key) {
   const Image& l = luminance.planes;
-  const bool is_reduced = l.width != luminance.own_width || l.height != luminance.own_height;
-  const std::vector<ColorHint> here =
-      ScaleHints(hints,
-                 static_cast<double>(l.width) / luminance.own_width,
-                 static_cast<double>(l.height) / luminance.own_height);
   NoCheckpoints checkpoints;
   NullObserver progress;
   const CancellationToken never;
-  const RunControl control{pool_, checkpoints, progress, never};
   HintPictures pictures;
-  pictures.is_reduced = is_reduced;
-  if (below != nullptr) {
-    LayerOptions options;
-    if (is_reduced) options.tolerance = kPreviewTolerance;
-    Image ab = below->planes;
-    LayAbove(LayerOfHints(l, ab, here, options, control, pictures), &ab);
-    return ab;
-  }
+  pictures.is_reduced = is_preview;
   const bool asks_automatic = std::ranges::any_of(
       hints, [](const ColorHint& hint) { return hint.fill == ColorHint::Fill::kAutomatic; });
   const Shared automatic = asks_automatic ? Automatic(luminance, key) : nullptr;
   if (automatic) pictures.automatic_ab = &automatic->planes;
   HintOptions options;
-  if (is_reduced) options.tolerance = kPreviewTolerance;
-  return KeyColorFromHints(l, here, options, control, pictures).ab;
+  Shared grid;
+  if (is_preview) {
+    options.tolerance = kPreviewTolerance;
+    grid = cache_.Get("spread " + key, [&] {
+      Prepared prepared;
+      prepared.grid = PrepareHints(l, options, pool_);
+      prepared.bytes = prepared.grid->bytes();
+      return prepared;
+    });
+  }
+  return KeyColorFromHints(l,
+                           hints,
+                           options,
+                           {pool_, checkpoints, progress, never},
+                           pictures,
+                           grid ? grid->grid.get() : nullptr)
+      .ab;
+}
+
+Image StrokePreview::LayAboveColors(const Prepared& luminance,
+                                    const Prepared& below,
+                                    const std::vector<ColorHint>& hints,
+                                    bool is_preview,
+                                    const std::string& key) {
+  const Image& l = luminance.planes;
+  NoCheckpoints checkpoints;
+  NullObserver progress;
+  const CancellationToken never;
+  HintPictures pictures;
+  pictures.is_reduced = is_preview;
+  LayerOptions options;
+  Shared grid;
+  if (is_preview) {
+    options.tolerance = kPreviewTolerance;
+    options.max_side_px = kPreviewLayerSidePx;
+    grid = cache_.Get("layer " + key, [&] {
+      Prepared prepared;
+      prepared.grid = PrepareLayer(l, options, pool_);
+      prepared.bytes = prepared.grid->bytes();
+      return prepared;
+    });
+  }
+  Image ab = below.planes;
+  LayAbove(LayerOfHints(l,
+                        ab,
+                        hints,
+                        options,
+                        {pool_, checkpoints, progress, never},
+                        pictures,
+                        grid ? grid->grid.get() : nullptr),
+           &ab);
+  return ab;
+}
+
+// As SrgbFromLab, by all threads.
+Image StrokePreview::SrgbOf(const Image& luminance, const Image& ab) {
+  Image srgb(luminance.width, luminance.height, 3);
+  pool_.ForRanges(luminance.height, [&](int64_t begin, int64_t end, int) {
+    if (begin == end) return;
+    const size_t w = luminance.width, from = begin * w, count = (end - begin) * w;
+    Image band(luminance.width, static_cast<int>(end - begin), 3);
+    std::copy_n(luminance.Plane(0) + from, count, band.Plane(0));
+    for (int c = 0; c < 2; ++c) std::copy_n(ab.Plane(c) + from, count, band.Plane(c + 1));
+    band = SrgbFromLab(band);
+    for (int c = 0; c < 3; ++c) std::copy_n(band.Plane(c), count, srgb.Plane(c) + from);
+  });
+  return srgb;
 }
 
 Image StrokePreview::Colorize(const Request& request, const ReadBlob& read_blob) {
@@ -134,11 +186,18 @@ Image StrokePreview::Colorize(const Request& request, const ReadBlob& read_blob)
   if (!request.points().empty()) hints = ParseHintsJson(request.points());
   std::string key;
   const Shared luminance = Luminance(request, read_blob, &key);
+  const Image& l = luminance->planes;
   Shared below;
   if (request.automatic()) below = Automatic(*luminance, key);
   if (!request.below_sha256().empty()) below = Below(request, *luminance, read_blob);
-  const Image ab = hints.empty() ? below->planes : Spread(*luminance, below.get(), hints, key);
-  return SrgbFromLab(JoinLab(luminance->planes, ab));
+  if (hints.empty()) return SrgbOf(l, below->planes);
+  const bool is_preview = request.max_side_px() > 0;
+  hints = ScaleHints(std::move(hints),
+                     static_cast<double>(l.width) / luminance->own_width,
+                     static_cast<double>(l.height) / luminance->own_height);
+  return SrgbOf(l,
+                below ? LayAboveColors(*luminance, *below, hints, is_preview, key)
+                      : Spread(*luminance, hints, is_preview, key));
 }
 
 }  // namespace color3d

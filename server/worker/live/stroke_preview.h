@@ -9,6 +9,7 @@
 #include "color3d/internal/v1/inference.pb.h"
 #include "core/base/image.h"
 #include "core/base/parallel.h"
+#include "core/grid/grid_solver.h"
 #include "core/keycolor/hints/hints.h"
 #include "server/worker/live/byte_bound_cache.h"
 
@@ -33,9 +34,10 @@ class StrokePreview {
 
  private:
   struct Prepared {
-    Image planes;  // L; or a, b
+    Image planes = {};  // L; or a, b; or none
     int own_width = 0;
     int own_height = 0;
+    std::shared_ptr<GridHierarchy> grid = {};  // of the strokes alone, or above other colours
     int64_t bytes = 0;
   };
   using Shared = std::shared_ptr<const Prepared>;
@@ -43,10 +45,17 @@ class StrokePreview {
   Shared Luminance(const Request& request, const ReadBlob& read_blob, std::string* key);
   Shared Automatic(const Prepared& luminance, const std::string& key);
   Shared Below(const Request& request, const Prepared& luminance, const ReadBlob& read_blob);
+  // Without `is_preview` nothing is approximated.
   Image Spread(const Prepared& luminance,
-               const Prepared* below,
                const std::vector<ColorHint>& hints,
+               bool is_preview,
                const std::string& key);
+  Image LayAboveColors(const Prepared& luminance,
+                       const Prepared& below,
+                       const std::vector<ColorHint>& hints,
+                       bool is_preview,
+                       const std::string& key);
+  Image SrgbOf(const Image& luminance, const Image& ab);
 
   ThreadPool pool_;
   ByteBoundCache<Prepared> cache_;
