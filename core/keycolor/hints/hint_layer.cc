@@ -20,12 +20,14 @@ namespace {
 // Coupling of a smooth grid along one axis: the edge along it and the two diagonals.
 constexpr double kAxisCoupling = 1.0 + 1.41421356;
 // The pull below which nothing changes, and from which on the colour is that of the strokes.
-constexpr float kNoPull = 0.08f, kFullPull = 0.45f;
+constexpr float kNoPull = 0.1f, kFullPull = 0.4f;
 // Factor of the screening where a place is as unlike as the options say.
 constexpr float kScreeningOfUnlike = 6.0f;
 constexpr int kTextureRadiusPx = 4;
 constexpr int kLikenessRadiusPx = 2;
 constexpr float kLeastWeight = 1e-6f;
+// Hinted share of a cell from which on its own mean counts alone, so that far hints do not.
+constexpr float kFullWeight = 200.0f;
 
 // The smallest coupling difference of each pixel (1 channel, L units).
 Image SigmaOfTexture(const Image& luminance, const LayerOptions& options) {
@@ -74,7 +76,7 @@ Image MeansNearby(const Image& weighted) {
   for (size_t i = 0; i < weighted.PlaneSize(); ++i) {
     const float weight = weighted.Plane(count)[i];
     if (weight < kLeastWeight) continue;
-    const float own = is_last ? 1.0f : std::min(1.0f, 4.0f * weight);
+    const float own = is_last ? 1.0f : std::min(1.0f, kFullWeight * weight);
     for (int c = 0; c < count; ++c) {
       float& mean = means.Plane(c)[i];
       mean += own * (weighted.Plane(c)[i] / weight - mean);

@@ -20,7 +20,7 @@ struct LayerOptions {
   double texture = 2.0;  // 0..20
   // Distance over which the pull of a long stroke falls to 1/e on a smooth thing, as a share of the
   // longer side, 0.005..1.
-  double reach = 0.1;
+  double reach = 0.15;
   // Differences to what lies under the nearest strokes at which a place counts as unlike.
   double unlike_luminance = 8.0;  // L units, above 0
   double unlike_chroma = 10.0;    // Lab units of the colours below, above 0
