@@ -224,7 +224,7 @@ HintLayer LayerOfHints(const Image& luminance,
   above.automatic_ab = &below;
   HintMap map =
       DrawHints(hints, above, luminance.width, luminance.height, control.progress, control.cancel);
-  std::unique_ptr<GridHierarchy> own;
+  std::shared_ptr<GridHierarchy> own;
   if (prepared == nullptr) own = PrepareLayer(luminance, options, control.pool);
   GridHierarchy& hierarchy = prepared != nullptr ? *prepared : *own;
   HintLayer layer;
@@ -244,11 +244,11 @@ HintLayer LayerOfHints(const Image& luminance,
   return layer;
 }
 
-std::unique_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
+std::shared_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
                                             const LayerOptions& options,
                                             ThreadPool& pool) {
   const Image small = FitWithin(luminance, options.max_side_px);
-  return std::make_unique<GridHierarchy>(
+  return std::make_shared<GridHierarchy>(
       SystemOfLuminance(small, SigmaOfTexture(small, options), pool), pool, CancellationToken());
 }
 

@@ -52,7 +52,7 @@ HintLayer LayerOfHints(const Image& luminance,
 
 // What LayerOfHints needs of the picture alone, for quick answers to changing hints, with the same
 // result. The pool must outlive it.
-std::unique_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
+std::shared_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
                                             const LayerOptions& options,
                                             ThreadPool& pool);
 

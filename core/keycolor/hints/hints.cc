@@ -140,14 +140,16 @@ HintSolution KeyColorFromHints(const Image& luminance,
       prepared);
 }
 
-std::unique_ptr<GridHierarchy> PrepareHints(const Image& luminance,
+std::shared_ptr<GridHierarchy> PrepareHints(const Image& luminance,
                                             const HintOptions& options,
                                             ThreadPool& pool) {
   options.Validate();
   CheckLuminance(luminance);
-  return std::make_unique<GridHierarchy>(
+  return std::make_shared<GridHierarchy>(
       SystemOfLuminance(luminance, options.sigma, pool), pool, CancellationToken());
 }
+
+int64_t BytesOf(const GridHierarchy& prepared) { return prepared.bytes(); }
 
 std::vector<ColorHint> ScaleHints(std::vector<ColorHint> hints, double x, double y) {
   // Thinner ones would cover a pixel here and there.

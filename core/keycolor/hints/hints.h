@@ -91,8 +91,10 @@ HintSolution KeyColorFromHints(const Image& luminance,
 
 // What KeyColorFromHints needs of the picture alone, for quick solutions with changing hints, equal
 // within the tolerance. The pool must outlive it. Requires: sides of at most options.max_side_px.
-std::unique_ptr<GridHierarchy> PrepareHints(const Image& luminance,
+std::shared_ptr<GridHierarchy> PrepareHints(const Image& luminance,
                                             const HintOptions& options,
                                             ThreadPool& pool);
+
+int64_t BytesOf(const GridHierarchy& prepared);
 
 }  // namespace color3d

@@ -30,7 +30,7 @@ constexpr double kPreviewTolerance = 3e-3;
 // Size at which previews of strokes above other colours are solved.
 constexpr int kPreviewLayerSidePx = 500;
 
-int64_t BytesOf(const Image& image) {
+int64_t BytesOfPlanes(const Image& image) {
   return static_cast<int64_t>(image.data.size() * sizeof(float));
 }
 
@@ -54,7 +54,7 @@ StrokePreview::Shared StrokePreview::Luminance(const Request& request,
     const PictureSize own = OrientedSize(info, ReadOrientation(bytes));
     prepared.own_width = own.width;
     prepared.own_height = own.height;
-    prepared.bytes = BytesOf(prepared.planes);
+    prepared.bytes = BytesOfPlanes(prepared.planes);
     return prepared;
   });
 }
@@ -63,7 +63,7 @@ StrokePreview::Shared StrokePreview::Automatic(const Prepared& luminance, const 
   return cache_.Get("automatic " + key, [&] {
     Prepared prepared;
     prepared.planes = AutomaticColorizer::Embedded()->Colorize(luminance.planes).ab;
-    prepared.bytes = BytesOf(prepared.planes);
+    prepared.bytes = BytesOfPlanes(prepared.planes);
     return prepared;
   });
 }
@@ -92,7 +92,7 @@ StrokePreview::Shared StrokePreview::Below(const Request& request,
     if (srgb.channels != 3) throw InvalidArgument("the picture below the strokes has no colour");
     Prepared prepared{
         ChromaOfLab(LabFromSrgb(Resize(srgb, width, height))), own.width, own.height, 0};
-    prepared.bytes = BytesOf(prepared.planes);
+    prepared.bytes = BytesOfPlanes(prepared.planes);
     return prepared;
   });
 }
@@ -118,7 +118,7 @@ Image StrokePreview::Spread(const Prepared& luminance,
     grid = cache_.Get("spread " + key, [&] {
       Prepared prepared;
       prepared.grid = PrepareHints(l, options, pool_);
-      prepared.bytes = prepared.grid->bytes();
+      prepared.bytes = BytesOf(*prepared.grid);
       return prepared;
     });
   }
@@ -150,7 +150,7 @@ Image StrokePreview::LayAboveColors(const Prepared& luminance,
     grid = cache_.Get("layer " + key, [&] {
       Prepared prepared;
       prepared.grid = PrepareLayer(l, options, pool_);
-      prepared.bytes = prepared.grid->bytes();
+      prepared.bytes = BytesOf(*prepared.grid);
       return prepared;
     });
   }

@@ -9,7 +9,6 @@
 #include "color3d/internal/v1/inference.pb.h"
 #include "core/base/image.h"
 #include "core/base/parallel.h"
-#include "core/grid/grid_solver.h"
 #include "core/keycolor/hints/hints.h"
 #include "server/worker/live/byte_bound_cache.h"
 
