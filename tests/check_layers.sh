@@ -165,7 +165,7 @@ public core/grid edge_weights grid_solver
 public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling reduced weighted_resize \
   credit/caption credit/picture_credit probe/focal_length probe/orientation probe/probe
 public core/keycolor edit_model from_image picture_checks recolor automatic/automatic external/remote \
-  external/script hints/hint_map hints/hints references/reference words/prompt
+  external/script hints/hint_layer hints/hint_map hints/hints references/reference words/prompt
 public core/film anchor_frames film_carry moving_regions returning_shots shots steady_colors steady_tones
 public core/keyview collect_features coverage expected_error select tracks view_features
 public core/metrics confidence_interval scene_consistency temporal_consistency view_scores

@@ -83,6 +83,8 @@ std::string DescribeSource(const v1::Job& job) {
   if (field->cpp_type() == google::protobuf::FieldDescriptor::CPPTYPE_STRING) {
     text += " \"" + source.GetReflection()->GetString(source, field) + "\"";
   }
+  const bool is_backend = source.source_case() == v1::KeyColorSource::kBackend;
+  if (source.has_backend_input() && !is_backend) text += ", points above it";
   return text;
 }
 

@@ -12,13 +12,17 @@
 
 namespace color3d::client {
 
-// Source of the colours. Requires: exactly one is set, not empty.
+// Source of the colours. Requires: exactly one is set, not empty; or points besides an example of
+// the same picture or besides the automatic colorizer, whose colours lie below.
 struct LiveSource {
-  std::string colorizer;              // "colorizers/..."
+  std::string colorizer;              // "colorizers/...", kAutomaticColorizer
   std::string scene;                  // "scenes/...", by its newest colorizer
   std::optional<v1::Digest> example;  // a blob: a coloured picture of the same things
   std::string points = {};            // JSON: strokes, px of the picture
 };
+
+// The colorizer of automatic colours.
+inline constexpr char kAutomaticColorizer[] = "colorizers/automatic";
 
 struct LivePicture {
   std::string label;                 // for messages and file names

@@ -62,10 +62,15 @@ std::vector<std::string> Sources(const KeyColorFlags& flags) {
   add(flags.automatic, "--auto");
   add(!flags.script.empty(), "--script");
   if (!flags.backend.empty()) return sources;
-  add(!flags.hints.empty(), "--hints");
   add(!flags.references.empty(), "--reference");
   add(!flags.prompt.empty(), "--prompt");
+  if (sources.empty()) add(!flags.hints.empty(), "--hints");  // else above the source
   return sources;
+}
+
+bool HasHintsAbove(const KeyColorFlags& flags) {
+  const bool is_alone = Sources(flags) == std::vector<std::string>{"--hints"};
+  return !flags.hints.empty() && flags.backend.empty() && !is_alone;
 }
 
 void CheckCombination(const KeyColorFlags& flags) {
@@ -84,8 +89,9 @@ void CheckCombination(const KeyColorFlags& flags) {
         "--labels needs --hints POINTS.json, whose \"label\" entries refer to its values; "
         "omit it");
   }
-  if (backend && !flags.hints.empty() && !IsJson(flags.hints)) {
-    throw InvalidArgument("--hints of a backend must be points (a .json file), not {}",
+  if ((backend || HasHintsAbove(flags)) && !flags.hints.empty() && !IsJson(flags.hints)) {
+    throw InvalidArgument("--hints {} must be points (a .json file), not {}",
+                          backend ? "of a backend" : "above the colours of another source",
                           flags.hints);
   }
   if (backend && flags.references.size() > 1) {
@@ -153,6 +159,10 @@ v1::KeyColorSource MakeSource(const KeyColorFlags& flags, Uploads* uploads) {
   } else {
     *source.mutable_strokes() = uploads->Add(flags.hints);
   }
+  if (HasHintsAbove(flags)) {
+    *source.mutable_backend_input()->mutable_points() = uploads->Add(flags.hints);
+    if (!flags.labels.empty()) *source.mutable_labels() = uploads->Add(flags.labels);
+  }
   return source;
 }
 
@@ -173,7 +183,7 @@ void KeyColorFlags::Check() const {
 }
 
 void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
-  const char* group = "Colour of the key view (one source)";
+  const char* group = "Colour of the key view (one source, and hints above it)";
   const auto text = [&](const char* name, std::string* value, const std::string& help) {
     return app.add_option(name, *value, help)->group(group);
   };
@@ -184,7 +194,7 @@ void DeclareKeyColorFlags(CLI::App& app, KeyColorFlags* flags) {
   text("--hints,--strokes,--points",
        &flags->hints,
        "Colour strokes (PNG of the key view's size, transparent elsewhere), or points, lines and "
-       "regions (JSON)");
+       "regions (JSON); points besides another source change its colours where they lie");
   text("--labels", &flags->labels, "Grey PNG with the values of the \"label\" entries of points");
   app.add_option("--reference",
                  flags->references,

@@ -12,7 +12,7 @@ namespace color3d::client {
 
 struct KeyColorFlags {
   std::string image;   // the key view, coloured
-  std::string hints;   // strokes, or points as .json
+  std::string hints;   // strokes, or points as .json; besides a source points above its colours
   std::string labels;  // label picture of the points
   std::string edit;    // the key view in colour, edited
   std::string mask;    // for edit and backend

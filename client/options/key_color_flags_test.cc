@@ -52,6 +52,9 @@ TEST_F(KeyColorFlagsTest, AcceptsEachSource) {
                                                {"--image", "PNG"},
                                                {"--hints", "PNG"},
                                                {"--points", "JSON", "--labels", "PNG"},
+                                               {"--auto", "--hints", "JSON"},
+                                               {"--key-color", "PNG", "--points", "JSON"},
+                                               {"--reference", "PNG", "--hints", "JSON"},
                                                {"--reference", "PNG", "--reference", "PNG"},
                                                {"--prompt", "red brick", "--model", "clip"},
                                                {"--edit", "PNG", "--mask", "PNG"},
@@ -74,8 +77,8 @@ TEST_F(KeyColorFlagsTest, AcceptsEachSource) {
 }
 
 TEST_F(KeyColorFlagsTest, RefusesTwoSources) {
-  EXPECT_THAT(Complaint({"--auto", "--hints", "JSON"}),
-              AllOf(HasSubstr("--auto and --hints"), HasSubstr("one source")));
+  EXPECT_THAT(Complaint({"--auto", "--key-color", "PNG"}),
+              AllOf(HasSubstr("--key-color and --auto"), HasSubstr("one source")));
   EXPECT_THAT(Complaint({"--backend", "b", "--auto"}), HasSubstr("--backend and --auto"));
   EXPECT_THAT(Complaint({"--prompt", "red", "--model", "clip", "--reference", "PNG"}),
               HasSubstr("--reference and --prompt"));
@@ -89,6 +92,8 @@ TEST_F(KeyColorFlagsTest, NamesRequiredFlag) {
   EXPECT_THAT(Complaint({"--hints", "PNG", "--labels", "PNG"}), HasSubstr(".json"));
   EXPECT_THAT(Complaint({"--mask", "PNG"}), HasSubstr("--edit or --backend"));
   EXPECT_THAT(Complaint({"--backend", "b", "--hints", "PNG"}), HasSubstr(".json"));
+  EXPECT_THAT(Complaint({"--auto", "--hints", "PNG"}),
+              AllOf(HasSubstr("above the colours of another source"), HasSubstr(".json")));
   EXPECT_THAT(Complaint({"--backend", "b", "--reference", "PNG", "--reference", "PNG"}),
               HasSubstr("one --reference, not 2"));
 }

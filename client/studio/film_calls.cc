@@ -47,12 +47,9 @@ FilmFrameColor ReadFrameColor(const nlohmann::json& entry,
     frame.kept = kept->get<int>();
     return frame;
   }
-  const RunChoices choices = ReadChoices(entry, set, sets);
-  frame.view = TextOf(entry, "view");
-  if (frame.view.empty()) throw InvalidArgument("choose the frame that the colours belong to");
-  frame.automatic = choices.automatic;
-  frame.picture = choices.picture;
-  frame.is_strokes = choices.is_strokes;
+  frame.key = ReadKey(entry, set, sets);
+  frame.key.view = TextOf(entry, "view");
+  if (frame.key.view.empty()) throw InvalidArgument("choose the frame that the colours belong to");
   return frame;
 }
 
@@ -77,14 +74,6 @@ bool FlagOf(const nlohmann::json& body, const char* field) {
 
 // ---- what the service is asked -----------------------------------------------------------------
 bool HasRange(const v1::FurtherKeyView& entry) { return entry.has_begin_s() || entry.has_end_s(); }
-
-v1::KeyColorSource SourceOf(Connection& connection, const FilmFrameColor& frame) {
-  KeyColorFlags color;
-  color.automatic = frame.automatic;
-  if (!frame.automatic) (frame.is_strokes ? color.hints : color.image) = frame.picture;
-  color.Check();
-  return UploadKeyColor(connection, color);
-}
 
 // Entries of the job in the order in which the page counts them.
 struct FilmEntries {
@@ -120,8 +109,8 @@ v1::FurtherKeyView MakeEntry(Connection& connection,
     entry.clear_begin_s();
     entry.clear_end_s();
   } else {
-    entry.set_view(frame.view);
-    *entry.mutable_color() = SourceOf(connection, frame);
+    entry.set_view(frame.key.view);
+    *entry.mutable_color() = UploadColors(connection, frame.key.color, frame.key.strokes_file);
   }
   if (frame.begin_s) entry.set_begin_s(*frame.begin_s);
   if (frame.end_s) entry.set_end_s(*frame.end_s);

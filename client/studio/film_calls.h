@@ -15,12 +15,9 @@ namespace color3d::client {
 
 // A coloured frame, as the page wants it.
 struct FilmFrameColor {
-  std::string view;
-  // One of the job that is changed: the number in its list. `view` and colours are then unused.
+  KeyChoice key;
+  // One of the job that is changed: the number in its list. `key` is then unused.
   std::optional<int> kept;
-  bool automatic = true;
-  std::filesystem::path picture;  // else: its coloured picture, or its strokes
-  bool is_strokes = false;
   // Seconds of the film; for parts in other colours only.
   std::optional<double> begin_s = {};
   std::optional<double> end_s = {};

@@ -126,19 +126,19 @@ TEST_F(FilmChoicesTest, ReadsFramesAndParts) {
             {"keys", {{{"kept", 0}}, {{"view", "f000003"}, {"color", "automatic"}}}},
             {"parts",
              {{{"view", "f000007"},
-               {"color", "strokes"},
-               {"strokes", {{{"x", 1}, {"y", 2}, {"color", "#aa0000"}}}},
+               {"color", "nothing"},
+               {"strokes", R"([{"x": 1, "y": 2, "color": "#aa0000"}])"},
                {"begin_s", 0.5},
                {"end_s", 1.0}}}}});
   EXPECT_EQ(choices.preset, "best");
   EXPECT_TRUE(choices.poses);
   EXPECT_EQ(choices.keys[0].kept, 0);
-  EXPECT_EQ(choices.keys[1].view, "f000003");
-  EXPECT_TRUE(choices.keys[1].automatic);
+  EXPECT_EQ(choices.keys[1].key.view, "f000003");
+  EXPECT_EQ(choices.keys[1].key.color.from, ColorChoice::From::kAutomatic);
   ASSERT_EQ(choices.parts.size(), 1u);
-  EXPECT_TRUE(choices.parts[0].is_strokes);
+  EXPECT_EQ(choices.parts[0].key.color.from, ColorChoice::From::kNothing);
   EXPECT_EQ(choices.parts[0].begin_s, 0.5);
-  EXPECT_THAT(ReadFile(choices.parts[0].picture), HasSubstr("#aa0000"));
+  EXPECT_THAT(ReadFile(choices.parts[0].key.strokes_file), HasSubstr("#aa0000"));
 }
 
 TEST_F(FilmChoicesTest, RefusesWhatIsNoChoice) {
@@ -147,7 +147,7 @@ TEST_F(FilmChoicesTest, RefusesWhatIsNoChoice) {
   EXPECT_THAT(WhyNot({{"keys", {{{"kept", -1}}}}}), HasSubstr("kept"));
   EXPECT_THAT(WhyNot({{"keys", {{{"color", "automatic"}}}}}), HasSubstr("frame"));
   EXPECT_THAT(WhyNot({{"parts", {{{"kept", 0}, {"begin_s", "now"}}}}}), HasSubstr("begin_s"));
-  EXPECT_THAT(WhyNot({{"keys", {{{"view", "f1"}, {"color", "strokes"}}}}}), HasSubstr("strokes"));
+  EXPECT_THAT(WhyNot({{"keys", {{{"view", "f1"}, {"color", "nothing"}}}}}), HasSubstr("strokes"));
   EXPECT_THAT(WhyNot({{"preset", "../x"}}), HasSubstr("preset"));
   nlohmann::json many;
   for (int i = 0; i < 65; ++i) many["keys"].push_back({{"kept", i}});

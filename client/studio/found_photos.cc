@@ -206,37 +206,4 @@ std::string PhotoJpeg(const LocalFile& photo, int max_side_px, bool gray) {
   return EncodeJpeg(gray ? GrayOf(image) : image, kJpegQuality);
 }
 
-SmallPhoto MakeSmallPhoto(const LocalFile& photo, int max_side_px) {
-  const Image whole = ReadPhoto(photo);
-  const Image small = FitWithin(whole, max_side_px);
-  return {EncodePng8(GrayOf(small)), static_cast<double>(small.width) / whole.width};
-}
-
-std::string ScaleStrokes(const std::string& strokes, double scale) {
-  Json list = Json::parse(strokes, nullptr, /*allow_exceptions=*/false);
-  if (!list.is_array()) throw InvalidArgument("the strokes are not a JSON list");
-  for (Json& stroke : list) {
-    if (!stroke.is_object()) throw InvalidArgument("a stroke is not a JSON object");
-    for (const char* length : {"x", "y"}) {
-      if (stroke.contains(length) && stroke[length].is_number()) {
-        stroke[length] = stroke[length].get<double>() * scale;
-      }
-    }
-    // Defaults of hints.h, so that they are scaled, too; thinner strokes would cover no pixel.
-    if (stroke.contains("x"))
-      stroke["radius"] = std::max(0.75, stroke.value("radius", 2.0) * scale);
-    if (stroke.contains("line"))
-      stroke["width"] = std::max(1.5, stroke.value("width", 4.0) * scale);
-    for (const char* outline : {"line", "region"}) {
-      if (!stroke.contains(outline) || !stroke[outline].is_array()) continue;
-      for (Json& point : stroke[outline]) {
-        for (Json& value : point) {
-          if (value.is_number()) value = value.get<double>() * scale;
-        }
-      }
-    }
-  }
-  return list.dump();
-}
-
 }  // namespace color3d::client

@@ -38,14 +38,4 @@ const LocalFile& PhotoOfView(const PhotoFolder& folder, const std::string& name)
 // sRGB. `gray`: its luminance. Throws Error{kInvalidArgument} if it cannot be decoded.
 std::string PhotoJpeg(const LocalFile& photo, int max_side_px, bool gray);
 
-struct SmallPhoto {
-  std::string png;     // luminance, 8 bits
-  double scale = 1.0;  // px of the picture per px of the photo
-};
-SmallPhoto MakeSmallPhoto(const LocalFile& photo, int max_side_px);
-
-// Strokes (a JSON list of core/keycolor/hints/hints.h) on a photo, for a picture of it at this
-// scale. Throws Error{kInvalidArgument} unless `strokes` is a list of objects.
-std::string ScaleStrokes(const std::string& strokes, double scale);
-
 }  // namespace color3d::client

@@ -52,22 +52,6 @@ TEST_F(FoundPhotosTest, MakesSmallPictures) {
   EXPECT_EQ(photo.file.filename(), "b.jpg");
   EXPECT_EQ(DecodeImage(PhotoJpeg(photo, 30, false), "small").width, 30);
   EXPECT_EQ(DecodeImage(PhotoJpeg(photo, 0, true), "gray").channels, 1);
-  const SmallPhoto small = MakeSmallPhoto(photo, 30);
-  EXPECT_EQ(small.scale, 0.5);
-}
-
-TEST(ScaleStrokesTest, ScalesAllLengths) {
-  const std::string scaled = ScaleStrokes(
-      R"([{"x":10,"y":4,"radius":8,"color":"#fff000"},{"x":2,"y":2,"keep":"auto"},)"
-      R"({"line":[[10,20],[80,24]],"color":"#a0522d"},{"region":[[0,0],[8,0],[8,8]],"keep":"neutral"}])",
-      0.5);
-  EXPECT_EQ(scaled,
-            R"([{"x":5.0,"y":2.0,"radius":4.0,"color":"#fff000"},)"
-            R"({"x":1.0,"y":1.0,"keep":"auto","radius":1.0},)"
-            R"({"line":[[5.0,10.0],[40.0,12.0]],"color":"#a0522d","width":2.0},)"
-            R"({"region":[[0.0,0.0],[4.0,0.0],[4.0,4.0]],"keep":"neutral"}])");
-  EXPECT_THROW(ScaleStrokes("{}", 0.5), Error);
-  EXPECT_THROW(ScaleStrokes("[1]", 0.5), Error);
 }
 
 TEST(SizeNotesTest, NameOddPhotos) {

@@ -269,13 +269,22 @@ void Studio::Parts::AddSetRoutes() {
   Post(Pattern("sets", "/preview"),
        [this](const Request& request, Response& response, const ContentReader& body) {
          const auto json = ReadJsonBody(request, body);
-         const PhotoFolder folder = FolderOf(request.matches[1]);
-         const int side = std::clamp(json.value("max_side", 1000), 16, 2000);
-         const auto strokes = json.find("strokes");
-         if (strokes == json.end()) throw InvalidArgument("strokes are missing");
-         response.set_content(
-             calls_.PreviewOfStrokes(PhotoOf(folder, TextOf(json, "photo")), strokes->dump(), side),
-             "image/png");
+         const std::string id = request.matches[1];
+         const PhotoFolder folder = FolderOf(id);
+         const int side = json.value("max_side", 1000);
+         response.set_content(calls_.Preview(PhotoOf(folder, TextOf(json, "photo")),
+                                             ReadColor(json, id, sets_),
+                                             TextOf(json, "made_by"),
+                                             side == 0 ? 0 : std::clamp(side, 16, 2000)),
+                              "image/png");
+       });
+  Post(Pattern("sets", "/below"),
+       [this](const Request& request, Response& response, const ContentReader& body) {
+         const auto json = ReadJsonBody(request, body);
+         const std::string id = request.matches[1];
+         const ColorChoice color = ReadColor(json, id, sets_);
+         AnswerJson(JobFacts(calls_.ColorBelow(SceneOf(id), TextOf(json, "photo"), color)),
+                    response);
        });
   Post(Pattern("sets", "/colorize"),
        [this](const Request& request, Response& response, const ContentReader& body) {

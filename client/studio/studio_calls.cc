@@ -5,10 +5,12 @@
 #include <set>
 
 #include "client/commands/follow.h"
+#include "client/commands/key_jobs.h"
 #include "client/commands/results.h"
 #include "client/lib/blob_transfer.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/live_coloring.h"
+#include "client/lib/local_server.h"
 #include "client/lib/names.h"
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
@@ -40,18 +42,10 @@ constexpr milliseconds kQuiet{10'000};
 ColorizeOptions OptionsOf(const RunChoices& choices) {
   ColorizeOptions options;
   options.preset = choices.preset;
-  options.key_view = choices.key_view;
+  options.key_view = choices.key.view;
   options.time_budget_seconds = choices.time_budget_seconds;
   options.poses = choices.poses;
   return options;
-}
-
-v1::KeyColorSource KeyColorOf(Connection& connection, const RunChoices& choices) {
-  KeyColorFlags color;
-  color.automatic = choices.automatic;
-  if (!choices.automatic) (choices.is_strokes ? color.hints : color.image) = choices.picture;
-  color.Check();
-  return UploadKeyColor(connection, color);
 }
 
 // Throws Error{kInvalidArgument} unless each has a photo of its own.
@@ -61,13 +55,13 @@ void CheckKeyViews(const RunChoices& choices) {
                           choices.further.size(),
                           kMaxAdditionalKeyViews);
   }
-  std::set<std::string> views = {choices.key_view};
-  for (const RunChoices& one : choices.further) {
-    if (choices.key_view.empty() || one.key_view.empty()) {
+  std::set<std::string> views = {choices.key.view};
+  for (const KeyChoice& one : choices.further) {
+    if (choices.key.view.empty() || one.view.empty()) {
       throw InvalidArgument("choose the photos that the colours belong to");
     }
-    if (!views.insert(one.key_view).second) {
-      throw InvalidArgument("the photo {} is coloured twice; remove one of them", one.key_view);
+    if (!views.insert(one.view).second) {
+      throw InvalidArgument("the photo {} is coloured twice; remove one of them", one.view);
     }
   }
 }
@@ -119,11 +113,17 @@ std::optional<v1::Job> ColoredKey(Connection& connection, const v1::Job& run) {
 }  // namespace
 
 Json StudioCalls::ServerFacts() const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::ServerInfo info = GetServerInfo(connection);
+  const bool knows_words = std::ranges::any_of(
+      info.models(), [](const v1::ModelInfo& model) { return model.kind() == "clip"; });
   Json presets = Json::array();
   for (const v1::PresetInfo& preset : info.presets()) presets.push_back(preset.name());
-  return {{"version", info.version()}, {"address", connection.address()}, {"presets", presets}};
+  return {{"version", info.version()},
+          {"address", connection.address()},
+          {"presets", presets},
+          {"knows_words", knows_words}};
 }
 
 Json StudioCalls::Plan(const PhotoFolder& folder, const RunChoices& choices) const {
@@ -133,12 +133,14 @@ Json StudioCalls::Plan(const PhotoFolder& folder, const RunChoices& choices) con
   // Every source of colour takes about the same time.
   request.mutable_spec()->mutable_colorize_scene()->mutable_key_color()->set_automatic(true);
   *request.mutable_facts() = CaptureFactsOf(folder);
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return PlanJson(connection.Call(&v1::JobService::Stub::PlanJob, connection.jobs(), request));
 }
 
 std::string StudioCalls::Upload(const PhotoFolder& folder) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const auto entries = BuildManifest(folder, MaxFileBytes(connection), cancel_);
   return UploadScene(connection, entries, folder.Name(), [](int64_t, int64_t) {}).name();
 }
@@ -148,12 +150,14 @@ v1::Job StudioCalls::SelectKeyView(const std::string& scene, int count) const {
   spec.set_scene(ResourceName(scene, "scenes"));
   spec.mutable_select_key_view();
   if (count > 1) spec.mutable_select_key_view()->set_count(count);
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return SubmitJob(connection, spec);
 }
 
 Json StudioCalls::KeyViews(const std::string& job) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::Job select = GetJob(connection, ResourceName(job, "jobs"));
   const Json found = Json::parse(
       ReadArtifact(connection, select, artifact::kKeyView), nullptr, /*allow_exceptions=*/false);
@@ -183,19 +187,21 @@ Json StudioCalls::KeyViews(const std::string& job) const {
 }
 
 v1::Job StudioCalls::Colorize(const std::string& scene, const RunChoices& choices) const {
-  if (!choices.automatic && choices.key_view.empty()) {
+  if (choices.key.color.from != ColorChoice::From::kAutomatic && choices.key.view.empty()) {
     throw InvalidArgument("choose the photo that the colours belong to");
   }
   CheckKeyViews(choices);
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   v1::JobSpec spec = ColorizeSpec(OptionsOf(choices), ResourceName(scene, "scenes"));
-  spec.mutable_colorize_scene()->set_key_view(choices.key_view);
-  *spec.mutable_colorize_scene()->mutable_key_color() = KeyColorOf(connection, choices);
-  for (const RunChoices& one : choices.further) {
-    v1::FurtherKeyView* added =
-        spec.mutable_colorize_scene()->mutable_carry_color()->add_further_key_views();
-    added->set_view(one.key_view);
-    *added->mutable_color() = KeyColorOf(connection, one);
+  v1::ColorizeSceneSpec& job = *spec.mutable_colorize_scene();
+  job.set_key_view(choices.key.view);
+  *job.mutable_key_color() =
+      UploadColors(connection, choices.key.color, choices.key.strokes_file);
+  for (const KeyChoice& key : choices.further) {
+    v1::FurtherKeyView* added = job.mutable_carry_color()->add_further_key_views();
+    added->set_view(key.view);
+    *added->mutable_color() = UploadColors(connection, key.color, key.strokes_file);
   }
   return SubmitJob(connection, spec);
 }
@@ -204,7 +210,8 @@ v1::Job StudioCalls::Cancel(const std::string& job) const {
   v1::CancelJobRequest request;
   request.set_name(ResourceName(job, "jobs"));
   request.set_request_id(NewUuid());
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), request);
 }
 
@@ -212,17 +219,20 @@ v1::Job StudioCalls::Retry(const std::string& job) const {
   v1::RetryJobRequest request;
   request.set_name(ResourceName(job, "jobs"));
   request.set_request_id(NewUuid());
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return connection.Call(&v1::JobService::Stub::RetryJob, connection.jobs(), request);
 }
 
 v1::Job StudioCalls::Job(const std::string& job) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   return GetJob(connection, ResourceName(job, "jobs"));
 }
 
 Json StudioCalls::Jobs() const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   v1::ListJobsRequest request;
   request.set_page_size(kJobsInPage);
   Json list = Json::array();
@@ -246,7 +256,8 @@ Json StudioCalls::Jobs() const {
 
 void StudioCalls::Watch(const std::string& job,
                         const std::function<bool(const std::string&)>& send) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   v1::PlanJobRequest plan;
   *plan.mutable_spec() = run.spec();
@@ -283,7 +294,8 @@ void StudioCalls::Watch(const std::string& job,
 std::string StudioCalls::Fetch(const std::string& job,
                                const std::string& artifact,
                                const std::filesystem::path& file) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::Job made = GetJob(connection, ResourceName(job, "jobs"));
   const v1::Artifact& found = FindArtifact(made, artifact);
   DownloadBlob(
@@ -294,7 +306,8 @@ std::string StudioCalls::Fetch(const std::string& job,
 std::string StudioCalls::PreviewOfRun(const std::string& job,
                                       const LocalFile& photo,
                                       int max_side_px) const {
-  Connection connection = Connect();
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   const std::optional<v1::Job> colored = ColoredKey(connection, run);
   if (!colored) {
@@ -306,17 +319,58 @@ std::string StudioCalls::PreviewOfRun(const std::string& job,
   return LivePng(connection, source, {photo.path, photo.file, std::nullopt}, max_side_px);
 }
 
-std::string StudioCalls::PreviewOfStrokes(const LocalFile& photo,
-                                          const std::string& strokes,
-                                          int max_side_px) const {
-  const ScratchFolder scratch;
-  const SmallPhoto small = MakeSmallPhoto(photo, max_side_px);
-  const auto file = scratch.path() / "photo.png";
-  WriteFileAtomic(file, small.png);
+std::string StudioCalls::Preview(const LocalFile& photo,
+                                 const ColorChoice& color,
+                                 const std::string& made_by,
+                                 int max_side_px) const {
+  using From = ColorChoice::From;
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
   LiveSource source;
-  source.points = ScaleStrokes(strokes, small.scale);
-  Connection connection = Connect();
-  return LivePng(connection, source, {photo.path, file, std::nullopt}, 0);
+  source.points = color.strokes;
+  if (color.from == From::kAutomatic) source.colorizer = kAutomaticColorizer;
+  if (color.from == From::kReference || color.from == From::kWords) {
+    const v1::Job made = GetJob(connection, ResourceName(made_by, "jobs"));
+    source.example = FindArtifact(made, artifact::kKeyViewColored).digest();
+  }
+  const auto ask = [&] {
+    if (color.from == From::kPicture) source.example = blobs_.Of(connection, color.picture);
+    const v1::Digest digest = blobs_.Of(connection, photo.file);
+    return LivePng(connection, source, {photo.path, {}, digest}, max_side_px);
+  };
+  try {
+    return ask();
+  } catch (const Error& e) {
+    if (e.code() != ErrorCode::kNotFound && e.code() != ErrorCode::kFailedPrecondition) throw;
+    blobs_.Forget();  // another service, or it has removed what nothing used
+    return ask();
+  }
+}
+
+v1::Job StudioCalls::ColorBelow(const std::string& scene,
+                                const std::string& view,
+                                const ColorChoice& color) const {
+  if (view.empty()) throw InvalidArgument("choose the photo that the colours belong to");
+  const std::shared_ptr<Connection> kept = Kept();
+  Connection& connection = *kept;
+  v1::JobSpec select;
+  select.set_scene(ResourceName(scene, "scenes"));
+  select.mutable_select_key_view()->set_strategy(v1::SelectKeyViewSpec::STRATEGY_MANUAL);
+  select.mutable_select_key_view()->set_view(view);
+  v1::JobSpec spec;
+  spec.set_scene(select.scene());
+  *spec.mutable_colorize_key_view()->mutable_source() = UploadColors(connection, color, {});
+  const v1::Job selected = SubmitJob(connection, select);
+  for (const std::string& input : JobAndInputs(connection, selected)) spec.add_inputs(input);
+  return SubmitJob(connection, spec);
+}
+
+std::shared_ptr<Connection> StudioCalls::Kept() const {
+  const MutexLock lock(mutex_);
+  // A server of the user's own ends when it is idle: then another one is started.
+  const bool has_ended = kept_ && server_.own_server && !AcceptsConnections(kept_->address());
+  if (!kept_ || has_ended) kept_ = std::make_shared<Connection>(server_, cancel_);
+  return kept_;
 }
 
 }  // namespace color3d::client

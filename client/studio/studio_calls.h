@@ -1,10 +1,10 @@
 // What the page asks of the service, one function each: the same calls as the commands make.
-// Thread-safe; each function makes its own connection, so that a server that ended is found or
-// started again.
+// Thread-safe; all functions share one channel, and a server that ended is found or started again.
 #pragma once
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -12,22 +12,22 @@
 
 #include "client/lib/connection.h"
 #include "client/lib/photos/photo_folder.h"
+#include "client/studio/color_choice.h"
+#include "client/studio/kept_blobs.h"
 #include "client/studio/photo_sets.h"
 #include "color3d/v1/job.pb.h"
+#include "core/base/mutex.h"
 
 namespace color3d::client {
 
 // What the page chose for a run.
 struct RunChoices {
   std::string preset = "fast";
-  std::string key_view;              // empty: the service selects it
-  bool automatic = true;             // else `picture`
-  std::filesystem::path picture;     // a coloured key view, or its strokes
-  bool is_strokes = false;           // `picture` holds points as JSON, as for `key color --hints`
+  KeyChoice key;
+  // More photos that the user coloured, the most important first.
+  std::vector<KeyChoice> further;
   double time_budget_seconds = 0.0;  // 0: none
   bool poses = false;                // films: also a scene in 3D
-  // More photos that the user coloured, the most important first: their key views and colours.
-  std::vector<RunChoices> further;
 };
 
 class StudioCalls {
@@ -35,6 +35,7 @@ class StudioCalls {
   StudioCalls(ServerTarget server, const CancellationToken& cancel)
       : server_(std::move(server)), cancel_(cancel) {}
 
+  // A connection of its own, over a channel of its own.
   Connection Connect() const { return Connection(server_, cancel_); }
 
   nlohmann::ordered_json ServerFacts() const;
@@ -68,14 +69,26 @@ class StudioCalls {
 
   // Colours a photo at screen size as PNG, from the coloured key view of a run.
   std::string PreviewOfRun(const std::string& job, const LocalFile& photo, int max_side_px) const;
-  // The same from strokes on this photo (JSON of `key color --hints`, px of the whole photo).
-  std::string PreviewOfStrokes(const LocalFile& photo,
-                               const std::string& strokes,
-                               int max_side_px) const;
+  // Colours a photo from a choice as PNG, at most `max_side_px` on its longer side; 0: at full
+  // size, exactly as a run does. kReference and kWords need `made_by`, the job of ColorBelow.
+  std::string Preview(const LocalFile& photo,
+                      const ColorChoice& color,
+                      const std::string& made_by,
+                      int max_side_px) const;
+  // Submits the colouring of one photo without its strokes.
+  v1::Job ColorBelow(const std::string& scene,
+                     const std::string& view,
+                     const ColorChoice& color) const;
 
  private:
+  // The connection that all calls share. Finds or starts a server where the user's own has ended.
+  std::shared_ptr<Connection> Kept() const;
+
   const ServerTarget server_;
   const CancellationToken& cancel_;
+  mutable Mutex mutex_;
+  mutable std::shared_ptr<Connection> kept_ COLOR3D_GUARDED_BY(mutex_);
+  mutable KeptBlobs blobs_;
 };
 
 }  // namespace color3d::client

@@ -1,6 +1,7 @@
 #include "client/studio/studio_requests.h"
 
 #include <cstdlib>
+#include <map>
 
 #include "client/studio/run_progress.h"
 #include "core/base/error.h"
@@ -12,26 +13,14 @@ using httplib::Request;
 using Json = nlohmann::ordered_json;
 constexpr int kMaxSidePx = 8192;
 
-// A photo and its colours.
-RunChoices ReadKeyView(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
-  RunChoices choices;
-  choices.key_view = TextOf(body, "key_view");
-  const std::string color = TextOf(body, "color");
-  if (color.empty() || color == "automatic") return choices;
-  choices.automatic = false;
-  if (color == "strokes") {
-    const auto strokes = body.find("strokes");
-    if (strokes == body.end() || !strokes->is_array() || strokes->empty()) {
-      throw InvalidArgument("there are no strokes yet; draw one, or choose automatic colours");
-    }
-    choices.is_strokes = true;
-    choices.picture = sets.KeepPicture(set, ".json", strokes->dump());
-    return choices;
-  }
-  if (color != "picture") throw InvalidArgument("color is automatic, picture or strokes");
-  const std::string picture = TextOf(body, "picture");
-  choices.picture = sets.KeptPicture(set, picture);
-  return choices;
+// The text of a file of strokes, as it is: the service gets the bytes that a saved file has. Empty
+// without strokes.
+std::string StrokesOf(const nlohmann::json& body) {
+  const std::string text = TextOf(body, "strokes");
+  if (text.empty()) return "";
+  const auto list = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (!list.is_array()) throw InvalidArgument("the strokes are not a JSON list");
+  return list.empty() ? "" : text;
 }
 
 }  // namespace
@@ -62,8 +51,49 @@ Json SetJson(const PhotoSet& set) {
           {"as_frames", set.as_frames}};
 }
 
+ColorChoice ReadColor(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
+  using From = ColorChoice::From;
+  static const std::map<std::string, From> kNames = {{"", From::kAutomatic},
+                                                     {"automatic", From::kAutomatic},
+                                                     {"nothing", From::kNothing},
+                                                     {"picture", From::kPicture},
+                                                     {"reference", From::kReference},
+                                                     {"words", From::kWords}};
+  ColorChoice choice;
+  const auto from = kNames.find(TextOf(body, "color"));
+  if (from == kNames.end()) {
+    throw InvalidArgument("color is automatic, nothing, picture, reference or words");
+  }
+  choice.from = from->second;
+  if (choice.from == From::kPicture || choice.from == From::kReference) {
+    choice.picture = sets.KeptPicture(set, TextOf(body, "picture"));
+  }
+  if (choice.from == From::kWords) {
+    choice.words = TextOf(body, "words");
+    if (choice.words.empty()) {
+      throw InvalidArgument("there are no words yet; name things with their colours");
+    }
+  }
+  choice.strokes = StrokesOf(body);
+  if (choice.strokes.empty() && choice.from == From::kNothing) {
+    throw InvalidArgument("there are no strokes yet; draw one, or choose automatic colours");
+  }
+  return choice;
+}
+
+KeyChoice ReadKey(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
+  KeyChoice key;
+  key.view = TextOf(body, "key_view");
+  key.color = ReadColor(body, set, sets);
+  if (!key.color.strokes.empty()) {
+    key.strokes_file = sets.KeepPicture(set, ".json", key.color.strokes);
+  }
+  return key;
+}
+
 RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
-  RunChoices choices = ReadKeyView(body, set, sets);
+  RunChoices choices;
+  choices.key = ReadKey(body, set, sets);
   const std::string preset = TextOf(body, "preset");
   if (preset.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != preset.npos) {
     throw InvalidArgument("the preset {} is unknown", preset.substr(0, 40));  // never a file
@@ -76,7 +106,7 @@ RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, Photo
   if (!further->is_array()) throw InvalidArgument("further is not a list");
   for (const nlohmann::json& one : *further) {
     if (!one.is_object()) throw InvalidArgument("further is not a list of photos");
-    choices.further.push_back(ReadKeyView(one, set, sets));
+    choices.further.push_back(ReadKey(one, set, sets));
   }
   return choices;
 }

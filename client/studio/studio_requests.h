@@ -19,6 +19,13 @@ int SideOf(const httplib::Request& request);
 
 nlohmann::ordered_json SetJson(const PhotoSet& set);
 
+// The colours of a photo of the set and strokes above them. Throws Error{kInvalidArgument}.
+ColorChoice ReadColor(const nlohmann::json& body, const std::string& set, PhotoSets& sets);
+
+// A photo of the set, named by `key_view`, and its colours; strokes are kept beside the set. Throws
+// Error{kInvalidArgument}.
+KeyChoice ReadKey(const nlohmann::json& body, const std::string& set, PhotoSets& sets);
+
 // Choices for a run of the set; strokes are kept beside it. Throws Error{kInvalidArgument}.
 RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, PhotoSets& sets);
 

@@ -41,6 +41,22 @@ const click = async (selector) => {
     await send('Input.dispatchMouseEvent', { type, x, y, button: 'left', clickCount: 1 });
   }
 };
+// A finger draws between two places, shares of the canvas.
+const touchStroke = async (from, to) => {
+  await send('Emulation.setTouchEmulationEnabled', { enabled: true });
+  const box = await evaluate(`(() => {
+    const canvas = document.querySelector('.paint-stage canvas');
+    canvas.scrollIntoView({ block: 'center' });
+    const { x, y, width, height } = canvas.getBoundingClientRect();
+    return { x, y, width, height };
+  })()`);
+  const touch = (type, places) => send('Input.dispatchTouchEvent',
+    { type, touchPoints: places.map(([x, y]) => ({ id: 0, x: box.x + x * box.width, y: box.y + y * box.height })) });
+  await touch('touchStart', [from]);
+  for (let i = 1; i <= 8; ++i) await touch('touchMove', [[0, 1].map((k) => from[k] + ((to[k] - from[k]) * i) / 8)]);
+  await touch('touchEnd', []);
+  await send('Emulation.setTouchEmulationEnabled', { enabled: false });
+};
 const press = async (key, code) => {
   const text = key === 'Enter' ? { text: '\r' } : {};
   for (const type of ['keyDown', 'keyUp']) {
@@ -112,6 +128,12 @@ const use = async () => {
   await waitFor('!!document.querySelector("#colored-picture")');
   await look('picture');
   await click('input[value=automatic]');
+  await waitFor('document.querySelector("#told").textContent === "" && document.querySelector("#key-photo").src.startsWith("blob:")');
+  await click('#paint');
+  await waitFor('!!document.querySelector(".paint-stage canvas")');
+  await touchStroke([0.4, 0.45], [0.6, 0.55]);
+  await waitFor('document.querySelector(".paint").dataset.count === "1" && document.querySelector(".paint").dataset.preview === "shown"');
+  await look('paint');
   await click('#start');
   await waitFor('location.hash.startsWith("#job/") && !!document.querySelector(".stage")');
   await waitFor('!!document.querySelector(".gallery img")', 90000);

@@ -125,10 +125,12 @@ AggregateCycle::AggregateCycle(AggregateGraph finest,
     for (auto* vector : {&level.u, &level.f, &level.r, &level.k, &level.ak}) {
       vector->assign(2 * nodes, 0.0f);
     }
+    level.edge_sum.resize(nodes);
     level.scale.resize(nodes);
     for (int64_t i = 0; i < nodes; ++i) {
       float sum = 0.0f;
       for (int64_t k = g.row_begin[i]; k < g.row_begin[i + 1]; ++k) sum += g.weight[k];
+      level.edge_sum[i] = sum;
       level.scale[i] = JacobiScale(sum, g.data[i]);
     }
     if (nodes <= kCoarsestNodes) break;
@@ -141,6 +143,32 @@ AggregateCycle::AggregateCycle(AggregateGraph finest,
     level.clusters = std::move(clusters);
   }
   FactorCoarsest();
+}
+
+void AggregateCycle::SetData(std::vector<float> finest) {
+  std::vector<float> data = std::move(finest);
+  for (Level& level : levels_) {
+    level.graph.data = std::move(data);
+    const int64_t nodes = level.graph.NodeCount();
+    for (int64_t i = 0; i < nodes; ++i) {
+      level.scale[i] = JacobiScale(level.edge_sum[i], level.graph.data[i]);
+    }
+    data.assign(level.clusters.count, 0.0f);
+    if (data.empty()) break;
+    for (int64_t i = 0; i < nodes; ++i) data[level.clusters.of_node[i]] += level.graph.data[i];
+  }
+  FactorCoarsest();
+}
+
+int64_t AggregateCycle::bytes() const {
+  int64_t bytes = 0;
+  for (const Level& level : levels_) {
+    const AggregateGraph& g = level.graph;
+    bytes += g.NodeCount() * static_cast<int64_t>(13 * sizeof(float) + sizeof(int64_t)) +
+             static_cast<int64_t>(g.weight.size() * (sizeof(float) + sizeof(int32_t)) +
+                                  level.clusters.of_node.size() * sizeof(int32_t));
+  }
+  return bytes;
 }
 
 void AggregateCycle::FactorCoarsest() {

@@ -29,11 +29,16 @@ class AggregateCycle {
   const std::vector<float>& answer() const { return levels_[0].u; }
   void Run() { Solve(0); }
 
+  // Replaces the data of the finest graph, and with it that of all levels. The edges and clusters
+  // stay.
+  void SetData(std::vector<float> finest);
+  int64_t bytes() const;
+
  private:
   struct Level {
     AggregateGraph graph;
     Clusters clusters;  // into the next level; empty on the coarsest
-    std::vector<float> scale;
+    std::vector<float> edge_sum, scale;
     std::vector<float> u, f, r, k, ak;  // interleaved work vectors
     bool twice = false;                 // K-cycle: it costs too much where levels hardly shrink
   };

@@ -26,30 +26,43 @@ Image Smoothed(const Image& luminance, ThreadPool& pool) {
   return smooth;
 }
 
-}  // namespace
-
-GridSystem SystemOfLuminance(const Image& luminance, double sigma, ThreadPool& pool) {
+// `per_sigma(i, j)`: 1 over the sigma of the edge between two pixels.
+template <typename PerSigma>
+GridSystem SystemWith(const Image& luminance, const PerSigma& per_sigma, ThreadPool& pool) {
   GridSystem system(luminance.width, luminance.height);
   const Image smooth = Smoothed(luminance, pool);
-  const auto per_sigma = static_cast<float>(1.0 / sigma);
-  const auto weight = [per_sigma](float x, float y) {
-    const float ratio = std::abs(x - y) * per_sigma;
+  const float* l = smooth.data.data();
+  const auto weight = [&](int64_t i, int64_t j) {
+    const float ratio = std::abs(l[i] - l[j]) * per_sigma(i, j);
     return 1.0f / (1.0f + ratio * ratio * ratio);
   };
   constexpr float kDiagonal = 0.70710678f;
   const int64_t w = luminance.width;
   pool.ForEach(luminance.height, [&](int64_t y, int) {
-    const float* here = smooth.data.data() + y * w;
-    for (int64_t x = 0; x + 1 < w; ++x) system.right[y * w + x] = weight(here[x], here[x + 1]);
+    const int64_t row = y * w;
+    for (int64_t i = row; i + 1 < row + w; ++i) system.right[i] = weight(i, i + 1);
     if (y + 1 == luminance.height) return;
-    const float* below = here + w;
-    for (int64_t x = 0; x < w; ++x) system.down[y * w + x] = weight(here[x], below[x]);
-    for (int64_t x = 0; x + 1 < w; ++x) {
-      system.down_right[y * w + x] = kDiagonal * weight(here[x], below[x + 1]);
-      system.down_left[y * w + x + 1] = kDiagonal * weight(here[x + 1], below[x]);
+    for (int64_t i = row; i < row + w; ++i) system.down[i] = weight(i, i + w);
+    for (int64_t i = row; i + 1 < row + w; ++i) {
+      system.down_right[i] = kDiagonal * weight(i, i + w + 1);
+      system.down_left[i + 1] = kDiagonal * weight(i + 1, i + w);
     }
   });
   return system;
+}
+
+}  // namespace
+
+GridSystem SystemOfLuminance(const Image& luminance, double sigma, ThreadPool& pool) {
+  const auto per_sigma = static_cast<float>(1.0 / sigma);
+  return SystemWith(
+      luminance, [&](int64_t, int64_t) { return per_sigma; }, pool);
+}
+
+GridSystem SystemOfLuminance(const Image& luminance, const Image& sigma, ThreadPool& pool) {
+  const float* each = sigma.data.data();
+  return SystemWith(
+      luminance, [&](int64_t i, int64_t j) { return 1.0f / std::min(each[i], each[j]); }, pool);
 }
 
 }  // namespace color3d

@@ -14,4 +14,8 @@ namespace color3d {
 // floor; without the filter, grain of 2 L units cost up to 0.4 CIEDE2000.
 GridSystem SystemOfLuminance(const Image& luminance, double sigma, ThreadPool& pool);
 
+// The same with a sigma for each pixel (1 channel, above 0); an edge has the smaller one of its
+// ends.
+GridSystem SystemOfLuminance(const Image& luminance, const Image& sigma, ThreadPool& pool);
+
 }  // namespace color3d

@@ -42,11 +42,32 @@ class Solver {
     b_ = MakeVector(system_);
     SetRightSide();
     ComputeScale();
-    clusters_ = ClusterGrid(system_, pool_);
+    own_clusters_ = ClusterGrid(system_, pool_);
     cancel_.ThrowIfCancelled();
-    cycle_ =
-        std::make_unique<AggregateCycle>(CoarsenGrid(system_, clusters_, pool_), pool_, cancel_);
-    for (auto* vector : {&u_, &r_, &z_, &p_, &ap_, &t_}) *vector = MakeVector(system_);
+    own_cycle_ = std::make_unique<AggregateCycle>(
+        CoarsenGrid(system_, own_clusters_, pool_), pool_, cancel_);
+    clusters_ = &own_clusters_;
+    cycle_ = own_cycle_.get();
+    MakeVectors();
+  }
+  // With clusters and a cycle of the same edges without pins and data.
+  Solver(GridSystem&& system,
+         const std::vector<float>& target,
+         const Clusters& clusters,
+         AggregateCycle& cycle,
+         ThreadPool& pool,
+         const CancellationToken& cancel)
+      : system_(std::move(system)),
+        target_(target),
+        pool_(pool),
+        cancel_(cancel),
+        clusters_(&clusters),
+        cycle_(&cycle) {
+    b_ = MakeVector(system_);
+    SetRightSide();
+    ComputeScale();
+    cycle_->SetData(DataOfClusters());
+    MakeVectors();
   }
 
   GridSolution Run(const GridSolveOptions& options,
@@ -73,6 +94,20 @@ class Solver {
   }
 
  private:
+  void MakeVectors() {
+    for (auto* vector : {&u_, &r_, &z_, &p_, &ap_, &t_}) *vector = MakeVector(system_);
+  }
+
+  // Clusters still have the edges to pinned pixels. Holding these at 0 there as well takes more
+  // iterations (measured).
+  std::vector<float> DataOfClusters() const {
+    std::vector<float> data(clusters_->count, 0.0f);
+    for (int64_t i = 0; i < system_.PixelCount(); ++i) {
+      data[clusters_->of_node[i]] += system_.data[i];
+    }
+    return data;
+  }
+
   template <typename Body>
   void ForChunks(Body&& body) {
     const int64_t pixels = system_.PixelCount();
@@ -150,12 +185,13 @@ class Solver {
     });
     std::vector<float>& f = cycle_->right_side();
     const int64_t n = system_.PixelCount();
-    pool_.ForEach(static_cast<int64_t>(clusters_.first.size()) - 1, [&](int64_t range, int) {
-      std::fill(
-          f.begin() + 2 * clusters_.first[range], f.begin() + 2 * clusters_.first[range + 1], 0.0f);
-      const int64_t begin = range * clusters_.range_nodes;
-      for (int64_t i = begin; i < std::min(n, begin + clusters_.range_nodes); ++i) {
-        const int64_t c = clusters_.of_node[i];
+    pool_.ForEach(static_cast<int64_t>(clusters_->first.size()) - 1, [&](int64_t range, int) {
+      std::fill(f.begin() + 2 * clusters_->first[range],
+                f.begin() + 2 * clusters_->first[range + 1],
+                0.0f);
+      const int64_t begin = range * clusters_->range_nodes;
+      for (int64_t i = begin; i < std::min(n, begin + clusters_->range_nodes); ++i) {
+        const int64_t c = clusters_->of_node[i];
         f[2 * c] += t_.a[i];
         f[2 * c + 1] += t_.b[i];
       }
@@ -164,7 +200,7 @@ class Solver {
     const std::vector<float>& correction = cycle_->answer();
     ForChunks([&](int64_t begin, int64_t end, int64_t) {
       for (int64_t i = begin; i < end; ++i) {
-        const int64_t c = clusters_.of_node[i];
+        const int64_t c = clusters_->of_node[i];
         z_.a[i] += correction[2 * c];
         z_.b[i] += correction[2 * c + 1];
       }
@@ -227,13 +263,55 @@ class Solver {
   ThreadPool& pool_;
   const CancellationToken& cancel_;
   GridPlane scale_;
-  Clusters clusters_;
-  std::unique_ptr<AggregateCycle> cycle_;
+  Clusters own_clusters_;
+  std::unique_ptr<AggregateCycle> own_cycle_;
+  const Clusters* clusters_;
+  AggregateCycle* cycle_;
   GridVector b_, u_, r_, z_, p_, ap_, t_;
   GridPair rz_start_{};
 };
 
 }  // namespace
+
+struct GridHierarchy::Parts {
+  GridSystem edges;
+  ThreadPool& pool;
+  Clusters clusters;
+  std::unique_ptr<AggregateCycle> cycle;
+};
+
+GridHierarchy::GridHierarchy(GridSystem edges, ThreadPool& pool, const CancellationToken& cancel)
+    : parts_(new Parts{std::move(edges), pool, {}, nullptr}) {
+  Parts& p = *parts_;
+  p.edges.data.Fill(0.0f);
+  p.edges.pinned.clear();
+  p.clusters = ClusterGrid(p.edges, pool);
+  p.cycle = std::make_unique<AggregateCycle>(CoarsenGrid(p.edges, p.clusters, pool), pool, cancel);
+}
+
+GridHierarchy::~GridHierarchy() = default;
+
+GridSolution GridHierarchy::Solve(std::vector<uint8_t> pinned,
+                                  const GridPlane* data,
+                                  const std::vector<float>& target,
+                                  const GridSolveOptions& options,
+                                  const std::function<void(int, double)>& report,
+                                  const CancellationToken& cancel) {
+  cancel.ThrowIfCancelled();
+  GridSystem system = parts_->edges;
+  system.pinned = std::move(pinned);
+  if (data != nullptr) system.data = *data;
+  return Solver(std::move(system), target, parts_->clusters, *parts_->cycle, parts_->pool, cancel)
+      .Run(options, report);
+}
+
+int GridHierarchy::width() const { return parts_->edges.width; }
+int GridHierarchy::height() const { return parts_->edges.height; }
+
+int64_t GridHierarchy::bytes() const {
+  return parts_->edges.PixelCount() * static_cast<int64_t>(6 * sizeof(float)) +
+         parts_->cycle->bytes();
+}
 
 GridPlane::GridPlane(int width_px, int height_px)
     : margin_(width_px + 1 + kGridMargin),

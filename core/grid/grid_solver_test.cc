@@ -98,6 +98,29 @@ Eigen::MatrixXd DenseSolve(const GridSystem& s, const std::vector<float>& target
   return a.partialPivLu().solve(b);
 }
 
+TEST_P(GridSolverTest, HierarchyServesSeveralPinsDataAndTargets) {
+  const GridSystem edges = RandomSystem(23, 17, 3.0, 1000, 5);
+  ThreadPool pool(2);
+  GridHierarchy hierarchy(edges, pool, {});
+  EXPECT_GT(hierarchy.bytes(), 23 * 17 * 20);
+  for (const int step : {7, 31, 150}) {
+    const GridSystem other = RandomSystem(23, 17, 3.0, step, 5);  // draws the same edges
+    const std::vector<float> target = RandomTarget(other, step);
+    GridSystem system = edges;
+    system.data = other.data;
+    system.pinned = other.pinned;
+    const Eigen::MatrixXd exact = DenseSolve(system, target);
+    const GridSolution solved =
+        hierarchy.Solve(other.pinned, &other.data, target, {1e-6, 200}, [](int, double) {}, {});
+    EXPECT_TRUE(solved.converged);
+    for (int64_t i = 0; i < system.PixelCount(); ++i) {
+      for (int c = 0; c < 2; ++c) {
+        EXPECT_NEAR(solved.u[i + c * system.PixelCount()], exact(i, c), 0.05) << step << " " << i;
+      }
+    }
+  }
+}
+
 TEST_P(GridSolverTest, AgreesWithDenseSolve) {
   struct Case {
     int width, height;

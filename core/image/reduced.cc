@@ -30,13 +30,11 @@ Image ReadImageFitted(const std::filesystem::path& path, int max_side_px) {
                           [&](const PictureSize& own) { return SizeWithin(own, max_side_px); });
 }
 
-Image ReadImageWithin(const std::filesystem::path& path, int max_side_px) {
+Image DecodeImageWithin(std::string_view bytes, const std::string& file_name, int max_side_px) {
   if (max_side_px < 1) {
     throw InvalidArgument("a picture cannot be reduced to {} px", max_side_px);
   }
-  const std::string bytes = ReadFile(path);
-  const std::string name = path.filename().string();
-  const ImageInfo info = ProbeImage(bytes, name);
+  const ImageInfo info = ProbeImage(bytes, file_name);
   DecodeRequest request;
   request.wanted = [&](const PictureSize& own) { return SizeWithin(own, max_side_px); };
   if (info.format == ImageFormat::kJpeg) {
@@ -45,7 +43,11 @@ Image ReadImageWithin(const std::filesystem::path& path, int max_side_px) {
     int& reduction = request.jpeg_reduction;
     while (reduction < 8 && side / (2 * reduction) >= 2 * max_side_px) reduction *= 2;
   }
-  return Decode(bytes, name, info, request);
+  return Decode(bytes, file_name, info, request);
+}
+
+Image ReadImageWithin(const std::filesystem::path& path, int max_side_px) {
+  return DecodeImageWithin(ReadFile(path), path.filename().string(), max_side_px);
 }
 
 }  // namespace color3d

@@ -3,6 +3,8 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
+#include <string_view>
 
 #include "core/base/image.h"
 #include "core/image/probe/orientation.h"
@@ -13,6 +15,7 @@ namespace color3d {
 // enlarged). Large JPEG files are decoded at a fraction of their size, many times quicker than
 // ReadImage. Throws what ReadImage throws.
 Image ReadImageWithin(const std::filesystem::path& path, int max_side_px);
+Image DecodeImageWithin(std::string_view bytes, const std::string& file_name, int max_side_px);
 
 // Decodes like ReadImage and resizes like Resize to the size that `wanted` returns for the
 // picture's own size. Exceptions of `wanted` pass through. Only the reduced copy of a large picture

@@ -9,6 +9,12 @@
 namespace color3d {
 
 // Returns true if the key view applies to a range of time only.
+// Whether the input for a backend is points above the colours of another source.
+inline bool HasPointsAbove(const v1::KeyColorSource& source) {
+  return source.source_case() != v1::KeyColorSource::kBackend && source.has_backend_input() &&
+         source.backend_input().has_points();
+}
+
 inline bool HasRange(const v1::FurtherKeyView& key) { return key.has_begin_s() || key.has_end_s(); }
 
 // Returns pointers into the spec to its additional key views: all of a carry_color job, and the

@@ -107,6 +107,19 @@ void CheckPrompt(const std::string& prompt, const std::string& path) {
   }
 }
 
+// Without a backend its input may only be points, above the colours of the source.
+void CheckPointsAbove(const v1::KeyColorSource& source, const std::string& path) {
+  const bool is_layer = source.source_case() == v1::KeyColorSource::kPoints ||
+                        source.source_case() == v1::KeyColorSource::kStrokes;
+  const v1::BackendInput& input = source.backend_input();
+  if (is_layer) {
+    Reject(path, " is set, but points and strokes have nothing below them; give all as points");
+  }
+  if (!input.has_points() || input.has_reference() || input.has_mask() || !input.prompt().empty()) {
+    Reject(path, " is set, but the source is no backend: only points may lie above its colours");
+  }
+}
+
 // Options that some sources of colour take.
 void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& path) {
   if (!source.model().empty() && !TakesModel(source.source_case())) {
@@ -116,10 +129,11 @@ void CheckKeyColorExtras(const v1::KeyColorSource& source, const std::string& pa
             " is '{}', but only prompt, automatic and references work with a model; leave it out",
             source.model()));
   }
+  const bool is_points = source.source_case() == v1::KeyColorSource::kPoints;
   if (source.has_backend_input() && source.source_case() != v1::KeyColorSource::kBackend) {
-    Reject(path + ".backend_input", " is set, but the source is no backend; leave it out");
+    CheckPointsAbove(source, path + ".backend_input");
   }
-  if (source.has_labels() && source.source_case() != v1::KeyColorSource::kPoints) {
+  if (source.has_labels() && !is_points && !HasPointsAbove(source)) {
     Reject(path + ".labels", " is set, but only points refer to labels; leave it out");
   }
   if (source.has_backend_input() && !source.backend_input().prompt().empty()) {
@@ -242,6 +256,10 @@ void CheckCorrections(const v1::CorrectColorsSpec& spec, const std::string& path
       continue;
     }
     CheckKeyColorExtras(correction.color(), entry + ".color");
+    if (HasPointsAbove(correction.color())) {
+      Reject(entry + ".color.backend_input",
+             " is set, but a correction has one layer; give the points as a correction of their own");
+    }
     switch (correction.color().source_case()) {
       case v1::KeyColorSource::kImage:
       case v1::KeyColorSource::kStrokes:

@@ -102,6 +102,22 @@ TEST(KeyColorSpec, RefusesOptionsOfOtherSources) {
                 *s->mutable_labels() = SomeDigest("l");
               }),
               HasSubstr("key_color.labels"));
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                *s->mutable_points() = SomeDigest("p");
+                *s->mutable_backend_input()->mutable_points() = SomeDigest("a");
+              }),
+              HasSubstr("backend_input is set, but points and strokes have nothing below"));
+  EXPECT_THAT(CheckMessage([](auto* s) {
+                s->set_automatic(true);
+                *s->mutable_backend_input()->mutable_mask() = SomeDigest("m");
+              }),
+              HasSubstr("only points may lie above"));
+  EXPECT_EQ(CheckMessage([](auto* s) {
+              s->set_automatic(true);
+              *s->mutable_backend_input()->mutable_points() = SomeDigest("a");
+              *s->mutable_labels() = SomeDigest("l");
+            }),
+            "accepted");
 }
 
 // The refusal of the paper's preset with these options, or "accepted".

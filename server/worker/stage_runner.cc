@@ -52,7 +52,6 @@ ColorizeKeyViewOptions SourceOptionsFrom(const v1::KeyColorSource& source, BlobS
     case v1::KeyColorSource::kPoints:
       options.source = Source::kPoints;
       options.file = blobs.Fetch(source.points().sha256());
-      options.labels = FetchIf(source.has_labels(), source.labels(), blobs);
       break;
     case v1::KeyColorSource::kReference:
       options.source = Source::kReferences;
@@ -89,7 +88,10 @@ ColorizeKeyViewOptions SourceOptionsFrom(const v1::KeyColorSource& source, BlobS
 }
 
 ColorizeKeyViewOptions KeyColorOptions(const v1::ColorizeKeyViewSpec& spec, BlobSource& blobs) {
-  ColorizeKeyViewOptions options = SourceOptionsFrom(spec.source(), blobs);
+  const v1::KeyColorSource& source = spec.source();
+  ColorizeKeyViewOptions options = SourceOptionsFrom(source, blobs);
+  options.above = FetchIf(HasPointsAbove(source), source.backend_input().points(), blobs);
+  options.labels = FetchIf(source.has_labels(), source.labels(), blobs);
   options.hints = HintOptionsFrom(spec);
   options.view = spec.view();
   return options;

@@ -1,4 +1,5 @@
-// The studio in a real browser, on a rendered room: from a folder to the coloured scene.
+// The studio in a real browser, on a rendered room: from a folder to the coloured scene, with the
+// stroke of a finger.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -44,8 +45,11 @@ TEST_F(StudioTest, FolderBecomesColoredScene) {
   EXPECT_THAT(text("again"), HasSubstr("room"));
   EXPECT_THAT(text("again"), HasSubstr("being coloured"));
   EXPECT_THAT(text("done"), HasSubstr("view.html"));
-  // The same job as on the command line.
-  EXPECT_EQ(NewestJob("colorize_scene").state(), v1::Job::STATE_SUCCEEDED);
+  // The same job as on the command line, with the stroke of a finger above automatic colours.
+  const v1::Job run = NewestJob("colorize_scene");
+  EXPECT_EQ(run.state(), v1::Job::STATE_SUCCEEDED);
+  EXPECT_TRUE(run.spec().colorize_scene().key_color().automatic());
+  EXPECT_TRUE(run.spec().colorize_scene().key_color().backend_input().has_points());
   studio.Signal(SIGINT);
   EXPECT_EQ(studio.Wait(seconds(10)), 0) << studio.Err();
 }

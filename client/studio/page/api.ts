@@ -35,11 +35,13 @@ export interface KeyViews {
   views: { name: string; expected_error: number | null; saves: number | null }[];
 }
 export interface State {
-  server: { version: string; address: string; presets: string[] }; sets: PhotoSet[]; jobs: Job[];
+  server: { version: string; address: string; presets: string[]; knows_words: boolean }; sets: PhotoSet[]; jobs: Job[];
 }
-export interface KeyChoice {
-  key_view: string; color: 'automatic' | 'picture' | 'strokes'; picture?: string; strokes?: readonly unknown[];
-}
+// Where the colours of a photo come from, and strokes above them. picture: a kept one; made_by: the job that coloured the
+// photo by a reference or words; strokes: the text of a file of strokes.
+export type Source = 'automatic' | 'picture' | 'reference' | 'words' | 'nothing';
+export interface Colors { color: Source; picture?: string; words?: string; made_by?: string; strokes?: string }
+export interface KeyChoice extends Colors { key_view: string }
 export interface Choices extends KeyChoice {
   preset: string;
   poses?: boolean; // films: also a scene in 3D
@@ -83,17 +85,20 @@ export const planRun = (id: string, preset: string): Promise<Plan> => post(`/api
 export const selectKey = (id: string, count: number): Promise<Job> => post(`/api/sets/${id}/key`, { count });
 export const keyViews = (job: string): Promise<KeyViews> => get(`/api/jobs/${job}/key-views`);
 export const colorize = (id: string, choices: Choices): Promise<Job> => post(`/api/sets/${id}/colorize`, choices);
-export const previewStrokes = async (
-  id: string, photo: string, strokes: readonly unknown[], maxSide: number, signal: AbortSignal,
-): Promise<ImageBitmap> => {
-  const body = JSON.stringify({ photo, strokes, max_side: maxSide });
-  const response = await answerOf(fetch(`/api/sets/${id}/preview`, { method: 'POST', body, signal }));
-  return createImageBitmap(await response.blob());
+// A PNG of the coloured photo; maxSide 0: at full size, as a run colours it.
+export const previewColors = async (
+  id: string, photo: string, colors: Colors, maxSide: number, signal?: AbortSignal,
+): Promise<Blob> => {
+  const body = JSON.stringify({ photo, ...colors, max_side: maxSide });
+  return (await answerOf(fetch(`/api/sets/${id}/preview`, { method: 'POST', body, signal }))).blob();
 };
 export const getJob = (id: string): Promise<Job> => get(`/api/jobs/${id}`);
 export const getRun = async (id: string): Promise<Run> => new Promise((done, failed) => {
   const stop = follow(id, { run: (run) => { stop(); done(run); }, problem: (text) => failed(new StudioError(text, 'UNKNOWN')), end: () => undefined });
 });
+// Colours one photo by a reference or words: a job.
+export const colorBelow = (id: string, photo: string, colors: Colors): Promise<Job> =>
+  post(`/api/sets/${id}/below`, { photo, ...colors });
 export const cancelJob = (id: string): Promise<Job> => post(`/api/jobs/${id}/cancel`);
 export const retryJob = (id: string): Promise<Job> => post(`/api/jobs/${id}/retry`);
 export const artifactUrl = (job: string, name: string, download = false): string =>

@@ -1,15 +1,16 @@
 // Which photo is coloured, and with what.
 import {
-  colorize, describeSet, follow, getState, keepPicture, keyViews, photoUrl, previewStrokes, selectKey,
-  type Choices, type Found, type KeyChoice, type KeyViews, type Run,
+  colorize, describeSet, follow, getState, keyViews, photoUrl, previewColors, selectKey,
+  type Colors, type Found, type KeyChoice, type KeyViews, type Run,
 } from './api';
 import { bar, button, h, problem, replace, say } from './dom';
+import { colorSources } from './key_colors';
 import { furtherKeys } from './keys/further_keys';
 import { asChoices } from './keys/key_list';
-import { Painter, type StrokeFile } from './paint/index';
+import { Painter, serializeStrokes, type StrokeFile } from './paint/index';
 import { errorInWords, seconds, stageName } from './words';
 
-type Way = Choices['color'];
+const shownSide = 1000; // px of previews
 const maxChosen = 4;
 
 // Selections that are known, so that going back and forth asks once.
@@ -48,8 +49,8 @@ const reason = ({ view, description, views }: KeyViews): string => {
 export const showKey = (main: HTMLElement, set: string): (() => void) => {
   const stops: (() => void)[] = [];
   let left = false;
-  let view = '', way: Way = 'automatic', picture = '';
-  let strokes: StrokeFile = [];
+  let view = '';
+  const strokesOf = new Map<string, StrokeFile>(); // by photo
   let painter: Painter | undefined;
   const waiting = bar('Choosing the photo');
   const doing = h('p', { class: 'soft' }, 'Looking at the photos …');
@@ -61,58 +62,129 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
     painter = undefined;
   };
 
-  const build = (found: Found, views: KeyViews, presets: string[]): void => {
+  const build = (found: Found, views: KeyViews, presets: string[], knowsWords: boolean): void => {
     const stage = h('div', { class: 'key-stage' });
     const name = h('p', { class: 'key-name' });
     const problems = h('div', {});
-    const mount = async (): Promise<void> => {
+    const told = h('p', { class: 'soft small', role: 'status', id: 'told' });
+    const showProblem = (text: string | null): void => replace(problems, text !== null && problem(text));
+    const photoOf = (wanted: string) => found.photos.find((photo) => photo.name === wanted);
+    const withStrokes = (colors: Colors, strokes: StrokeFile | undefined): Colors =>
+      strokes?.length ? { ...colors, strokes: serializeStrokes(strokes) } : colors;
+    const sources = colorSources({
+      set, knowsWords, view: () => view, problem: showProblem, change: () => void showBelow(),
+      size: () => {
+        const { width, height } = photoOf(view) ?? {};
+        return width && height ? { width, height } : undefined;
+      },
+    });
+
+    // The photo in the colours that lie below the strokes, as soon as there are any.
+    let below: Blob | undefined, turn = 0;
+    let asking: AbortController | undefined;
+    const showBelow = async (): Promise<void> => {
+      const mine = ++turn;
+      asking?.abort();
+      below = undefined;
+      await putBelow();
+      const colors = sources.seen();
+      if (!colors || !photoOf(view)) return;
+      told.textContent = 'Its colours are being made …';
+      asking = new AbortController();
+      try {
+        const picture = await previewColors(set, view, colors, shownSide, asking.signal);
+        if (left || mine !== turn) return;
+        below = picture;
+        await putBelow();
+        told.textContent = '';
+      } catch (error) {
+        if (left || mine !== turn) return;
+        told.textContent = '';
+        showProblem((error as Error).message);
+      }
+    };
+    const putBelow = async (): Promise<void> => {
+      if (painter) {
+        painter.setAutomatic(below ? await createImageBitmap(below) : null);
+        return;
+      }
+      const image = stage.querySelector<HTMLImageElement>('#key-photo');
+      if (!image) return;
+      const url = below ? URL.createObjectURL(below) : photoUrl(set, view, 1600, true);
+      image.onload = () => URL.revokeObjectURL(url);
+      image.src = url;
+      image.alt = below ? `The photo ${view} in its colours` : `The photo ${view}`;
+    };
+
+    const showStill = (): void => {
       endPainter();
-      const isPhoto = found.photos.some((photo) => photo.name === view);
-      const image = h('img', { id: 'key-photo', alt: `The photo ${view}`, ...(isPhoto ? { src: photoUrl(set, view, 1600, way !== 'picture') } : {}) });
-      replace(stage, isPhoto ? image : h('p', { class: 'soft' }, view || 'The service chooses it.'));
-      if (way !== 'strokes' || !isPhoto) return;
+      paint.setAttribute('aria-pressed', 'false');
+      replace(stage, photoOf(view) ? h('img', { id: 'key-photo', alt: `The photo ${view}`, src: photoUrl(set, view, 1600, true) })
+        : h('p', { class: 'soft' }, view || 'The service chooses it.'));
+      void putBelow();
+    };
+    const showPainter = async (): Promise<void> => {
+      const mine = view;
       const response = await fetch(photoUrl(set, view, 0, true));
       const photo = await createImageBitmap(await response.blob());
-      if (left || (way as Way) !== 'strokes') return;
+      if (left || mine !== view) return;
+      endPainter();
       const host = h('div', { class: 'painter', id: 'painter' });
       replace(stage, host);
       painter = new Painter(host, {
         photo,
-        preview: (now, side, signal) => previewStrokes(set, view, now, side, signal),
-        onChange: (now) => { strokes = now; },
+        preview: async (now, side, signal) =>
+          createImageBitmap(await previewColors(set, mine, withStrokes(sources.seen() ?? { color: 'nothing' }, now), side, signal)),
+        onChange: (now) => strokesOf.set(mine, now),
       });
-      if (strokes.length) painter.load(strokes);
+      const strokes = strokesOf.get(mine);
+      if (strokes?.length) painter.load(strokes);
+      paint.setAttribute('aria-pressed', 'true');
+      await putBelow();
+    };
+    const paint = button('Paint on the photo', () => {
+      if (painter) showStill();
+      else showPainter().catch((error: Error) => showProblem(error.message));
+    }, { id: 'paint', 'aria-pressed': 'false' });
+
+    // At full size, as a run colours it.
+    const save = button('Save the coloured picture', () => void savePicture(), { id: 'save-picture' });
+    const savePicture = async (): Promise<void> => {
+      save.disabled = true;
+      told.textContent = 'The picture is being made in full size …';
+      try {
+        const colors = withStrokes(sources.seen() ?? sources.now(), strokesOf.get(view));
+        const url = URL.createObjectURL(await previewColors(set, view, colors, 0));
+        h('a', { href: url, download: `${view.replace(/^.*\//, '').replace(/\.[^.]*$/, '')}_coloured.png` }).click();
+        setTimeout(() => URL.revokeObjectURL(url), 10000);
+        showProblem(null);
+      } catch (error) {
+        showProblem((error as Error).message);
+      }
+      told.textContent = '';
+      save.disabled = false;
     };
 
-    const keyNow = (): KeyChoice => {
-      if (painter) strokes = painter.strokes();
-      if (way === 'strokes' && !strokes.length) throw new Error('Draw a stroke first, or choose automatic colours.');
-      if (way === 'picture' && !picture) throw new Error('Bring the coloured picture first.');
-      return { key_view: view, color: way, ...(way === 'picture' ? { picture } : {}), ...(way === 'strokes' ? { strokes } : {}) };
-    };
     const also = furtherKeys<KeyChoice>({
-      set, key: keyNow, proposed: views.views.map(({ name }) => name), photos: found.photos.map(({ name }) => name),
+      set, proposed: views.views.map(({ name }) => name), photos: found.photos.map(({ name }) => name),
+      key: () => ({ key_view: view, ...withStrokes(sources.now(), strokesOf.get(view)) }),
       go: (next, kept) => {
         choose(next);
-        if (!kept) return;
-        picture = kept.picture ?? '';
-        strokes = (kept.strokes ?? []) as StrokeFile;
-        const radio = wayChoice.querySelector<HTMLInputElement>(`input[value=${kept.color}]`);
-        if (radio) radio.checked = true;
-        pickWay(kept.color);
+        if (kept) sources.restore(kept);
       },
-      problem: (text) => replace(problems, text !== null && problem(text)),
+      problem: showProblem,
     });
 
     const choose = (next: string): void => {
-      if (next !== view) strokes = [];
       view = next;
-      picture = '';
       name.textContent = view;
       for (const item of options.querySelectorAll('button')) {
         item.setAttribute('aria-pressed', String(item.dataset.view === view));
       }
-      void mount();
+      paint.disabled = save.disabled = !photoOf(view);
+      sources.forget();
+      showStill();
+      void showBelow();
     };
     const option = (row: KeyViews['views'][number], i: number): HTMLElement => {
       const saves = row.saves ?? 0;
@@ -124,40 +196,6 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
     const others = h('select', { id: 'other-view', onchange: (event) => choose((event.currentTarget as HTMLSelectElement).value) },
       h('option', { value: '' }, 'another photo …'), ...found.photos.map((photo) => h('option', { value: photo.name }, photo.name)));
     const options = h('ul', { class: 'key-options' }, ...views.views.map(option));
-
-    const ways: [Way, string, string][] = [
-      ['automatic', 'Automatic', 'The program guesses sky, plants, skin and wood. It cannot know the colour of a coat.'],
-      ['strokes', 'Paint', 'Give a few things their colour; it spreads up to their edges.'],
-      ['picture', 'A picture I coloured', 'Save the photo, colour it in a paint program, and bring it back in the same size.'],
-    ];
-    const detail = h('div', { class: 'way-detail' });
-    const pickWay = (next: Way): void => {
-      way = next;
-      const [, , text] = ways.find(([value]) => value === way)!;
-      const pictureInput = h('input', { type: 'file', accept: 'image/*', id: 'colored-picture', class: 'said', onchange: (event) => void bring(event) });
-      replace(detail, h('p', { class: 'soft' }, text), way === 'picture' && h('p', { class: 'row' },
-        h('a', { class: 'button', href: photoUrl(set, view), download: view.replace(/^.*\//, '').replace(/\.[^.]*$/, '.jpg') }, 'Save the photo'),
-        h('span', { class: 'file-choice' }, pictureInput, h('label', { for: 'colored-picture', class: 'button' }, 'Bring the coloured picture')),
-        h('span', { id: 'brought', class: 'soft', role: 'status' })));
-      void mount();
-    };
-    const bring = async (event: Event): Promise<void> => {
-      const file = (event.currentTarget as HTMLInputElement).files?.[0];
-      if (!file) return;
-      try {
-        const kept = await keepPicture(set, file);
-        picture = kept.picture;
-        document.getElementById('brought')!.textContent = `${file.name}, ${kept.width} × ${kept.height}`;
-        const url = URL.createObjectURL(file);
-        replace(stage, h('img', { src: url, alt: 'The photo as you coloured it', onload: () => URL.revokeObjectURL(url) }));
-        replace(problems);
-      } catch (error) {
-        replace(problems, problem((error as Error).message));
-      }
-    };
-    const wayChoice = h('fieldset', { class: 'choices' }, h('legend', {}, 'Its colours'),
-      ...ways.map(([value, label]) => h('label', {},
-        h('input', { type: 'radio', name: 'way', value, checked: value === way, onchange: () => pickWay(value) }), ` ${label}`)));
 
     const presetWords: Record<string, string> = { fast: 'Fast', best: 'Best, takes several times as long' };
     const preset = h('select', { id: 'preset' }, ...presets.filter((value) => presetWords[value])
@@ -174,20 +212,30 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
         replace(problems, problem((error as Error).message));
       }
     };
+    const allowFile = (event: Event): void => event.preventDefault();
+    const dropFile = (event: Event): void => {
+      event.preventDefault();
+      const file = (event as DragEvent).dataTransfer?.files[0];
+      if (file && photoOf(view)) void sources.take(file);
+    };
     replace(body,
       h('p', { class: 'lead' }, reason(views)),
       h('div', { class: 'key-layout' },
-        h('div', { class: 'key-main' }, name, stage,
+        h('div', { class: 'key-main', ondragover: allowFile, ondrop: dropFile }, name, stage,
+          h('p', { class: 'row key-actions' }, paint, save), told,
           h('section', { 'aria-labelledby': 'which' }, h('h2', { id: 'which' }, 'Which photo'), options,
             found.photos.length > 1 && h('p', {}, h('label', { for: 'other-view', class: 'said' }, 'Another photo'), others),
             found.photos.length > 1 && also.root)),
         h('div', { class: 'key-side panel' },
-          wayChoice, detail, problems,
+          sources.root, problems,
           h('p', { class: 'row' }, h('label', { for: 'preset' }, 'Quality'), preset),
           found.kind === 'film' && h('label', { class: 'choice' }, poses, ' Also a scene in 3D: finds how the camera moved, and takes several times as long'),
           h('p', {}, start))));
     choose(views.view);
-    pickWay(way);
+    stops.push(() => {
+      sources.stop();
+      asking?.abort();
+    });
     say(`The proposed photo is ${views.view}`);
   };
 
@@ -200,7 +248,7 @@ export const showKey = (main: HTMLElement, set: string): (() => void) => {
         say(doing.textContent);
         waiting.set(now && now.share > 0 ? now.share : null);
       }, stops);
-      if (!left) build(found, views, server.presets);
+      if (!left) build(found, views, server.presets, server.knows_words);
     } catch (error) {
       if (!left) replace(body, problem((error as Error).message, button('Try again', () => showAgain())));
     }

@@ -11,6 +11,7 @@
 #include "core/base/error.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
+#include "core/image/codec.h"
 
 namespace color3d {
 namespace {
@@ -46,6 +47,7 @@ class HintDrawer {
     hint_ = &hint;
     drawn_ = 0;
     CheckColor();
+    if (hint.fill == ColorHint::Fill::kAutomatic) map_.kept.resize(map_.hinted.size(), 0);
     switch (hint.shape) {
       case ColorHint::Shape::kDisc:
         DrawDisc();
@@ -60,6 +62,7 @@ class HintDrawer {
         DrawLabel();
         break;
     }
+    if (drawn_ == 0 && pictures_.is_reduced) DrawSomePixel();
     if (drawn_ == 0) throw InvalidArgument("{} covers no pixel of the photo", Name());
   }
 
@@ -115,6 +118,7 @@ class HintDrawer {
       if (contradictions_++ == 0) first_pair_ = {entry_of_[i], entry_};
     }
     map_.hinted[i] = 1;
+    if (!map_.kept.empty()) map_.kept[i] = hint_->fill == ColorHint::Fill::kAutomatic;
     entry_of_[i] = static_cast<int32_t>(entry_);
     as[i] = a;
     bs[i] = b;
@@ -187,6 +191,14 @@ class HintDrawer {
     }
   }
 
+  // The pixel at the beginning of a line or region.
+  void DrawSomePixel() {
+    if (hint_->points_px.empty()) return;
+    const Point& point = hint_->points_px[0];
+    Set(std::min(static_cast<int>(point[0]), width_ - 1),
+        std::min(static_cast<int>(point[1]), height_ - 1));
+  }
+
   void DrawLabel() {
     if (pictures_.labels == nullptr) {
       throw InvalidArgument(
@@ -256,6 +268,29 @@ HintMap HintsFromStrokes(const Image& strokes) {
                         : std::hypot(lab.Plane(1)[i], lab.Plane(2)[i]) > kChromaOfHint;
   }
   return map;
+}
+
+HintMap ReduceHints(const HintMap& full, int width, int height) {
+  Image weighted(full.ab.width, full.ab.height, full.kept.empty() ? 3 : 4);
+  for (size_t i = 0; i < full.hinted.size(); ++i) {
+    if (!full.hinted[i]) continue;
+    weighted.Plane(0)[i] = full.ab.Plane(0)[i];
+    weighted.Plane(1)[i] = full.ab.Plane(1)[i];
+    weighted.Plane(2)[i] = 1.0f;
+    if (!full.kept.empty()) weighted.Plane(3)[i] = full.kept[i];
+  }
+  weighted = Resize(weighted, width, height);
+  HintMap small{std::vector<uint8_t>(weighted.PlaneSize(), 0), Image(width, height, 2)};
+  if (!full.kept.empty()) small.kept.resize(weighted.PlaneSize(), 0);
+  for (size_t i = 0; i < small.hinted.size(); ++i) {
+    const float share = weighted.Plane(2)[i];
+    if (share < 1e-4f) continue;
+    small.hinted[i] = 1;
+    small.ab.Plane(0)[i] = weighted.Plane(0)[i] / share;
+    small.ab.Plane(1)[i] = weighted.Plane(1)[i] / share;
+    if (!full.kept.empty()) small.kept[i] = weighted.Plane(3)[i] > 0.5f * share;
+  }
+  return small;
 }
 
 }  // namespace color3d

@@ -11,8 +11,10 @@
 namespace color3d {
 
 struct HintMap {
-  std::vector<uint8_t> hinted;  // 1 where the colour is given
-  Image ab;                     // 2 channels; valid where hinted
+  std::vector<uint8_t> hinted;     // 1 where the colour is given
+  Image ab;                        // 2 channels; valid where hinted
+  std::vector<uint8_t> kept = {};  // 1 where hinted by Fill::kAutomatic; empty: nowhere
+  bool IsKept(size_t i) const { return !kept.empty() && kept[i] != 0; }
 };
 
 // Throws Error{kInvalidArgument} naming an entry that is malformed or lies outside the picture of
@@ -25,5 +27,8 @@ HintMap DrawHints(const std::vector<ColorHint>& hints,
                   const CancellationToken& cancel);
 // Hints from a strokes picture, as in KeyColorFromStrokes.
 HintMap HintsFromStrokes(const Image& strokes);
+// The hints on a smaller grid. A cell with any hinted pixel is hinted, so that thin strokes
+// survive, and has their mean colour.
+HintMap ReduceHints(const HintMap& full, int width, int height);
 
 }  // namespace color3d

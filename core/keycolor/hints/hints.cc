@@ -26,45 +26,27 @@ void CheckLuminance(const Image& luminance) {
   }
 }
 
-// The hints on a smaller grid. A cell with any hinted pixel is hinted, so that thin strokes
-// survive, and has their mean colour.
-HintMap Reduce(const HintMap& full, int width, int height) {
-  Image weighted(full.ab.width, full.ab.height, 3);
-  for (size_t i = 0; i < full.hinted.size(); ++i) {
-    if (!full.hinted[i]) continue;
-    weighted.Plane(0)[i] = full.ab.Plane(0)[i];
-    weighted.Plane(1)[i] = full.ab.Plane(1)[i];
-    weighted.Plane(2)[i] = 1.0f;
-  }
-  weighted = Resize(weighted, width, height);
-  HintMap small{std::vector<uint8_t>(weighted.PlaneSize(), 0), Image(width, height, 2)};
-  for (size_t i = 0; i < small.hinted.size(); ++i) {
-    const float share = weighted.Plane(2)[i];
-    if (share < 1e-4f) continue;
-    small.hinted[i] = 1;
-    small.ab.Plane(0)[i] = weighted.Plane(0)[i] / share;
-    small.ab.Plane(1)[i] = weighted.Plane(1)[i] / share;
-  }
-  return small;
-}
-
 // Propagates hints over a picture of the same size. Sets all of the solution but hinted_pixels.
 HintSolution SolveAtSize(const Image& luminance,
                          HintMap hints,
                          const HintOptions& options,
-                         const RunControl& control) {
-  GridSystem system = SystemOfLuminance(luminance, options.sigma, control.pool);
-  system.pinned = std::move(hints.hinted);
-  GridSolution solved = SolveGridSystem(
-      std::move(system),
-      hints.ab.data,
-      {options.tolerance, options.max_iterations},
-      control.pool,
-      [&](int iteration, double residual) {
-        control.progress.OnError(iteration, "relative_residual", residual);
-        control.progress.OnProgress(iteration, 0, "spreading the colour hints");
-      },
-      control.cancel);
+                         const RunControl& control,
+                         GridHierarchy* prepared = nullptr) {
+  const GridSolveOptions until{options.tolerance, options.max_iterations};
+  const auto report = [&](int iteration, double residual) {
+    control.progress.OnError(iteration, "relative_residual", residual);
+    control.progress.OnProgress(iteration, 0, "spreading the colour hints");
+  };
+  GridSolution solved;
+  if (prepared != nullptr) {
+    solved = prepared->Solve(
+        std::move(hints.hinted), nullptr, hints.ab.data, until, report, control.cancel);
+  } else {
+    GridSystem system = SystemOfLuminance(luminance, options.sigma, control.pool);
+    system.pinned = std::move(hints.hinted);
+    solved = SolveGridSystem(
+        std::move(system), hints.ab.data, until, control.pool, report, control.cancel);
+  }
   if (!solved.converged) {
     control.progress.OnWarning(fmt::format(
         "colour hints: the solver stopped after {} iterations at a relative residual of {:.3g}",
@@ -84,14 +66,15 @@ HintSolution SolveAtSize(const Image& luminance,
 HintSolution Solve(const Image& luminance,
                    HintMap hints,
                    const HintOptions& options,
-                   const RunControl& control) {
+                   const RunControl& control,
+                   GridHierarchy* prepared = nullptr) {
   const int64_t hinted = std::count(hints.hinted.begin(), hints.hinted.end(), 1);
   HintSolution solution;
   if (std::max(luminance.width, luminance.height) <= options.max_side_px) {
-    solution = SolveAtSize(luminance, std::move(hints), options, control);
+    solution = SolveAtSize(luminance, std::move(hints), options, control, prepared);
   } else {
     const Image small = FitWithin(luminance, options.max_side_px);
-    solution = SolveAtSize(small, Reduce(hints, small.width, small.height), options, control);
+    solution = SolveAtSize(small, ReduceHints(hints, small.width, small.height), options, control);
     solution.ab = UpsampleGuided(solution.ab, luminance);
     for (size_t i = 0; i < hints.hinted.size(); ++i) {
       if (!hints.hinted[i]) continue;
@@ -144,7 +127,8 @@ HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,
                                const RunControl& control,
-                               const HintPictures& pictures) {
+                               const HintPictures& pictures,
+                               GridHierarchy* prepared) {
   options.Validate();
   CheckLuminance(luminance);
   return Solve(
@@ -152,7 +136,36 @@ HintSolution KeyColorFromHints(const Image& luminance,
       DrawHints(
           hints, pictures, luminance.width, luminance.height, control.progress, control.cancel),
       options,
-      control);
+      control,
+      prepared);
+}
+
+std::shared_ptr<GridHierarchy> PrepareHints(const Image& luminance,
+                                            const HintOptions& options,
+                                            ThreadPool& pool) {
+  options.Validate();
+  CheckLuminance(luminance);
+  return std::make_shared<GridHierarchy>(
+      SystemOfLuminance(luminance, options.sigma, pool), pool, CancellationToken());
+}
+
+int64_t BytesOf(const GridHierarchy& prepared) { return prepared.bytes(); }
+
+std::vector<ColorHint> ScaleHints(std::vector<ColorHint> hints, double x, double y) {
+  // Thinner ones would cover a pixel here and there.
+  constexpr double kLeastRadiusPx = 0.75;
+  const double mean = std::sqrt(x * y);
+  for (ColorHint& hint : hints) {
+    hint.x_px *= x;
+    hint.y_px *= y;
+    if (mean < 1.0) {
+      hint.radius_px = std::max(std::min(kLeastRadiusPx, hint.radius_px), hint.radius_px * mean);
+    } else {
+      hint.radius_px *= mean;
+    }
+    for (auto& point : hint.points_px) point = {point[0] * x, point[1] * y};
+  }
+  return hints;
 }
 
 }  // namespace color3d

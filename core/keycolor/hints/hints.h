@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 
 namespace color3d {
 
+class GridHierarchy;
 inline constexpr double kMinReach = 0.1, kMaxReach = 2.0;
 
 // Pixels of given colour: a disc, a line, a polygon, or a label of a label picture.
@@ -55,6 +57,9 @@ struct HintSolution {
 struct HintPictures {
   const Image* labels = nullptr;        // 1 channel, value * 255 is the label
   const Image* automatic_ab = nullptr;  // 2 channels, for Fill::kAutomatic
+  // The hints were made for a larger picture (ScaleHints): those that are too small for a pixel get
+  // one.
+  bool is_reduced = false;
 };
 
 // Strokes as a picture of the key photo's size: 4 channels (pixels with alpha > 0.5 are hints), or
@@ -75,12 +80,25 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
 // Error{kInvalidArgument} naming the entry.
 std::vector<ColorHint> ParseHintsJson(const std::string& json);
 
+// The hints for a copy of the picture whose sides are these shares of the picture's, above 0.
+std::vector<ColorHint> ScaleHints(std::vector<ColorHint> hints, double x, double y);
+
 // Propagates the hints. Throws an error naming a hint that lies outside the picture or covers no
 // pixel. Where hints overlap, the last one wins; warns if they contradict each other.
+// `prepared`: of the same picture and sigma, see PrepareHints; null: none.
 HintSolution KeyColorFromHints(const Image& luminance,
                                const std::vector<ColorHint>& hints,
                                const HintOptions& options,
                                const RunControl& control,
-                               const HintPictures& pictures = {});
+                               const HintPictures& pictures = {},
+                               GridHierarchy* prepared = nullptr);
+
+// What KeyColorFromHints needs of the picture alone, for quick solutions with changing hints, equal
+// within the tolerance. The pool must outlive it. Requires: sides of at most options.max_side_px.
+std::shared_ptr<GridHierarchy> PrepareHints(const Image& luminance,
+                                            const HintOptions& options,
+                                            ThreadPool& pool);
+
+int64_t BytesOf(const GridHierarchy& prepared);
 
 }  // namespace color3d

@@ -25,9 +25,10 @@ struct ColorizeKeyViewOptions {
   std::filesystem::path file;  // image, strokes, points (JSON) or edit; backend: points or empty
   std::vector<std::filesystem::path> references;  // references: 1..16; backend: at most 1
   std::filesystem::path mask;                     // edit and backend; empty: everywhere
-  std::filesystem::path labels;                   // points: the picture that labels refer to
-  std::string prompt;                             // prompt; backend, may be empty
-  std::string name;  // weights, script or backend by name; empty: the embedded model
+  std::filesystem::path labels;                   // points, above: what labels refer to
+  std::filesystem::path above;  // points (JSON) above the colours of the source; empty: none
+  std::string prompt;           // prompt; backend, may be empty
+  std::string name;             // weights, script or backend by name; empty: the embedded model
   HintOptions hints;
   std::string view;  // additional key view: name or unique file stem; empty: the chosen key view
   bool operator==(const ColorizeKeyViewOptions&) const = default;

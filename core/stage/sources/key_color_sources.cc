@@ -14,6 +14,7 @@
 #include "core/keycolor/external/remote.h"
 #include "core/keycolor/external/script.h"
 #include "core/keycolor/from_image.h"
+#include "core/keycolor/hints/hint_layer.h"
 #include "core/keycolor/recolor.h"
 #include "core/keycolor/references/reference.h"
 #include "core/keycolor/words/prompt.h"
@@ -205,6 +206,27 @@ KeyColorResult FromPrompt(const Options& options, const KeyPhoto& photo, StageCo
   return result;
 }
 
+// Lays the points of the options above the colours of the source.
+void LayPointsAbove(const Options& options,
+                    const KeyPhoto& photo,
+                    StageContext& context,
+                    KeyColorResult* result) {
+  const auto hints = ParseHintsJson(ReadFile(options.above, kMaxPointsBytes));
+  const Image labels = options.labels.empty() ? Image() : ReadStoredValues(options.labels);
+  HintPictures pictures;
+  if (!labels.Empty()) pictures.labels = &labels;
+  const HintLayer layer =
+      LayerOfHints(photo.luminance, result->ab, hints, {}, context.control(), pictures);
+  LayAbove(layer, &result->ab);
+  for (size_t i = 0; i < result->confidence.data.size(); ++i) {
+    float& confidence = result->confidence.data[i];
+    confidence += layer.share.data[i] * (1.0f - confidence);
+  }
+  result->facts["above"] = {{"hinted_pixels", layer.hinted_pixels},
+                            {"share", MeanOf(layer.share)},
+                            {"iterations", layer.iterations}};
+}
+
 struct SourceRow {
   Options::Source source;
   const char* name;
@@ -236,7 +258,9 @@ KeyColorResult SolveKeyColor(const ColorizeKeyViewOptions& options,
                              const KeyPhoto& photo,
                              StageContext& context) {
   SetTorchThreads(context.pool().thread_count(), /*blas_threads=*/1);
-  return Find(options.source).solve(options, photo, context);
+  KeyColorResult result = Find(options.source).solve(options, photo, context);
+  if (!options.above.empty()) LayPointsAbove(options, photo, context, &result);
+  return result;
 }
 
 }  // namespace color3d

@@ -10,6 +10,8 @@ namespace color3d {
 namespace {
 
 constexpr size_t kMaxImageBytes = 3 << 20;
+// Name of the colorizer that no job made.
+constexpr char kAutomaticColorizer[] = "colorizers/automatic";
 constexpr size_t kMaxPointsBytes = 1 << 20;
 constexpr size_t kMaxRequestIdBytes = 128;
 constexpr int kMinSidePx = 16;
@@ -55,6 +57,20 @@ void TakePicture(const RpcParts& parts,
         "max_side_px is {}; the range is 16 to 8192, or 0 for the picture's own size", side);
   }
   call->set_max_side_px(side);
+}
+
+void TakeStrokes(const RpcParts& parts,
+                 const ProjectStore& store,
+                 v1::ColorizeImagesRequest* request,
+                 internal::v1::ColorizeImageRequest* call) {
+  if (request->points().size() > kMaxPointsBytes) {
+    throw InvalidArgument("points has {} bytes; at most 1 MiB is allowed; merge strokes",
+                          request->points().size());
+  }
+  call->mutable_points()->swap(*request->mutable_points());
+  if (request->has_example()) {
+    call->set_below_sha256(RequireBlob(parts, store, request->example(), "example"));
+  }
 }
 
 ColorizerRecord NewestOf(const ProjectStore& store, const std::string& scene) {
@@ -105,18 +121,19 @@ void ResolveColorizeRequest(const RpcParts& parts,
   }
   response->set_request_id(request->request_id());
   const bool trained = !request->colorizer().empty() || !request->scene().empty();
+  const bool automatic = request->colorizer() == kAutomaticColorizer;
   const bool has_points = !request->points().empty();
-  if (int{trained} + int{request->has_example()} + int{has_points} != 1) {
-    throw InvalidArgument("set one of colorizer, scene, example and points");
+  const int sources = int{trained} + int{request->has_example()};
+  if (sources > 1 || (sources == 0 && !has_points) || (has_points && trained && !automatic)) {
+    throw InvalidArgument(
+        "set one of colorizer, scene, example and points, or points besides an example or {}",
+        kAutomaticColorizer);
   }
   TakePicture(parts, store, request, call);
-  if (has_points) {
-    if (request->points().size() > kMaxPointsBytes) {
-      throw InvalidArgument("points has {} bytes; at most 1 MiB is allowed; merge strokes",
-                            request->points().size());
-    }
-    call->mutable_points()->swap(*request->mutable_points());
-    return;
+  if (has_points || automatic) {
+    call->set_automatic(automatic);
+    response->set_colorizer(request->colorizer());
+    return TakeStrokes(parts, store, request, call);
   }
   if (request->has_example()) {
     call->set_example_sha256(RequireBlob(parts, store, request->example(), "example"));

@@ -12,12 +12,11 @@
 #include "core/colorizer/personal/train_colorizer.h"
 #include "core/encoder/encoder.h"
 #include "core/image/codec.h"
-#include "core/keycolor/automatic/automatic.h"
-#include "core/keycolor/hints/hints.h"
 #include "core/keycolor/picture_checks.h"
 #include "server/base/service_error.h"
-#include "server/worker/live/colorizer_cache.h"
 #include "server/worker/live/live_engine.h"
+#include "server/worker/live/loaded_colorizer.h"
+#include "server/worker/live/stroke_preview.h"
 
 namespace color3d {
 namespace {
@@ -36,7 +35,7 @@ constexpr int64_t kMaxFileBytes = int64_t{256} << 20;
 class CoreLiveEngine : public LiveEngine {
  public:
   explicit CoreLiveEngine(const LiveEngineSetup& setup)
-      : setup_(setup), cache_(setup.cache_bytes) {}
+      : setup_(setup), cache_(setup.cache_bytes), strokes_(setup.threads, setup.picture_bytes) {}
 
   void WarmUp() override { embedded_ = Encoder::Embedded(); }
   void Colorize(std::vector<LiveTask>& tasks) override;
@@ -52,11 +51,9 @@ class CoreLiveEngine : public LiveEngine {
   Picture Prepare(const Request& request);
   // Colours pictures of any scenes; pictures of equal size share a pass of the encoder.
   static std::vector<Image> ColorizeBatch(const std::vector<Picture>& group);
-  // Answers a picture with strokes.
-  void Spread(const Request& request, internal::v1::ColorizeImageResponse* answer);
   // Colours and answers the group, then empties it.
   void Finish(std::vector<Picture>& group);
-  void Answer(const Image& luminance, const Image& ab, internal::v1::ColorizeImageResponse* answer);
+  void Answer(const Image& srgb, internal::v1::ColorizeImageResponse* answer);
   Image ReadLuminance(const Request& request);
   std::string KeyOf(const Request& request);
   std::shared_ptr<const Encoder> FindEncoder(const std::string& name);
@@ -71,6 +68,7 @@ class CoreLiveEngine : public LiveEngine {
 
   const LiveEngineSetup setup_;
   ColorizerCache cache_;
+  StrokePreview strokes_;
   FileDigests digests_;
   std::shared_ptr<const Encoder> embedded_;
   // Encoders of users by digest of the file, kept while a cached colorizer refers to them.
@@ -161,32 +159,8 @@ CoreLiveEngine::Picture CoreLiveEngine::Prepare(const Request& request) {
   return picture;
 }
 
-// As colorize_key_view does with points.
-void CoreLiveEngine::Spread(const Request& request, internal::v1::ColorizeImageResponse* answer) {
-  const std::vector<ColorHint> hints = ParseHintsJson(request.points());
-  const Image luminance = ReadLuminance(request);
-  const bool asks_automatic = std::ranges::any_of(
-      hints, [](const ColorHint& hint) { return hint.fill == ColorHint::Fill::kAutomatic; });
-  Image automatic;
-  HintPictures pictures;
-  if (asks_automatic) {
-    automatic = AutomaticColorizer::Embedded()->Colorize(luminance).ab;
-    pictures.automatic_ab = &automatic;
-  }
-  ThreadPool pool(setup_.threads);
-  NoCheckpoints checkpoints;
-  NullObserver progress;
-  const CancellationToken never;
-  const HintSolution solution =
-      KeyColorFromHints(luminance, hints, {}, {pool, checkpoints, progress, never}, pictures);
-  const int side = request.max_side_px() > 0 ? request.max_side_px() : 0;
-  Answer(FitWithin(luminance, side), FitWithin(solution.ab, side), answer);
-}
-
-void CoreLiveEngine::Answer(const Image& luminance,
-                            const Image& ab,
-                            internal::v1::ColorizeImageResponse* answer) {
-  std::string png = EncodePng8(SrgbFromLab(JoinLab(luminance, ab)));
+void CoreLiveEngine::Answer(const Image& srgb, internal::v1::ColorizeImageResponse* answer) {
+  std::string png = EncodePng8(srgb);
   if (png.size() <= kMaxMessageImageBytes) {
     answer->mutable_image()->swap(png);
     return;
@@ -217,7 +191,7 @@ void CoreLiveEngine::Finish(std::vector<Picture>& group) {
     Picture& picture = group[i];
     try {
       if (ab[i].Empty()) ab[i] = picture.loaded->colorizer->Colorize(picture.luminance);
-      Answer(picture.luminance, ab[i], picture.task->response);
+      Answer(SrgbFromLab(JoinLab(picture.luminance, ab[i])), picture.task->response);
       picture.task->response->set_encoder_digest(picture.loaded->encoder->digest());
     } catch (const std::exception&) {
       picture.task->error = std::current_exception();
@@ -231,8 +205,9 @@ void CoreLiveEngine::Colorize(std::vector<LiveTask>& tasks) {
   int64_t pixels = 0;
   for (LiveTask& task : tasks) {
     try {
-      if (!task.request->points().empty()) {
-        Spread(*task.request, task.response);
+      if (StrokePreview::Takes(*task.request)) {
+        const auto read = [this](const std::string& sha256) { return ReadBlob(sha256); };
+        Answer(strokes_.Colorize(*task.request, read), task.response);
         continue;
       }
       Picture picture = Prepare(*task.request);

@@ -220,5 +220,49 @@ TEST_F(CoreLiveEngineTest, AnswersLargeResultsAsBlobs) {
   EXPECT_EQ(DecodeImage(png, "the answer").width, 1500);
 }
 
+Request ByPoints(const std::string& points, const std::string& image, int side = 0) {
+  Request request;
+  request.set_points(points);
+  request.set_image(image);
+  request.set_max_side_px(side);
+  return request;
+}
+
+TEST_F(CoreLiveEngineTest, StrokesAreSolvedAtTheSizeOfTheAnswer) {
+  const std::string image = GrayPng(480, 400);
+  const std::string stroke =
+      R"([{"line": [[40, 40], [440, 360]], "width": 9, "color": "#b04040"},
+          {"x": 470.5, "y": 399.5, "radius": 0.5, "color": "#b04040"}])";
+  const auto errors = Run({ByPoints(stroke, image), ByPoints(stroke, image, 120)});
+  EXPECT_EQ(errors, (std::vector<std::string>{"", ""}));
+  const MeanLab whole = MeanOf(LabOf(0)), small = MeanOf(LabOf(1));
+  EXPECT_EQ(LabOf(0).width, 480);
+  EXPECT_EQ(LabOf(1).width, 120);
+  EXPECT_NEAR(whole.a, small.a, 1.0);
+  EXPECT_NEAR(whole.b, small.b, 1.0);
+  EXPECT_GT(small.a, 20.0);
+}
+
+TEST_F(CoreLiveEngineTest, StrokesLieAboveAPictureOrAutomaticColors) {
+  const std::string image = GrayPng(240, 200);
+  const std::string stroke = R"([{"x": 30, "y": 30, "radius": 6, "color": "#b04040"}])";
+  Request above = ByPoints(stroke, image);
+  above.set_below_sha256(Put(EncodePng8(SrgbFromLab(TintedLab(-30, 20, 240, 200)))));
+  Request automatic = ByPoints("", image), above_automatic = ByPoints(stroke, image);
+  automatic.set_automatic(true);
+  above_automatic.set_automatic(true);
+  Request other_shape = above;
+  other_shape.set_below_sha256(Put(EncodePng8(SrgbFromLab(TintedLab(-30, 20, 240, 100)))));
+  const auto errors = Run({above, automatic, above_automatic, other_shape});
+  EXPECT_EQ(errors[0] + errors[1] + errors[2], "");
+  EXPECT_THAT(errors[3], HasSubstr("below the strokes has 240x100 px, the photo 240x200"));
+  const Image lab = LabOf(0);
+  EXPECT_GT(lab.At(1, 30, 30), 25.0f);
+  EXPECT_NEAR(lab.At(1, 180, 220), -30.0f, 2.0f);
+  const Image guessed = LabOf(1), with_stroke = LabOf(2);
+  EXPECT_GT(with_stroke.At(1, 30, 30), 25.0f);
+  EXPECT_NEAR(with_stroke.At(1, 180, 220), guessed.At(1, 180, 220), 1e-3f);
+}
+
 }  // namespace
 }  // namespace color3d

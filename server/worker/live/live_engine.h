@@ -34,7 +34,8 @@ struct LiveEngineSetup {
   WorkerBlobs& blobs;  // must outlive the engine
   UserModels models;
   int threads = 1;
-  int64_t cache_bytes = int64_t{512} << 20;  // size of the colorizer cache
+  int64_t cache_bytes = int64_t{512} << 20;    // size of the colorizer cache
+  int64_t picture_bytes = int64_t{256} << 20;  // size of the cache of pictures with strokes
 };
 
 // Implemented in core_live_engine.cc.

@@ -12,7 +12,7 @@ export interface JobTimeline {
   next: { view: string; error_now: number; error_with: number } | null; poses: boolean;
 }
 export interface FrameColor {
-  kept?: number; view?: string; color?: string; strokes?: readonly unknown[]; picture?: string;
+  kept?: number; view?: string; color?: string; strokes?: string; picture?: string;
   begin_s?: number; end_s?: number;
 }
 export interface FilmChoices {

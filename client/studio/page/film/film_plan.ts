@@ -114,8 +114,8 @@ export class FilmPlan {
 
   toBody(): { keys: FrameColor[]; parts: FrameColor[] } {
     const entry = (one: Coloring): FrameColor => one.way === 'kept' ? { kept: one.kept! } : {
-      view: this.film.names[one.frame]!, color: one.way,
-      ...(one.way === 'strokes' ? { strokes: one.strokes } : {}),
+      view: this.film.names[one.frame]!, color: one.way === 'strokes' ? 'automatic' : one.way, // strokes lie above automatic colours
+      ...(one.way === 'strokes' ? { strokes: serializeStrokes(one.strokes as StrokeFile) } : {}),
       ...(one.way === 'picture' ? { picture: one.picture } : {}),
     };
     return {

@@ -31,7 +31,7 @@ test('what is sent has the colours of each frame', () => {
   const { keys, parts } = plan.toBody();
   assert.deepEqual(keys, [{ view: 'f4.png', color: 'automatic' }, { view: 'f9.png', color: 'picture', picture: 'p.png' }]);
   assert.equal(parts[0]!.view, 'f20.png');
-  assert.deepEqual(parts[0]!.strokes, strokes);
+  assert.deepEqual(JSON.parse(parts[0]!.strokes!), strokes);
   assert.ok(parts[0]!.begin_s! < 2 && parts[0]!.end_s! > 2);
 });
 

@@ -1,7 +1,7 @@
 // The film with its timeline: what is shown, what is picked, and the painter in place of the film.
-import { previewStrokes } from '../api';
+import { previewColors } from '../api';
 import { button, h, replace, say } from '../dom';
-import { Painter, type StrokeFile } from '../paint/index';
+import { Painter, serializeStrokes, type StrokeFile } from '../paint/index';
 import { ColoringPanel, type List } from './coloring_panel';
 import { frameUrl, type FilmFacts } from './film_api';
 import type { FilmPlan } from './film_plan';
@@ -182,7 +182,8 @@ export class Workspace {
     this.root.parentElement?.classList.add('film-painting');
     this.painter = new Painter(host, {
       photo,
-      preview: (strokes, side, signal) => previewStrokes(set, name, strokes, side, signal),
+      preview: async (strokes, side, signal) => createImageBitmap(
+        await previewColors(set, name, { color: 'automatic', strokes: serializeStrokes(strokes) }, side, signal)),
       onChange: (strokes) => {
         plan.color(list, index, { way: 'strokes', strokes }, joins);
         joins = true;

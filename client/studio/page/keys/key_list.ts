@@ -1,7 +1,5 @@
 // The photos that the user coloured for one run, the most important first. Pure functions.
 
-export interface KeyColors { key_view: string; color: string; picture?: string; strokes?: readonly unknown[] }
-
 // The list with `key` in the place of the same photo, else at its end.
 export const withKey = <T extends { key_view: string }>(keys: readonly T[], key: T): T[] => {
   const at = keys.findIndex(({ key_view }) => key_view === key.key_view);

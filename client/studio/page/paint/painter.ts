@@ -52,6 +52,7 @@ export class Painter {
   private readonly dialog: HTMLDialogElement;
   private action: Action | undefined;
   private noteTimer: ReturnType<typeof setTimeout> | undefined;
+  private changedAt = 0; // ms
   private luminanceTimer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(host: HTMLElement, private readonly options: PainterOptions) {
@@ -73,6 +74,7 @@ export class Painter {
         this.previewNote.textContent = state === 'waiting' ? texts.previewWaiting
           : state === 'failed' ? filled(texts.previewFailed, problem ?? '') : '';
         this.root.dataset.preview = state;
+        if (state === 'shown') this.root.dataset.previewMs = String(Math.round(performance.now() - this.changedAt));
       },
     });
     this.bar = actionBar({
@@ -139,10 +141,11 @@ export class Painter {
   strokes(): StrokeFile {
     return this.document.entries;
   }
-  // Colours of an automatic colourizer, of the photo's shape, shown under the strokes.
+  // The colours that lie below the strokes, of the photo's shape; null: none. Their source is asked for a new preview.
   setAutomatic(picture: ImageBitmap | null): void {
     this.stage.layers.setAutomatic(picture);
     this.layers.setAvailable('automatic', picture !== null);
+    this.askPreview();
     this.stage.redraw();
   }
   // Gives the canvas the keys. The keys count while the focus is anywhere in the painter.
@@ -160,12 +163,15 @@ export class Painter {
   }
 
   private changed(isLoad: boolean): void {
-    const strokes = this.document.entries;
-    const { width, height } = this.stage.layers.size;
-    this.previews.changed(strokes, Math.min(previewSide, Math.max(width, height)));
+    this.changedAt = performance.now();
+    this.askPreview();
     this.stage.redraw();
     this.showState();
-    if (!isLoad) this.options.onChange?.(strokes);
+    if (!isLoad) this.options.onChange?.(this.document.entries);
+  }
+  private askPreview(): void {
+    const { width, height } = this.stage.layers.size;
+    this.previews.changed(this.document.entries, Math.min(previewSide, Math.max(width, height)));
   }
   private setPreview(bitmap: ImageBitmap | null): void {
     this.stage.layers.preview?.close();

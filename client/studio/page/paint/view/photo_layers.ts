@@ -1,4 +1,5 @@
-// The pictures of the canvas from bottom to top: the photo in grey, automatic colours, the preview, the strokes.
+// The pictures of the canvas from bottom to top: the photo in grey, the colours below the strokes, the preview, the
+// strokes.
 import type { Luminance } from '../region/edge_weights';
 import { luminanceFromBytes } from '../color/lab';
 import { isDisc, isLine, isRegion, type StrokeEntry, type StrokeFile } from '../model/stroke_file';

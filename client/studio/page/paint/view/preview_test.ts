@@ -35,7 +35,23 @@ test('changes in quick succession ask once, for the last', async () => {
   assert.deepEqual(pictures.map((picture) => picture?.of), [dot(4)]);
 });
 
-test('a running preview is withdrawn, and its late picture is not shown', async () => {
+test('while one is under way the newest strokes wait, and only they are asked for next', async () => {
+  const asked: StrokeFile[] = [];
+  const { loop, pictures, states } = loopOf(async (strokes) => {
+    asked.push(strokes);
+    await pause(40);
+    return new Picture(strokes);
+  });
+  loop.changed(dot(1), 100);
+  await pause(25);
+  for (let i = 2; i < 6; ++i) loop.changed(dot(i), 100);
+  await pause(130);
+  assert.deepEqual(asked, [dot(1), dot(5)]);
+  assert.deepEqual(pictures.map((picture) => picture?.of), [dot(1), dot(5)]);
+  assert.equal(states.filter((state) => state === 'shown').length, 1);
+});
+
+test('what is stopped is withdrawn, and its late picture is not shown', async () => {
   const late: Picture[] = [];
   let aborted = 0;
   const { loop, pictures } = loopOf(async (strokes, _, signal) => {
@@ -47,11 +63,11 @@ test('a running preview is withdrawn, and its late picture is not shown', async 
   });
   loop.changed(dot(1), 100);
   await pause(25);
-  loop.changed(dot(2), 100);
-  await pause(110);
+  loop.changed([], 100);
+  await pause(60);
   assert.equal(aborted, 1);
-  assert.deepEqual(pictures.map((picture) => picture?.of), [dot(2)]);
-  assert.deepEqual(late.map(({ isClosed }) => isClosed), [true, false]);
+  assert.deepEqual(pictures, [null]);
+  assert.deepEqual(late.map(({ isClosed }) => isClosed), [true]);
 });
 
 test('a failure is told, and the next change tries anew', async () => {

@@ -1,4 +1,4 @@
-#include "server/worker/live/colorizer_cache.h"
+#include "server/worker/live/byte_bound_cache.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,14 @@
 namespace color3d {
 namespace {
 
-LoadedColorizer Sized(int64_t bytes) { return {nullptr, nullptr, bytes}; }
+struct Loaded {
+  int64_t bytes = 0;
+};
+using Cache = ByteBoundCache<Loaded>;
+Loaded Sized(int64_t bytes) { return {bytes}; }
 
-TEST(ColorizerCacheTest, LoadsOnceAndEvictsLeastRecentlyUsed) {
-  ColorizerCache cache(100);
+TEST(ByteBoundCacheTest, LoadsOnceAndEvictsLeastRecentlyUsed) {
+  Cache cache(100);
   int loads = 0;
   const auto get = [&](const std::string& key) {
     cache.Get(key, [&] {
@@ -29,8 +33,8 @@ TEST(ColorizerCacheTest, LoadsOnceAndEvictsLeastRecentlyUsed) {
   EXPECT_EQ(cache.size(), 2u);
 }
 
-TEST(ColorizerCacheTest, KeepsColorizersInUseBeyondBound) {
-  ColorizerCache cache(100);
+TEST(ByteBoundCacheTest, KeepsColorizersInUseBeyondBound) {
+  Cache cache(100);
   const auto used = cache.Get("used", [] { return Sized(90); });
   const auto also = cache.Get("also", [] { return Sized(90); });
   cache.Get("idle", [] { return Sized(90); });
@@ -40,9 +44,9 @@ TEST(ColorizerCacheTest, KeepsColorizersInUseBeyondBound) {
   EXPECT_EQ(cache.Get("also", [] { return Sized(1); }), also);
 }
 
-TEST(ColorizerCacheTest, FailedLoadIsNotCached) {
-  ColorizerCache cache(100);
-  EXPECT_THROW(cache.Get("a", []() -> LoadedColorizer { throw InvalidArgument("bad"); }), Error);
+TEST(ByteBoundCacheTest, FailedLoadIsNotCached) {
+  Cache cache(100);
+  EXPECT_THROW(cache.Get("a", []() -> Loaded { throw InvalidArgument("bad"); }), Error);
   EXPECT_EQ(cache.size(), 0u);
   EXPECT_EQ(cache.Get("a", [] { return Sized(7); })->bytes, 7);
 }
