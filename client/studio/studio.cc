@@ -14,8 +14,8 @@
 #include "client/lib/out_folder.h"
 #include "client/lib/photos/photo_folder.h"
 #include "client/studio/correct/correct_routes.h"
-#include "client/studio/film_frames.h"
-#include "client/studio/film_routes.h"
+#include "client/studio/film/film_frames.h"
+#include "client/studio/film/film_routes.h"
 #include "client/studio/found_photos.h"
 #include "client/studio/page_files.h"
 #include "client/studio/photo_sets.h"
@@ -179,7 +179,9 @@ void Studio::Parts::AddRoutes() {
   AddJobRoutes();
   const StudioRoutes routes{
       [this](const std::string& pattern, Handler handler) { Get(pattern, std::move(handler)); },
-      [this](const std::string& pattern, BodyHandler handler) { Post(pattern, std::move(handler)); },
+      [this](const std::string& pattern, BodyHandler handler) {
+        Post(pattern, std::move(handler));
+      },
       [this](Response& response, std::function<void(const StudioRoutes::Send&)> watch) {
         Stream(response, std::move(watch));
       }};

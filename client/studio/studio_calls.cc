@@ -196,8 +196,7 @@ v1::Job StudioCalls::Colorize(const std::string& scene, const RunChoices& choice
   v1::JobSpec spec = ColorizeSpec(OptionsOf(choices), ResourceName(scene, "scenes"));
   v1::ColorizeSceneSpec& job = *spec.mutable_colorize_scene();
   job.set_key_view(choices.key.view);
-  *job.mutable_key_color() =
-      UploadColors(connection, choices.key.color, choices.key.strokes_file);
+  *job.mutable_key_color() = UploadColors(connection, choices.key.color, choices.key.strokes_file);
   for (const KeyChoice& key : choices.further) {
     v1::FurtherKeyView* added = job.mutable_carry_color()->add_further_key_views();
     added->set_view(key.view);

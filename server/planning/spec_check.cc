@@ -257,8 +257,9 @@ void CheckCorrections(const v1::CorrectColorsSpec& spec, const std::string& path
     }
     CheckKeyColorExtras(correction.color(), entry + ".color");
     if (HasPointsAbove(correction.color())) {
-      Reject(entry + ".color.backend_input",
-             " is set, but a correction has one layer; give the points as a correction of their own");
+      Reject(
+          entry + ".color.backend_input",
+          " is set, but a correction has one layer; give the points as a correction of their own");
     }
     switch (correction.color().source_case()) {
       case v1::KeyColorSource::kImage:

@@ -125,6 +125,3 @@ export const follow = (
   };
   return () => source.close();
 };
-
-// For the calls of film/.
-export { get as getJson, post as postJson, query };

@@ -58,7 +58,7 @@ const results = (run: Run, stops: (() => void)[], onNewest: (run: Run) => void):
   const has = (name: string): boolean => run.artifacts.some((artifact) => artifact.name === name);
   const film = run.artifacts.find(({ name }) => name === 'film.mp4');
   return [
-    ...(has('view.html') ? [scene(run, stops)] : []),
+    ...(has('view.html') ? [scene(run, stops, onNewest)] : []),
     ...(!has('view.html') && film ? [h('p', { class: 'soft' }, 'Save the film to play it.')] : []),
   ];
 };
@@ -108,7 +108,7 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     }
   };
 
-  let share: HTMLElement | undefined;
+  let shared: HTMLElement | undefined;
   const showShare = async (run: Run): Promise<void> => {
     try {
       const { sets } = await getState();
@@ -119,9 +119,9 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
     }
     if (left) return;
     const panel = sharePanel(run, set);
-    if (share?.isConnected) share.replaceWith(panel);
+    if (shared?.isConnected) shared.replaceWith(panel);
     else result.append(panel);
-    share = panel;
+    shared = panel;
   };
 
   // A run that waited was put elsewhere in the queue, as another one.

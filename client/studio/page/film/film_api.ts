@@ -1,5 +1,5 @@
 // Calls about films (client/studio/README.md).
-import { getJson, postJson, query, type Job } from '../api';
+import { get, post, query, type Job } from '../api';
 
 export interface FilmFacts {
   frames: number; seconds: number; frames_per_second: number; width: number; height: number; codec: string;
@@ -20,14 +20,14 @@ export interface FilmChoices {
   keys: FrameColor[]; parts: FrameColor[];
 }
 
-export const describeFilm = (set: string): Promise<FilmFacts> => getJson(`/api/sets/${set}/film`);
+export const describeFilm = (set: string): Promise<FilmFacts> => get(`/api/sets/${set}/film`);
 export const setAsFrames = (set: string, areFrames: boolean): Promise<unknown> =>
-  postJson(`/api/sets/${set}/film/frames`, { are_frames: areFrames });
+  post(`/api/sets/${set}/film/frames`, { are_frames: areFrames });
 export const colorizeFilm = (set: string, choices: FilmChoices): Promise<Job> =>
-  postJson(`/api/sets/${set}/film/colorize`, choices);
+  post(`/api/sets/${set}/film/colorize`, choices);
 export const changeFilm = (set: string, job: string, choices: FilmChoices): Promise<Job> =>
-  postJson(`/api/jobs/${job}/film/change`, { set, ...choices });
-export const timelineOf = (job: string): Promise<JobTimeline> => getJson(`/api/jobs/${job}/film`);
+  post(`/api/jobs/${job}/film/change`, { set, ...choices });
+export const timelineOf = (job: string): Promise<JobTimeline> => get(`/api/jobs/${job}/film`);
 
 export const frameUrl = (set: string, name: string, side: number, gray: boolean): string =>
   `/api/sets/${set}/film/frame?${query({ name, ...(side ? { side } : {}), ...(gray ? { gray: 1 } : {}) })}`;

@@ -1,4 +1,5 @@
 // What is wanted of a film: its coloured frames and its parts in other colours, with undo. No page in it.
+import { serializeStrokes, type StrokeFile } from '../paint/model/stroke_file';
 import type { FrameColor, JobTimeline } from './film_api';
 import { frameOfName, newSpan, withEdge, type Edge, type FilmTimes, type Part } from './timeline_model';
 

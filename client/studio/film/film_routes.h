@@ -6,8 +6,8 @@
 #include <functional>
 #include <string>
 
-#include "client/studio/film_calls.h"
-#include "client/studio/film_frames.h"
+#include "client/studio/film/film_calls.h"
+#include "client/studio/film/film_frames.h"
 #include "client/studio/photo_sets.h"
 #include "client/studio/studio_calls.h"
 #include "client/studio/studio_routes.h"

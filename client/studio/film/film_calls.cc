@@ -1,4 +1,4 @@
-#include "client/studio/film_calls.h"
+#include "client/studio/film/film_calls.h"
 
 #include <fmt/format.h>
 

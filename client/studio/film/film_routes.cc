@@ -1,4 +1,4 @@
-#include "client/studio/film_routes.h"
+#include "client/studio/film/film_routes.h"
 
 #include <algorithm>
 #include <charconv>
@@ -92,35 +92,35 @@ void AddFilmRoutes(const FilmRouteParts& parts, const StudioRoutes& routes) {
     AnswerFile(folder.film->file, MediaTypeOfFilm(folder.film->file), response);
   });
   routes.post(FilmPattern("sets", "/colorize"),
-             [parts](const Request& request, Response& response, const ContentReader& body) {
-               const std::string id = request.matches[1];
-               const FilmChoices choices =
-                   ReadFilmChoices(ReadJsonBody(request, body), id, parts.sets);
-               RequireFilm(parts.folder_of(id));
-               const FilmCalls films(parts.calls);
-               AnswerJson(JobFacts(films.Colorize(parts.scene_of(id), choices)), response);
-             });
+              [parts](const Request& request, Response& response, const ContentReader& body) {
+                const std::string id = request.matches[1];
+                const FilmChoices choices =
+                    ReadFilmChoices(ReadJsonBody(request, body), id, parts.sets);
+                RequireFilm(parts.folder_of(id));
+                const FilmCalls films(parts.calls);
+                AnswerJson(JobFacts(films.Colorize(parts.scene_of(id), choices)), response);
+              });
   routes.post(FilmPattern("sets", "/frames"),
-             [parts](const Request& request, Response& response, const ContentReader& body) {
-               const auto json = ReadJsonBody(request, body);
-               const auto value = json.find("are_frames");
-               if (value == json.end() || !value->is_boolean()) {
-                 throw InvalidArgument("are_frames is true or false");
-               }
-               parts.sets.SetAsFrames(request.matches[1], value->get<bool>());
-               AnswerJson(SetJson(parts.sets.Get(request.matches[1])), response);
-             });
+              [parts](const Request& request, Response& response, const ContentReader& body) {
+                const auto json = ReadJsonBody(request, body);
+                const auto value = json.find("are_frames");
+                if (value == json.end() || !value->is_boolean()) {
+                  throw InvalidArgument("are_frames is true or false");
+                }
+                parts.sets.SetAsFrames(request.matches[1], value->get<bool>());
+                AnswerJson(SetJson(parts.sets.Get(request.matches[1])), response);
+              });
   routes.get(FilmPattern("jobs", ""), [parts](const Request& request, Response& response) {
     AnswerJson(FilmCalls(parts.calls).Timeline(request.matches[1]), response);
   });
   routes.post(FilmPattern("jobs", "/change"),
-             [parts](const Request& request, Response& response, const ContentReader& body) {
-               const auto json = ReadJsonBody(request, body);
-               const std::string set = TextOf(json, "set");
-               const FilmChoices choices = ReadFilmChoices(json, set, parts.sets);
-               const FilmCalls films(parts.calls);
-               AnswerJson(JobFacts(films.Change(request.matches[1], choices)), response);
-             });
+              [parts](const Request& request, Response& response, const ContentReader& body) {
+                const auto json = ReadJsonBody(request, body);
+                const std::string set = TextOf(json, "set");
+                const FilmChoices choices = ReadFilmChoices(json, set, parts.sets);
+                const FilmCalls films(parts.calls);
+                AnswerJson(JobFacts(films.Change(request.matches[1], choices)), response);
+              });
   // A finished movie, and its frames for browsers that cannot play it.
   routes.get(FilmPattern("jobs", "/video"), [parts](const Request& request, Response& response) {
     AnswerFile(

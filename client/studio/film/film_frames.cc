@@ -1,4 +1,4 @@
-#include "client/studio/film_frames.h"
+#include "client/studio/film/film_frames.h"
 
 #include <fmt/format.h>
 

@@ -1,9 +1,9 @@
-#include "client/studio/film_frames.h"
+#include "client/studio/film/film_frames.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/studio/film_calls.h"
+#include "client/studio/film/film_calls.h"
 #include "client/studio/found_photos.h"
 #include "core/base/error.h"
 #include "core/image/codec.h"
