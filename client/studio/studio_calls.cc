@@ -129,7 +129,7 @@ Json StudioCalls::ServerFacts() const {
 Json StudioCalls::Plan(const PhotoFolder& folder, const RunChoices& choices) const {
   v1::PlanJobRequest request;
   *request.mutable_spec() = ColorizeSpec(OptionsOf(choices), "");
-  request.mutable_spec()->mutable_colorize_scene()->set_key_view(choices.key_view);
+  request.mutable_spec()->mutable_colorize_scene()->set_key_view(choices.key.view);
   // Every source of colour takes about the same time.
   request.mutable_spec()->mutable_colorize_scene()->mutable_key_color()->set_automatic(true);
   *request.mutable_facts() = CaptureFactsOf(folder);

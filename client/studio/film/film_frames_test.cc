@@ -14,11 +14,11 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
-constexpr int kWidth = 64, kHeight = 48, kFrames = 12;
+constexpr int kFilmWidth = 64, kFilmHeight = 48, kFilmFrames = 12;
 
 // Brighter from frame to frame.
 Image GrayFrame(int frame) {
-  return Image(kWidth, kHeight, 3, 0.2f + 0.05f * static_cast<float>(frame));
+  return Image(kFilmWidth, kFilmHeight, 3, 0.2f + 0.05f * static_cast<float>(frame));
 }
 
 float LightOf(const std::string& jpeg) {
@@ -31,14 +31,14 @@ class FilmFramesTest : public ::testing::Test {
   PhotoFolder Film() const {
     ThreadPool pool(1);
     Mp4Writer writer(scratch_.path() / "walk.mp4",
-                     {.width = kWidth, .height = kHeight, .frames_per_second = 8});
-    for (int i = 0; i < kFrames; ++i) writer.Add(GrayFrame(i), pool);
+                     {.width = kFilmWidth, .height = kFilmHeight, .frames_per_second = 8});
+    for (int i = 0; i < kFilmFrames; ++i) writer.Add(GrayFrame(i), pool);
     writer.Finish();
     return CollectPhotos(scratch_.path() / "walk.mp4");
   }
   PhotoFolder Pictures() const {
     fs::create_directories(scratch_.path() / "scan");
-    for (int i = 0; i < kFrames; ++i) {
+    for (int i = 0; i < kFilmFrames; ++i) {
       WriteFileAtomic(scratch_.path() / "scan" / ("n" + std::to_string(100 + i) + ".png"),
                       EncodePng8(GrayFrame(i)));
     }
@@ -56,10 +56,10 @@ TEST_F(FilmFramesTest, DescribesAVideoFile) {
   const PhotoFolder film = Film();
   ASSERT_TRUE(IsFilm(film));
   const auto facts = films_.Describe(film);
-  EXPECT_EQ(facts.at("frames"), kFrames);
+  EXPECT_EQ(facts.at("frames"), kFilmFrames);
   EXPECT_NEAR(facts.at("seconds"), 1.5, 1e-3);
   EXPECT_NEAR(facts.at("frames_per_second"), 8.0, 1e-3);
-  EXPECT_EQ(facts.at("width"), kWidth);
+  EXPECT_EQ(facts.at("width"), kFilmWidth);
   EXPECT_EQ(facts.at("is_video"), true);
   EXPECT_EQ(facts.at("in_color"), false);
   EXPECT_EQ(facts.at("has_sound"), false);
@@ -69,7 +69,7 @@ TEST_F(FilmFramesTest, DescribesPicturesAsAFilm) {
   const PhotoFolder pictures = Pictures();
   ASSERT_TRUE(IsFilm(pictures));
   const auto facts = films_.Describe(pictures);
-  EXPECT_EQ(facts.at("frames"), kFrames);
+  EXPECT_EQ(facts.at("frames"), kFilmFrames);
   EXPECT_EQ(facts.at("is_video"), false);
   EXPECT_EQ(facts.at("frames_per_second"), 25.0);
   EXPECT_NEAR(LightOf(films_.Jpeg(pictures, "n103.png", 0, true)), 0.35f, 0.02f);
@@ -90,7 +90,7 @@ TEST_F(FilmFramesTest, GivesFramesAsFiles) {
   const PhotoFolder film = Film();
   const LocalFile frame = films_.File(film, "f000005");
   EXPECT_EQ(frame.path, "f000005.png");
-  EXPECT_EQ(ReadImage(frame.file).width, kWidth);
+  EXPECT_EQ(ReadImage(frame.file).width, kFilmWidth);
   EXPECT_EQ(films_.File(film, "f000005.png").file, frame.file);
 }
 

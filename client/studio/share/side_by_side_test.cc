@@ -12,16 +12,16 @@
 namespace color3d::client {
 namespace {
 
-constexpr int kWidth = 96, kHeight = 64, kFrames = 6;
+constexpr int kMovieWidth = 96, kMovieHeight = 64, kMovieFrames = 6;
 
 // Red on the left, blue on the right, brighter from frame to frame.
 Image Frame(int i) {
-  Image frame(kWidth, kHeight, 3);
-  for (int y = 0; y < kHeight; ++y) {
-    for (int x = 0; x < kWidth; ++x) {
-      frame.At(0, y, x) = x < kWidth / 2 ? 0.6f + 0.05f * static_cast<float>(i) : 0.1f;
+  Image frame(kMovieWidth, kMovieHeight, 3);
+  for (int y = 0; y < kMovieHeight; ++y) {
+    for (int x = 0; x < kMovieWidth; ++x) {
+      frame.At(0, y, x) = x < kMovieWidth / 2 ? 0.6f + 0.05f * static_cast<float>(i) : 0.1f;
       frame.At(1, y, x) = 0.15f;
-      frame.At(2, y, x) = x < kWidth / 2 ? 0.1f : 0.7f;
+      frame.At(2, y, x) = x < kMovieWidth / 2 ? 0.1f : 0.7f;
     }
   }
   return frame;
@@ -31,21 +31,21 @@ TEST(SideBySideTest, GrayIsLeftAndColorRight) {
   const ScratchFolder scratch;
   const auto movie = scratch.path() / "a.mp4", both = scratch.path() / "both.mp4";
   ThreadPool pool(1);
-  Mp4Writer writer(movie, {.width = kWidth, .height = kHeight, .frames_per_second = 10.0});
-  for (int i = 0; i < kFrames; ++i) writer.Add(Frame(i), pool);
+  Mp4Writer writer(movie, {.width = kMovieWidth, .height = kMovieHeight, .frames_per_second = 10.0});
+  for (int i = 0; i < kMovieFrames; ++i) writer.Add(Frame(i), pool);
   writer.Finish();
   const CancellationToken cancel;
   WriteSideBySide(movie, both, cancel);
   FilmReader reader(both);
-  ASSERT_EQ(reader.facts().width, 2 * kWidth);
-  ASSERT_EQ(reader.facts().height, kHeight);
-  ASSERT_EQ(reader.times().size(), size_t{kFrames});
+  ASSERT_EQ(reader.facts().width, 2 * kMovieWidth);
+  ASSERT_EQ(reader.facts().height, kMovieHeight);
+  ASSERT_EQ(reader.times().size(), size_t{kMovieFrames});
   EXPECT_NEAR(reader.times()[3], 0.3, 1e-3);
-  const Image picture = reader.Read(kFrames - 1);
-  const int y = kHeight / 2;
-  for (const int x : {kWidth / 4, 3 * kWidth / 4}) {
+  const Image picture = reader.Read(kMovieFrames - 1);
+  const int y = kMovieHeight / 2;
+  for (const int x : {kMovieWidth / 4, 3 * kMovieWidth / 4}) {
     EXPECT_NEAR(picture.At(0, y, x), picture.At(2, y, x), 0.03f) << "grey";
-    EXPECT_GT(std::abs(picture.At(0, y, kWidth + x) - picture.At(2, y, kWidth + x)), 0.4f)
+    EXPECT_GT(std::abs(picture.At(0, y, kMovieWidth + x) - picture.At(2, y, kMovieWidth + x)), 0.4f)
         << "colour";
   }
 }
