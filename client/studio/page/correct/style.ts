@@ -23,7 +23,7 @@ const rules = `
 .co-strip button{display:block;padding:.25rem;min-height:0;text-align:left;font-size:.8rem;border-color:transparent;position:relative}
 .co-strip canvas{display:block;height:5.25rem;border-radius:4px;background:var(--line)}
 .co-strip .name{max-width:8rem;margin:.15rem 0 0;color:inherit}
-.co-note:not(:empty){position:absolute;right:.45rem;top:.45rem;background:#000c;color:#fff;border-radius:4px;padding:0 .3rem}
+.co-note:not(:empty){position:absolute;right:.45rem;top:.45rem;background:#000;color:#fff;border-radius:4px;padding:0 .3rem}
 .co-side{display:grid;gap:1rem}
 .co-section{padding:1rem 1.1rem;border:1px solid var(--line);border-radius:var(--radius);background:var(--card)}
 .co-section h3{font-size:1rem;margin:0 0 .5rem}

@@ -50,7 +50,7 @@ const press = async (key, code) => {
     await send('Input.dispatchKeyEvent', { type, key, code: key, windowsVirtualKeyCode: code, ...(key === 'Enter' && type === 'keyDown' ? { text: '\r' } : {}) });
   }
 };
-const data = (name) => `document.querySelector('#corrector').dataset.${name} ?? ''`;
+const data = (name) => `(document.querySelector('#corrector').dataset.${name} ?? '')`;
 const main = '.co-panes figure:nth-of-type(2) canvas:last-child';
 
 const keep = async (name) => {
@@ -172,7 +172,7 @@ const use = async () => {
     if (answer.exceptionDetails) throw new Error(answer.exceptionDetails.exception.description);
     return answer.result.value;
   };
-  const theirs = (name) => `document.querySelector('#corrector')?.dataset.${name} ?? ''`;
+  const theirs = (name) => `(document.querySelector('#corrector')?.dataset.${name} ?? '')`;
   await waitFor(`${theirs('corrections')} === '1'`, 60000, other);
 
   // A second stroke on another photo, by keyboard.
