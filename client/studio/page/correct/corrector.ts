@@ -216,7 +216,7 @@ export class Corrector {
   }
   private tellScene(photo?: string): void {
     const baked = this.scenes.get(this.sceneUrl)?.tone ?? plainTone;
-    this.scene.show({ shades: this.mode === 'source' ? 2 : 0, tone: gainBetween(baked, this.tone), ...(photo && { photo }) });
+    this.scene.show({ bare: true, shades: this.mode === 'source' ? 2 : 0, tone: gainBetween(baked, this.tone), ...(photo && { photo }) });
   }
   private onScene(url: string): void {
     this.sceneUrl = url;

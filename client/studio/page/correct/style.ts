@@ -1,11 +1,13 @@
 // The look of the corrections, by the custom properties of studio.css.
 const rules = `
+main:has(.co){max-width:112rem}
 .co{display:grid;grid-template-columns:minmax(0,1fr) minmax(16rem,20rem);gap:1.2rem;align-items:start}
 .co-bar{grid-column:1/-1;display:flex;flex-wrap:wrap;gap:.6rem 1.2rem;align-items:center}
 .co-group{display:flex;flex-wrap:wrap}
 .co-group button{border-radius:0;margin-left:-1px}
 .co-group button:first-child{border-radius:8px 0 0 8px;margin:0}.co-group button:last-child{border-radius:0 8px 8px 0}
 .co button[aria-pressed=true]{background:var(--accent);border-color:var(--accent);color:var(--on-accent)}
+.co-group button[aria-pressed=true]+button[aria-pressed=true]{border-left-color:var(--on-accent)}
 .co-panes{display:grid;grid-auto-flow:column;grid-auto-columns:minmax(0,1fr);gap:.6rem}
 .co-picture{margin:0;min-width:0}
 .co-canvases{position:relative;aspect-ratio:var(--aspect,3/2);background:#0d0e10;border-radius:6px;overflow:hidden}

@@ -11,7 +11,7 @@ export interface SceneHooks {
   held(photo: string | null): void;
   recolored(): void;
 }
-export interface SceneLook { shades?: 0 | 1 | 2; tone?: Gain; photo?: string }
+export interface SceneLook { shades?: 0 | 1 | 2; tone?: Gain; photo?: string; bare?: true }
 
 const isShare = (value: unknown): value is number => typeof value === 'number' && value >= 0 && value <= 1;
 const isName = (value: unknown): value is string => typeof value === 'string' && value.length > 0 && value.length <= 1024;
