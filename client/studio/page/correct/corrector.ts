@@ -324,9 +324,10 @@ export class Corrector {
 
   // ---- changes
   private async apply(): Promise<void> {
-    this.applied = this.draft.trial;
-    const done = await this.change({ add: this.draft.asNew }, 'All photos have the new colours. The scene follows …');
-    if (done) this.draft.clear();
+    const { asNew, trial } = this.draft;
+    this.applied = trial;
+    this.draft.clear();
+    if (!await this.change({ add: asNew }, 'All photos have the new colours. The scene follows …')) this.draft.restore(asNew, trial);
   }
   private askTone(tone: Tone): void {
     if (sameTone(tone, this.ownTone ?? this.version.tone)) return;
@@ -422,6 +423,7 @@ export class Corrector {
       const view = this.version.corrections.find((one) => one.id === id)?.view;
       if (view) this.choose(view, true);
     }
+    this.root.dataset.without = this.without ? id ?? '' : '';
     this.refresh();
   }
   private async drawPlace(correction: Correction, before: HTMLCanvasElement, after: HTMLCanvasElement): Promise<void> {

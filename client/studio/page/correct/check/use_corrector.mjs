@@ -193,8 +193,8 @@ const use = async () => {
 
   // The first one is looked at without, and removed.
   await click('.co-history li:first-child button');
-  await waitFor(`document.querySelector('.co-history li:first-child button').getAttribute('aria-pressed') === 'true'`);
-  await pause(2500);
+  await waitFor(data('without'));
+  await pause(1500);
   await look('without');
   await click('.co-history li:first-child .co-remove');
   await waitFor(`${data('corrections')} === '1'`);
