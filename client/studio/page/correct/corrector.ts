@@ -289,7 +289,7 @@ export class Corrector {
   }
   private showDraft(): void {
     const { isEmpty, trial, reach } = this.draft;
-    this.brush.showDraft(isEmpty ? null : trial ? this.touched.text(reach) : 'Looking at what it touches …', reach, trial !== '');
+    this.brush.showDraft(isEmpty ? null : trial ? this.touched.text(reach, Math.min(maxHeated, this.version.views.length)) : 'Looking at what it touches …', reach, trial !== '');
     if (!trial) return;
     for (const { name } of this.version.views) {
       const share = this.touched.share(name, reach);

@@ -4,6 +4,8 @@ import { h } from '../../dom';
 import type { Gain } from '../model/tone';
 import type { ChangeMap } from './changes';
 
+const patience = 1500; // ms
+
 export interface ScenePlace { readonly photo: string; readonly x: number; readonly y: number }
 export interface SceneHooks {
   ready(url: string): void;
@@ -17,12 +19,12 @@ const isShare = (value: unknown): value is number => typeof value === 'number' &
 const isName = (value: unknown): value is string => typeof value === 'string' && value.length > 0 && value.length <= 1024;
 
 export type SceneMessage =
-  | { kind: 'ready' } | { kind: 'recolored' } | { kind: 'held'; photo: string | null } | ({ kind: 'picked' } & ScenePlace);
+  | { kind: 'ready' } | { kind: 'recolored' } | { kind: 'drawn' } | { kind: 'held'; photo: string | null } | ({ kind: 'picked' } & ScenePlace);
 // null: not a message of a scene's page.
 export const readMessage = (data: unknown): SceneMessage | null => {
   if (data === null || typeof data !== 'object') return null;
   const { color3d, photo, x, y } = data as Record<string, unknown>;
-  if (color3d === 'ready' || color3d === 'recolored') return { kind: color3d };
+  if (color3d === 'ready' || color3d === 'recolored' || color3d === 'drawn') return { kind: color3d };
   if (color3d === 'held' && (photo === null || isName(photo))) return { kind: 'held', photo };
   if (color3d === 'picked' && isName(photo) && isShare(x) && isShare(y)) return { kind: 'picked', photo, x, y };
   return null;
@@ -32,6 +34,8 @@ export class SceneFrame {
   readonly root = h('div', { class: 'co-scene' });
   private shown: HTMLIFrameElement | null = null;
   private coming: HTMLIFrameElement | null = null;
+  private next: SceneLook | null = null;
+  private asked = -Infinity; // when a look was sent that is not drawn yet
   private readonly listen = (event: MessageEvent): void => this.receive(event);
 
   constructor(private readonly hooks: SceneHooks) {
@@ -50,7 +54,14 @@ export class SceneFrame {
     }
     this.root.append(frame);
   }
+  // One look at a time: the newest waits until the one before is drawn, so that the page itself stays quick.
   show(look: SceneLook): void {
+    if (performance.now() - this.asked < patience) {
+      this.next = { ...this.next, ...look };
+      return;
+    }
+    this.next = null;
+    this.asked = performance.now();
     // The frame has no origin; what is sent is no secret.
     this.shown?.contentWindow?.postMessage({ color3d: 'show', ...look }, '*');
   }
@@ -63,6 +74,10 @@ export class SceneFrame {
     this.root.replaceChildren();
   }
 
+  private drawn(): void {
+    this.asked = -Infinity;
+    if (this.next) this.show(this.next);
+  }
   private receive({ source, origin, data }: MessageEvent): void {
     const frame = [this.coming, this.shown].find((one) => one && one.contentWindow === source);
     if (!frame || origin !== 'null') return;
@@ -73,6 +88,8 @@ export class SceneFrame {
       this.shown?.remove();
       this.shown = frame;
       this.coming = null;
+      this.asked = -Infinity;
+      this.next = null;
       frame.id = 'scene';
       frame.classList.remove('co-coming');
       frame.removeAttribute('tabindex');
@@ -80,7 +97,8 @@ export class SceneFrame {
     } else if (frame === this.shown) {
       if (message.kind === 'picked') this.hooks.picked(message);
       else if (message.kind === 'held') this.hooks.held(message.photo);
-      else this.hooks.recolored();
+      else if (message.kind === 'recolored') this.hooks.recolored();
+      else this.drawn();
     }
   }
 }
