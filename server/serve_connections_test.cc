@@ -23,6 +23,9 @@ namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
+// Time until a new client is answered, on a busy machine; a server that is held up takes longer
+// than silent connections may stay open, 10 s.
+constexpr milliseconds kServed(5'000);
 constexpr int kIdle = 1'100;
 constexpr rlim_t kFewDescriptors = 1'024;
 // HTTP/2 client preface and empty settings.
@@ -93,11 +96,11 @@ class ConnectionsTest : public ::testing::Test {
   void Attack(ServerProcess& server, std::string_view words) {
     {
       const IdleConnections idle(server.address(), kIdle, words);
-      EXPECT_LT(NewClientLatency(server.address()), milliseconds(1'000)) << "while they are open";
+      EXPECT_LT(NewClientLatency(server.address()), kServed) << "while they are open";
       SleepMs(1'000);
-      EXPECT_LT(NewClientLatency(server.address()), milliseconds(1'000)) << "while they are open";
+      EXPECT_LT(NewClientLatency(server.address()), kServed) << "while they are open";
     }
-    EXPECT_LT(NewClientLatency(server.address()), milliseconds(1'000)) << "when they are closed";
+    EXPECT_LT(NewClientLatency(server.address()), kServed) << "when they are closed";
   }
   const ScratchFolder scratch_;
 };
@@ -153,7 +156,7 @@ TEST_F(ConnectionsTest, UnreachableServerReportsAndEnds) {
   ServerProcess server(scratch_.path(),
                        {"--listen", "unix:" + socket.string(), "--probe-seconds", "0.2"});
   SleepMs(1'000);
-  EXPECT_LT(NewClientLatency(server.address()), milliseconds(1'000));
+  EXPECT_LT(NewClientLatency(server.address()), kServed);
   ASSERT_TRUE(fs::remove(socket)) << "it did not survive its own looks";
   const int status = server.Wait();
   const std::string said = ::testing::internal::GetCapturedStderr();
@@ -171,12 +174,12 @@ TEST_F(ConnectionsTest, SecondServerDoesNotTakeOverSocket) {
   EXPECT_EQ(second.Wait(), 2);
   EXPECT_THAT(::testing::internal::GetCapturedStderr(),
               ::testing::HasSubstr("another server listens there"));
-  EXPECT_LT(NewClientLatency(address), milliseconds(1'000));
+  EXPECT_LT(NewClientLatency(address), kServed);
   // A killed server leaves its socket, which the next one replaces.
   first.Signal(SIGKILL);
   first.Wait();
   ServerProcess third(other, {"--listen", address}, 0);
-  EXPECT_LT(NewClientLatency(address), milliseconds(1'000));
+  EXPECT_LT(NewClientLatency(address), kServed);
 }
 
 }  // namespace

@@ -78,13 +78,13 @@ class FullStore : public SqliteJobStore {
 
 TEST_F(RpcTest, DeletionReleasesBallastOfFullDisk) {
   FullStore full(scratch_.path() / "jobs.db", StoreRole::kServer, SystemClocks());
-  const std::string scene = client_->MakeScene().name();
-  const std::string job = client_->Create(ScriptedSpec(scene, "a")).name();
   RpcServerOptions options;
   options.listen = "127.0.0.1:0";
   options.make_room = [&] { return full.GiveUp(); };
   RpcServer server(options, full, blobs_, uploads_, SystemClock());
   TestClient client(server.address());
+  const std::string scene = client.MakeScene().name();
+  const std::string job = client.Create(ScriptedSpec(scene, "a")).name();
   grpc::ClientContext contexts[3];
   v1::CancelJobRequest cancel;
   cancel.set_name(job);

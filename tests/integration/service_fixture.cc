@@ -63,21 +63,23 @@ std::vector<std::string> TestServer::Arguments(const fs::path& folder,
                                                const std::string& listen) {
   fs::create_directories(folder);
   fs::remove(folder / "address");
-  return std::vector<std::string>{ServerProgram(),
-                                  "serve",
-                                  "--listen",
-                                  listen,
-                                  "--port-file",
-                                  (folder / "address").string(),
-                                  "--data-dir",
-                                  (folder / "data").string(),
-                                  "--workers",
-                                  "1",
-                                  "--threads",
-                                  "2",
-                                  "--drain-seconds",
-                                  "20"} +
-         more_flags;
+  std::vector<std::string> arguments = {ServerProgram(),
+                                        "serve",
+                                        "--listen",
+                                        listen,
+                                        "--port-file",
+                                        (folder / "address").string(),
+                                        "--data-dir",
+                                        (folder / "data").string(),
+                                        "--drain-seconds",
+                                        "20"};
+  const std::pair<const char*, const char*> defaults[] = {{"--workers", "1"}, {"--threads", "2"}};
+  for (const auto& [flag, value] : defaults) {
+    if (std::ranges::find(more_flags, flag) != more_flags.end()) continue;
+    arguments.push_back(flag);
+    arguments.push_back(value);
+  }
+  return arguments + more_flags;
 }
 
 TestServer::TestServer(const fs::path& folder,

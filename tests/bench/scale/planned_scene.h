@@ -1,5 +1,6 @@
 // The jobs of a colorize_scene submission, as the server plans them, for the simulation: their
-// graph and seconds by the planner and the cost model. Their bytes are assumed, not measured.
+// graph and seconds by the planner and the cost model. Their bytes were measured on one
+// scene.
 #pragma once
 
 #include "tests/bench/scale/queue_model.h"
