@@ -35,7 +35,7 @@ export class SceneFrame {
   private shown: HTMLIFrameElement | null = null;
   private coming: HTMLIFrameElement | null = null;
   private next: SceneLook | null = null;
-  private asked = -Infinity; // when a look was sent that is not drawn yet
+  private waiting: ReturnType<typeof setTimeout> | undefined; // a look was sent that is not drawn yet
   private readonly listen = (event: MessageEvent): void => this.receive(event);
 
   constructor(private readonly hooks: SceneHooks) {
@@ -56,14 +56,15 @@ export class SceneFrame {
   }
   // One look at a time: the newest waits until the one before is drawn, so that the page itself stays quick.
   show(look: SceneLook): void {
-    if (performance.now() - this.asked < patience) {
+    if (!this.shown) return;
+    if (this.waiting !== undefined) {
       this.next = { ...this.next, ...look };
       return;
     }
     this.next = null;
-    this.asked = performance.now();
+    this.waiting = setTimeout(() => this.drawn(), patience); // a frame out of sight does not draw
     // The frame has no origin; what is sent is no secret.
-    this.shown?.contentWindow?.postMessage({ color3d: 'show', ...look }, '*');
+    this.shown.contentWindow?.postMessage({ color3d: 'show', ...look }, '*');
   }
   // Changes the colours of the scene that is shown; no maps: as it is in its file.
   recolor(maps: readonly ChangeMap[]): void {
@@ -71,11 +72,13 @@ export class SceneFrame {
   }
   destroy(): void {
     removeEventListener('message', this.listen);
+    clearTimeout(this.waiting);
     this.root.replaceChildren();
   }
 
   private drawn(): void {
-    this.asked = -Infinity;
+    clearTimeout(this.waiting);
+    this.waiting = undefined;
     if (this.next) this.show(this.next);
   }
   private receive({ source, origin, data }: MessageEvent): void {
@@ -88,8 +91,8 @@ export class SceneFrame {
       this.shown?.remove();
       this.shown = frame;
       this.coming = null;
-      this.asked = -Infinity;
       this.next = null;
+      this.drawn();
       frame.id = 'scene';
       frame.classList.remove('co-coming');
       frame.removeAttribute('tabindex');
