@@ -1,12 +1,14 @@
 // Talks with the page that shows this one in a frame, by messages: what is shown, and where the user
 // points. Messages of anybody else, and such that are not as described here, are ignored.
-//   in:  {color3d: 'show', shades?: 0|1|2, photo?: name, tone?: [ka, pa, kb, pb]}, where colours become
-//        a' = ka a + pa (L + 16), b' = kb b + pb (L + 16) in Lab
+//   in:  {color3d: 'show', shades?: 0|1|2, photo?: name, tone?: [ka, pa, kb, pb], bare?: true}; bare: the page
+//        around has the choices of shades and photos; tone: colours become a' = ka a + pa (L + 16),
+//        b' = kb b + pb (L + 16) in Lab
 //        {color3d: 'recolor', maps: [{photo, width, height, ab: Int8Array}, ...]}: changes of a and b that
 //        photos show, pixel after pixel, for the Gaussians that they show; no maps: as it was
 //   out: {color3d: 'ready', photos: [name, ...]}; {color3d: 'held', photo: name or null};
 //        {color3d: 'picked', photo, x, y}: a click, as a place in a photo that shows the same surface, in
-//        shares of its undistorted width and height; {color3d: 'recolored'}: the answer to 'recolor'
+//        shares of its undistorted width and height; {color3d: 'recolored'}: the answer to
+//        'recolor'; {color3d: 'drawn'}: that to 'show', when it is on the screen
 const color3dFramed = (() => {
 'use strict';
 const kClickPx = 5, kClickMs = 500;
@@ -147,11 +149,13 @@ const isTone = (tone) => Array.isArray(tone) && tone.length === 4 &&
 // position of the camera; ray(x, y): unit direction through a pixel; centers(): in the page's space.
 const connect = (hooks) => {
   const tell = (message) => window.parent.postMessage(message, '*');
-  const obey = ({ shades, photo, tone }) => {
+  const obey = ({ shades, photo, tone, bare }) => {
+    if (bare === true) document.body.dataset.bare = '';
     if ([0, 1, 2].includes(shades)) hooks.showShades(shades);
     if (isTone(tone)) hooks.showTone(tone);
     const index = hooks.photos.findIndex(({ name }) => name === photo);
     if (index >= 0) hooks.goTo(index);
+    requestAnimationFrame(() => requestAnimationFrame(() => tell({ color3d: 'drawn' })));
   };
   const shown = new Map();
   const recolor = ({ maps }) => {

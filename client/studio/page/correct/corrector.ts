@@ -216,7 +216,7 @@ export class Corrector {
   }
   private tellScene(photo?: string): void {
     const baked = this.scenes.get(this.sceneUrl)?.tone ?? plainTone;
-    this.scene.show({ shades: this.mode === 'source' ? 2 : 0, tone: gainBetween(baked, this.tone), ...(photo && { photo }) });
+    this.scene.show({ bare: true, shades: this.mode === 'source' ? 2 : 0, tone: gainBetween(baked, this.tone), ...(photo && { photo }) });
   }
   private onScene(url: string): void {
     this.sceneUrl = url;
@@ -289,7 +289,7 @@ export class Corrector {
   }
   private showDraft(): void {
     const { isEmpty, trial, reach } = this.draft;
-    this.brush.showDraft(isEmpty ? null : trial ? this.touched.text(reach) : 'Looking at what it touches …', reach, trial !== '');
+    this.brush.showDraft(isEmpty ? null : trial ? this.touched.text(reach, Math.min(maxHeated, this.version.views.length)) : 'Looking at what it touches …', reach, trial !== '');
     if (!trial) return;
     for (const { name } of this.version.views) {
       const share = this.touched.share(name, reach);
@@ -324,9 +324,10 @@ export class Corrector {
 
   // ---- changes
   private async apply(): Promise<void> {
-    this.applied = this.draft.trial;
-    const done = await this.change({ add: this.draft.asNew }, 'All photos have the new colours. The scene follows …');
-    if (done) this.draft.clear();
+    const { asNew, trial } = this.draft;
+    this.applied = trial;
+    this.draft.clear();
+    if (!await this.change({ add: asNew }, 'All photos have the new colours. The scene follows …')) this.draft.restore(asNew, trial);
   }
   private askTone(tone: Tone): void {
     if (sameTone(tone, this.ownTone ?? this.version.tone)) return;
@@ -422,6 +423,7 @@ export class Corrector {
       const view = this.version.corrections.find((one) => one.id === id)?.view;
       if (view) this.choose(view, true);
     }
+    this.root.dataset.without = this.without ? id ?? '' : '';
     this.refresh();
   }
   private async drawPlace(correction: Correction, before: HTMLCanvasElement, after: HTMLCanvasElement): Promise<void> {

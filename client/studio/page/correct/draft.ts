@@ -49,6 +49,10 @@ export class Draft {
     this.reach = 1;
     this.changed();
   }
+  restore({ view, strokes, reach }: NewStroke, trial: string): void {
+    Object.assign(this, { view, strokes, reach, trial });
+    this.changed();
+  }
   // Takes back the last stroke.
   undo(run: string): void {
     this.strokes = this.strokes.slice(0, -1);

@@ -1,11 +1,13 @@
 // The look of the corrections, by the custom properties of studio.css.
 const rules = `
+main:has(.co){max-width:112rem}
 .co{display:grid;grid-template-columns:minmax(0,1fr) minmax(16rem,20rem);gap:1.2rem;align-items:start}
 .co-bar{grid-column:1/-1;display:flex;flex-wrap:wrap;gap:.6rem 1.2rem;align-items:center}
 .co-group{display:flex;flex-wrap:wrap}
 .co-group button{border-radius:0;margin-left:-1px}
 .co-group button:first-child{border-radius:8px 0 0 8px;margin:0}.co-group button:last-child{border-radius:0 8px 8px 0}
 .co button[aria-pressed=true]{background:var(--accent);border-color:var(--accent);color:var(--on-accent)}
+.co-group button[aria-pressed=true]+button[aria-pressed=true]{border-left-color:var(--on-accent)}
 .co-panes{display:grid;grid-auto-flow:column;grid-auto-columns:minmax(0,1fr);gap:.6rem}
 .co-picture{margin:0;min-width:0}
 .co-canvases{position:relative;aspect-ratio:var(--aspect,3/2);background:#0d0e10;border-radius:6px;overflow:hidden}
@@ -23,7 +25,7 @@ const rules = `
 .co-strip button{display:block;padding:.25rem;min-height:0;text-align:left;font-size:.8rem;border-color:transparent;position:relative}
 .co-strip canvas{display:block;height:5.25rem;border-radius:4px;background:var(--line)}
 .co-strip .name{max-width:8rem;margin:.15rem 0 0;color:inherit}
-.co-note:not(:empty){position:absolute;right:.45rem;top:.45rem;background:#000c;color:#fff;border-radius:4px;padding:0 .3rem}
+.co-note:not(:empty){position:absolute;right:.45rem;top:.45rem;background:#000;color:#fff;border-radius:4px;padding:0 .3rem}
 .co-side{display:grid;gap:1rem}
 .co-section{padding:1rem 1.1rem;border:1px solid var(--line);border-radius:var(--radius);background:var(--card)}
 .co-section h3{font-size:1rem;margin:0 0 .5rem}

@@ -21,12 +21,14 @@ export class Touched {
   clear(): void {
     this.histograms.clear();
   }
-  text(reach: number): string {
+  // `all`: number of photos that are looked at.
+  text(reach: number, all: number): string {
     const shares = [...this.histograms].map(([view, histogram]) => ({ view, share: touchedShare(histogram, reach) }));
     const touched = shares.filter(({ share }) => share >= 0.005).sort((a, b) => b.share - a.share);
     if (!touched.length) return 'It touches only what you drew on.';
     const stem = (view: string): string => view.replace(/^.*\//, '').replace(/\.[^.]*$/, '');
     const most = touched.slice(0, 3).map(({ view, share }) => `${stem(view)} (${Math.max(1, Math.round(100 * share))} %)`).join(', ');
-    return `It touches ${touched.length} of ${shares.length} photos, most of all ${most}.`;
+    const of = shares.length < all ? `the first ${shares.length}` : `${shares.length}`;
+    return `It touches ${touched.length} of ${of} photos, most of all ${most}.`;
   }
 }

@@ -12,5 +12,5 @@ writeFileSync(join(folder, 'package.json'), '{"type": "module"}\n');
 execFileSync(esbuild, [...tests, '--bundle', '--platform=node', '--format=esm', '--sourcemap=inline', '--log-level=warning',
   `--outbase=${sources}`, `--outdir=${folder}`], { stdio: 'inherit' });
 const files = readdirSync(folder, { recursive: true }).filter((name) => name.endsWith('_test.js')).map((name) => join(folder, name));
-const env = { ...process.env, COLOR3D_VIEW_PAGE: join(sources, '../../../../core/view/page/page.js') };
+const env = { ...process.env, COLOR3D_SOURCES: join(sources, '../../../..') };
 process.exit(spawnSync(process.execPath, ['--enable-source-maps', '--test', ...files], { stdio: 'inherit', env }).status ?? 1);

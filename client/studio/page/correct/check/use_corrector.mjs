@@ -50,7 +50,7 @@ const press = async (key, code) => {
     await send('Input.dispatchKeyEvent', { type, key, code: key, windowsVirtualKeyCode: code, ...(key === 'Enter' && type === 'keyDown' ? { text: '\r' } : {}) });
   }
 };
-const data = (name) => `document.querySelector('#corrector').dataset.${name} ?? ''`;
+const data = (name) => `(document.querySelector('#corrector').dataset.${name} ?? '')`;
 const main = '.co-panes figure:nth-of-type(2) canvas:last-child';
 
 const keep = async (name) => {
@@ -84,6 +84,28 @@ const colorAt = (x, y) => evaluate(`(() => {
   for (let i = 0; i < pixels.length; ++i) if (i % 4 < 3) sum[i % 4] += pixels[i] / 25;
   return sum.map(Math.round);
 })()`);
+// Place of a patch of the coloured photo that is even, has a weak colour and is neither dark nor bright, in shares of it.
+const nearlyGray = `(() => {
+  const canvas = document.querySelector('.co-panes figure:nth-of-type(2) canvas');
+  const { width, height } = canvas;
+  const pixels = canvas.getContext('2d').getImageData(0, 0, width, height).data;
+  let best = Infinity, place = [0.5, 0.5];
+  for (let y = 12; y < height - 12; y += 4) for (let x = 12; x < width - 12; x += 4) {
+    const low = [255, 255, 255], high = [0, 0, 0];
+    for (let dy = -8; dy <= 8; dy += 4) for (let dx = -8; dx <= 8; dx += 4) for (let c = 0; c < 3; ++c) {
+      const value = pixels[4 * ((y + dy) * width + x + dx) + c];
+      low[c] = Math.min(low[c], value);
+      high[c] = Math.max(high[c], value);
+    }
+    const uneven = Math.max(...high.map((value, c) => value - low[c]));
+    const mean = high.map((value, c) => (value + low[c]) / 2);
+    const weak = Math.max(...mean) - Math.min(...mean);
+    if (Math.min(...mean) < 70 || Math.max(...mean) > 200 || weak < 12) continue;
+    const cost = 2 * uneven + weak;
+    if (cost < best) { best = cost; place = [x / width, y / height]; }
+  }
+  return place;
+})()`;
 const setColor = (hex) => evaluate(`(() => {
   const input = document.querySelector('#co-color');
   input.value = ${JSON.stringify(hex)};
@@ -172,7 +194,7 @@ const use = async () => {
     if (answer.exceptionDetails) throw new Error(answer.exceptionDetails.exception.description);
     return answer.result.value;
   };
-  const theirs = (name) => `document.querySelector('#corrector')?.dataset.${name} ?? ''`;
+  const theirs = (name) => `(document.querySelector('#corrector')?.dataset.${name} ?? '')`;
   await waitFor(`${theirs('corrections')} === '1'`, 60000, other);
 
   // A second stroke on another photo, by keyboard.
@@ -193,8 +215,8 @@ const use = async () => {
 
   // The first one is looked at without, and removed.
   await click('.co-history li:first-child button');
-  await waitFor(`document.querySelector('.co-history li:first-child button').getAttribute('aria-pressed') === 'true'`);
-  await pause(2500);
+  await waitFor(data('without'));
+  await pause(1500);
   await look('without');
   await click('.co-history li:first-child .co-remove');
   await waitFor(`${data('corrections')} === '1'`);
@@ -211,13 +233,18 @@ const use = async () => {
   const begun = Date.now();
   await waitFor(`${data('run')} !== ${JSON.stringify(run)}`);
   seen.seconds.tone = seconds(begun);
-  await waitFor(`!(${data('working')})`);
-  // White balance.
+  await waitFor(`!${data('working')}`);
+  // White balance: something that is nearly grey becomes grey.
+  await click('#co-reset-tone');
+  await waitFor(data('working'));
+  await waitFor(`!${data('working')}`);
+  const [u, v] = await evaluate(nearlyGray);
+  seen.colors.gray_before = await colorAt(u, v);
   await click('#co-gray');
   const { x, y, width, height } = await boxOf(main);
-  await clickAt(x + 0.3 * width, y + 0.3 * height);
-  await pause(300);
-  seen.colors.gray = await colorAt(0.3, 0.3);
+  await clickAt(x + u * width, y + v * height);
+  await pause(500);
+  seen.colors.gray = await colorAt(u, v);
   await waitFor(data('working'));
   await waitFor(`!(${data('working')})`);
   await look('gray');

@@ -15,6 +15,7 @@ export interface BrushHooks {
 }
 
 const maxRecent = 8;
+const settled = 350; // ms
 
 export class BrushPanel {
   readonly root: HTMLElement;
@@ -23,6 +24,7 @@ export class BrushPanel {
   private color = '#a0522d';
   private isNeutral = false;
   private recent: string[] = [];
+  private releasing: ReturnType<typeof setTimeout> | undefined;
   private readonly input = h('input', { type: 'color', id: 'co-color', value: this.color });
   private readonly here = h('span', { class: 'co-here', title: 'The colour where it is drawn: the photo gives its brightness' });
   private readonly neutral = button('No colour (grey)', () => this.take({ keep: 'neutral' }), { 'aria-pressed': 'false' });
@@ -42,7 +44,7 @@ export class BrushPanel {
       { input: (value) => { this.width = value; hooks.changed(); } });
     this.reachSlider = slider(
       { id: 'co-reach', label: 'Reach', min: 0, max: 1, step: 0.01, value: 0.5, text: (value) => reachInWords(reachOfSlider(value)) },
-      { input: (value) => hooks.reach(reachOfSlider(value)), release: (value) => hooks.reached(reachOfSlider(value)) });
+      { input: (value) => hooks.reach(reachOfSlider(value)), release: (value) => this.release(reachOfSlider(value)) });
     this.draft = h('div', { class: 'co-draft', hidden: true }, this.says, this.reachSlider.root,
       h('div', { class: 'row' }, this.applies, button('Discard', () => hooks.discard(), { id: 'co-discard' })));
     this.root = section('Colour a thing',
@@ -52,6 +54,11 @@ export class BrushPanel {
     this.take({ color: this.color });
   }
 
+  // By keyboard the slider is released at every step.
+  private release(reach: number): void {
+    clearTimeout(this.releasing);
+    this.releasing = setTimeout(() => this.hooks.reached(reach), settled);
+  }
   get fill(): Fill {
     return this.isNeutral ? { keep: 'neutral' } : { color: this.color };
   }

@@ -27,8 +27,8 @@ export class TonePanel {
       });
     this.sliders = {
       saturation: make('saturation', 'Saturation', 0, 2, 0.01, (value) => `${Math.round(100 * value)} %`),
-      warmth: make('warmth', 'Warmth', -30, 30, 0.5, (value) => signed(value, 'blue', 'yellow')),
-      tint: make('tint', 'Tint', -30, 30, 0.5, (value) => signed(value, 'green', 'red')),
+      warmth: make('warmth', 'Warmth', -50, 50, 0.5, (value) => signed(value, 'blue', 'yellow')),
+      tint: make('tint', 'Tint', -50, 50, 0.5, (value) => signed(value, 'green', 'red')),
     };
     this.root = section('The whole scene', this.sliders.saturation.root, this.sliders.warmth.root, this.sliders.tint.root,
       h('div', { class: 'row' }, this.gray, button('Reset', () => { this.set(plainTone); hooks.input(plainTone); hooks.release(plainTone); }, { id: 'co-reset-tone' })));

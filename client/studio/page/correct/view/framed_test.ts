@@ -1,7 +1,8 @@
 // The other side of scene_frame.ts: how the page of a scene finds places and colours (core/view/page/framed.js).
 import assert from 'node:assert/strict';
-import { readFileSync } from 'node:fs';
 import test from 'node:test';
+
+import { viewPageScript } from '../check/view_page';
 
 type Point = [number, number, number];
 interface Photo { name: string; held_out: boolean; position: Point; rotation: [number, number, number, number]; aspect: number; tan: number; center: [number, number] }
@@ -11,8 +12,7 @@ interface Framed {
   bestPhoto(photos: Photo[], centers: Float32Array, from: Point, point: Point): { photo: string; x: number; y: number } | null;
   changesOf(photos: Photo[], centers: Float32Array, maps: object[]): Uint8Array;
 }
-const page = process.env.COLOR3D_VIEW_PAGE!.replace('page.js', 'framed.js');
-const framed = new Function(`${readFileSync(page, 'utf8')}; return color3dFramed;`)() as Framed;
+const framed = new Function(`${viewPageScript('framed.js')}; return color3dFramed;`)() as Framed;
 
 const photoAt = (name: string, x: number, held_out = false): Photo =>
   ({ name, held_out, position: [x, 0, 0], rotation: [0, 0, 0, 1], aspect: 1.5, tan: 0.5, center: [0.5, 0.5] });

@@ -4,6 +4,8 @@ import { h } from '../../dom';
 import type { Gain } from '../model/tone';
 import type { ChangeMap } from './changes';
 
+const patience = 1500; // ms
+
 export interface ScenePlace { readonly photo: string; readonly x: number; readonly y: number }
 export interface SceneHooks {
   ready(url: string): void;
@@ -11,18 +13,18 @@ export interface SceneHooks {
   held(photo: string | null): void;
   recolored(): void;
 }
-export interface SceneLook { shades?: 0 | 1 | 2; tone?: Gain; photo?: string }
+export interface SceneLook { shades?: 0 | 1 | 2; tone?: Gain; photo?: string; bare?: true }
 
 const isShare = (value: unknown): value is number => typeof value === 'number' && value >= 0 && value <= 1;
 const isName = (value: unknown): value is string => typeof value === 'string' && value.length > 0 && value.length <= 1024;
 
 export type SceneMessage =
-  | { kind: 'ready' } | { kind: 'recolored' } | { kind: 'held'; photo: string | null } | ({ kind: 'picked' } & ScenePlace);
+  | { kind: 'ready' } | { kind: 'recolored' } | { kind: 'drawn' } | { kind: 'held'; photo: string | null } | ({ kind: 'picked' } & ScenePlace);
 // null: not a message of a scene's page.
 export const readMessage = (data: unknown): SceneMessage | null => {
   if (data === null || typeof data !== 'object') return null;
   const { color3d, photo, x, y } = data as Record<string, unknown>;
-  if (color3d === 'ready' || color3d === 'recolored') return { kind: color3d };
+  if (color3d === 'ready' || color3d === 'recolored' || color3d === 'drawn') return { kind: color3d };
   if (color3d === 'held' && (photo === null || isName(photo))) return { kind: 'held', photo };
   if (color3d === 'picked' && isName(photo) && isShare(x) && isShare(y)) return { kind: 'picked', photo, x, y };
   return null;
@@ -32,6 +34,8 @@ export class SceneFrame {
   readonly root = h('div', { class: 'co-scene' });
   private shown: HTMLIFrameElement | null = null;
   private coming: HTMLIFrameElement | null = null;
+  private next: SceneLook | null = null;
+  private waiting: ReturnType<typeof setTimeout> | undefined; // a look was sent that is not drawn yet
   private readonly listen = (event: MessageEvent): void => this.receive(event);
 
   constructor(private readonly hooks: SceneHooks) {
@@ -50,9 +54,17 @@ export class SceneFrame {
     }
     this.root.append(frame);
   }
+  // One look at a time: the newest waits until the one before is drawn, so that the page itself stays quick.
   show(look: SceneLook): void {
+    if (!this.shown) return;
+    if (this.waiting !== undefined) {
+      this.next = { ...this.next, ...look };
+      return;
+    }
+    this.next = null;
+    this.waiting = setTimeout(() => this.drawn(), patience); // a frame out of sight does not draw
     // The frame has no origin; what is sent is no secret.
-    this.shown?.contentWindow?.postMessage({ color3d: 'show', ...look }, '*');
+    this.shown.contentWindow?.postMessage({ color3d: 'show', ...look }, '*');
   }
   // Changes the colours of the scene that is shown; no maps: as it is in its file.
   recolor(maps: readonly ChangeMap[]): void {
@@ -60,9 +72,15 @@ export class SceneFrame {
   }
   destroy(): void {
     removeEventListener('message', this.listen);
+    clearTimeout(this.waiting);
     this.root.replaceChildren();
   }
 
+  private drawn(): void {
+    clearTimeout(this.waiting);
+    this.waiting = undefined;
+    if (this.next) this.show(this.next);
+  }
   private receive({ source, origin, data }: MessageEvent): void {
     const frame = [this.coming, this.shown].find((one) => one && one.contentWindow === source);
     if (!frame || origin !== 'null') return;
@@ -73,6 +91,8 @@ export class SceneFrame {
       this.shown?.remove();
       this.shown = frame;
       this.coming = null;
+      this.next = null;
+      this.drawn();
       frame.id = 'scene';
       frame.classList.remove('co-coming');
       frame.removeAttribute('tabindex');
@@ -80,7 +100,8 @@ export class SceneFrame {
     } else if (frame === this.shown) {
       if (message.kind === 'picked') this.hooks.picked(message);
       else if (message.kind === 'held') this.hooks.held(message.photo);
-      else this.hooks.recolored();
+      else if (message.kind === 'recolored') this.hooks.recolored();
+      else this.drawn();
     }
   }
 }

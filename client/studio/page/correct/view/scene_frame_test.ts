@@ -6,6 +6,7 @@ import { readMessage } from './scene_frame';
 test('messages of a page of a scene are read', () => {
   assert.deepEqual(readMessage({ color3d: 'ready', photos: ['a'] }), { kind: 'ready' });
   assert.deepEqual(readMessage({ color3d: 'recolored' }), { kind: 'recolored' });
+  assert.deepEqual(readMessage({ color3d: 'drawn' }), { kind: 'drawn' });
   assert.deepEqual(readMessage({ color3d: 'held', photo: null }), { kind: 'held', photo: null });
   assert.deepEqual(readMessage({ color3d: 'picked', photo: 'a.jpg', x: 0.25, y: 1 }), { kind: 'picked', photo: 'a.jpg', x: 0.25, y: 1 });
 });

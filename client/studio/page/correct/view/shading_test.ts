@@ -1,8 +1,8 @@
 import assert from 'node:assert/strict';
-import { readFileSync } from 'node:fs';
 import test from 'node:test';
 
 import { labFromHex } from '../../paint/color/lab';
+import { viewPageScript } from '../check/view_page';
 import { gainOf, plainGain } from '../model/tone';
 import { shade, sourceShades, type Look } from './shading';
 
@@ -29,7 +29,7 @@ test('no saturation is grey, warmth is yellow', () => {
 });
 
 test('sources have the shades of the page of a scene', () => {
-  const page = readFileSync(process.env.COLOR3D_VIEW_PAGE!, 'utf8');
+  const page = viewPageScript('page.js');
   for (const [name, hex] of Object.entries(sourceShades)) {
     assert.match(page, new RegExp(`u${name[0]!.toUpperCase()}${name.slice(1)}: \\['${hex}'`));
   }
