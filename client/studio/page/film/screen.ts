@@ -107,9 +107,7 @@ export class Screen {
     if (this.playsMovie) {
       this.video.loop = this.loops;
       this.video.playbackRate = this.speed;
-      if (on) void this.video.play().catch((error: Error) => {
-        if (error.name !== 'AbortError') this.playFrames();
-      });
+      if (on) this.startMovie();
       else this.video.pause();
     }
     this.last = performance.now();
@@ -143,6 +141,15 @@ export class Screen {
   private dropMovie(): void {
     this.video.removeAttribute('src');
     this.video.load();
+  }
+
+  private startMovie(): void {
+    this.video.play().catch((error: Error) => {
+      if (error.name === 'AbortError' || !this.playing) return;
+      if (error.name !== 'NotAllowedError' || this.video.muted) return this.playFrames();
+      this.video.muted = true; // until somebody presses a button, browsers play in silence only
+      this.startMovie();
+    });
   }
 
   // The browser cannot play the movie.
