@@ -175,7 +175,7 @@ export class Screen {
         this.seek(this.times.length - 1);
         return this.play(false);
       }
-      if (this.position >= end) this.position = this.times[0]!;
+      if (this.position >= end) this.position = this.times[0]! + ((this.position - end) % secondsOf(this.times));
       frame = frameAt(this.times, this.position);
     }
     this.last = now;
