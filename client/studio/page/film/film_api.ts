@@ -1,5 +1,5 @@
 // Calls about films (client/studio/README.md).
-import { getJson, postJson, query, type Job } from '../api';
+import { getJson, postJson, previewStrokes, query, type Job } from '../api';
 
 export interface FilmFacts {
   frames: number; seconds: number; frames_per_second: number; width: number; height: number; codec: string;
@@ -38,3 +38,7 @@ export const movieFrameUrl = (job: string, name: string, frame: number, side: nu
 // A frame in first colours, from the coloured frame of a run that goes on.
 export const earlyUrl = (job: string, set: string, name: string, side: number): string =>
   `/api/jobs/${job}/preview?${query({ set, name, side })}`;
+// The frame in the colours of strokes, while somebody paints.
+export const previewFrame = (
+  set: string, name: string, strokes: readonly unknown[], side: number, signal: AbortSignal,
+): Promise<ImageBitmap> => previewStrokes(set, name, strokes, side, signal);

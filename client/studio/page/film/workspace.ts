@@ -1,9 +1,8 @@
 // The film with its timeline: what is shown, what is picked, and the painter in place of the film.
-import { previewStrokes } from '../api';
 import { button, h, replace, say } from '../dom';
 import { Painter, type StrokeFile } from '../paint/index';
 import { ColoringPanel, type List } from './coloring_panel';
-import { frameUrl, type FilmFacts } from './film_api';
+import { frameUrl, previewFrame, type FilmFacts } from './film_api';
 import type { FilmPlan } from './film_plan';
 import { playerBar, Screen, type FilmSource } from './screen';
 import { Timeline, type Proposal } from './timeline';
@@ -182,7 +181,7 @@ export class Workspace {
     this.root.parentElement?.classList.add('film-painting');
     this.painter = new Painter(host, {
       photo,
-      preview: (strokes, side, signal) => previewStrokes(set, name, strokes, side, signal),
+      preview: (strokes, side, signal) => previewFrame(set, name, strokes, side, signal),
       onChange: (strokes) => {
         plan.color(list, index, { way: 'strokes', strokes }, joins);
         joins = true;
