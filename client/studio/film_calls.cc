@@ -97,7 +97,7 @@ bool FlagOf(const nlohmann::json& body, const char* field) {
 // ---- what the service is asked -----------------------------------------------------------------
 bool HasRange(const v1::FurtherKeyView& entry) { return entry.has_begin_s() || entry.has_end_s(); }
 
-v1::KeyColorSource SourceOf(Connection& connection, const FilmFrameColor& frame) {
+v1::KeyColorSource ColorSourceOf(Connection& connection, const FilmFrameColor& frame) {
   KeyColorFlags color;
   color.automatic = frame.automatic;
   if (!frame.automatic) (frame.is_strokes ? color.hints : color.image) = frame.picture;
@@ -140,7 +140,7 @@ v1::FurtherKeyView MakeEntry(Connection& connection,
     entry.clear_end_s();
   } else {
     entry.set_view(frame.view);
-    *entry.mutable_color() = SourceOf(connection, frame);
+    *entry.mutable_color() = ColorSourceOf(connection, frame);
   }
   if (frame.begin_s) entry.set_begin_s(*frame.begin_s);
   if (frame.end_s) entry.set_end_s(*frame.end_s);

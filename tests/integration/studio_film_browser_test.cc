@@ -10,7 +10,6 @@
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
-#include "core/video/film_reader.h"
 #include "core/video/mp4_writer.h"
 #include "tests/integration/service_fixture.h"
 #include "tests/support/formats/sound_film.h"
