@@ -190,8 +190,7 @@ const use = async () => {
   await click('#add-part');
   await waitFor('!!document.querySelector("#parts-0-way")');
   await evaluate('document.getElementById("parts-0-way").focus()');
-  for (const letter of 'Paint') await press(letter);
-  await press('Enter');
+  await press('P');  // the option that begins with it: Paint
   await waitFor('!!document.querySelector("#film-painter canvas")', 20000);
   await pause(800);
   const canvas = await placeOf('#film-painter canvas');

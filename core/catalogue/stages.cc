@@ -87,7 +87,7 @@ const std::vector<Stage>& StageCatalogue() {
        .step = "export",
        .purpose = "viewers read files of their own",
        .needs = {kScene, kModel},
-       .reads = {kKeyView}},
+       .reads = {kKeyView, kImportFacts}},
       {.kind = kRender,
        .step = "render",
        .purpose = "the report shows rendered views",

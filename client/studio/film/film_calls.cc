@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 #include "client/commands/follow.h"
@@ -11,7 +12,6 @@
 #include "client/lib/names.h"
 #include "client/options/colorize_options.h"
 #include "client/options/key_color_flags.h"
-#include "client/studio/found_photos.h"
 #include "client/studio/studio_requests.h"
 #include "core/base/error.h"
 #include "core/catalogue/artifacts.h"
@@ -20,7 +20,6 @@ namespace color3d::client {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Entries = google::protobuf::RepeatedPtrField<v1::FurtherKeyView>;
 
 constexpr int kMostEntries = 64;
 
@@ -51,6 +50,15 @@ FilmFrameColor ReadFrameColor(const nlohmann::json& entry,
   frame.key.view = TextOf(entry, "view");
   if (frame.key.view.empty()) throw InvalidArgument("choose the frame that the colours belong to");
   return frame;
+}
+
+// The name of a preset, never a file.
+std::string PresetOf(const nlohmann::json& body) {
+  const std::string preset = TextOf(body, "preset");
+  if (preset.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != preset.npos) {
+    throw InvalidArgument("the preset {} is unknown", preset.substr(0, 40));
+  }
+  return preset.empty() ? "fast" : preset;
 }
 
 std::vector<FilmFrameColor> ReadFrames(const nlohmann::json& body,
@@ -230,7 +238,7 @@ void AddFrames(const Json& scene, const Json& carried, Json* timeline) {
 
 FilmChoices ReadFilmChoices(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
   FilmChoices choices;
-  choices.preset = ReadChoices({{"preset", TextOf(body, "preset")}}, set, sets).preset;
+  choices.preset = PresetOf(body);
   choices.poses = FlagOf(body, "poses");
   choices.steady_exposure = FlagOf(body, "steady_exposure");
   const auto rate = body.find("frames_per_second");

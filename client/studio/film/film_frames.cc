@@ -34,7 +34,7 @@ constexpr int kJudgedFrames = 5;   // looked at for colour
 int FrameOfView(const std::string& view) {
   const std::string stem = fs::path(view).stem().string();
   int frame = -1;
-  if (stem.size() < 2 || stem[0] != 'f') NoFrame(view);
+  if (stem.size() < 2 || stem[0] != 'f' || view.find('/') != view.npos) NoFrame(view);
   const auto [end, error] = std::from_chars(stem.data() + 1, stem.data() + stem.size(), frame);
   if (error != std::errc() || end != stem.data() + stem.size() || frame < 0) NoFrame(view);
   return frame;

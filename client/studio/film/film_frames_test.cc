@@ -143,7 +143,7 @@ TEST_F(FilmChoicesTest, ReadsFramesAndParts) {
 
 TEST_F(FilmChoicesTest, RefusesWhatIsNoChoice) {
   EXPECT_THAT(WhyNot({{"keys", "all"}}), HasSubstr("keys"));
-  EXPECT_THAT(WhyNot({{"keys", {1}}}), HasSubstr("JSON object"));
+  EXPECT_THAT(WhyNot({{"keys", nlohmann::json::array({1})}}), HasSubstr("JSON object"));
   EXPECT_THAT(WhyNot({{"keys", {{{"kept", -1}}}}}), HasSubstr("kept"));
   EXPECT_THAT(WhyNot({{"keys", {{{"color", "automatic"}}}}}), HasSubstr("frame"));
   EXPECT_THAT(WhyNot({{"parts", {{{"kept", 0}, {"begin_s", "now"}}}}}), HasSubstr("begin_s"));

@@ -196,7 +196,9 @@ const showMovie = async (on) => {
   if (on && !movie.src) movie.src = await movieAddress();
   movie.hidden = !on;
   press($('see-movie'), on);
-  if (on) movie.play().catch(() => {});  // where pages may not play by themselves, people do
+  const start = (then) => movie.play().catch(then);
+  // Where pages may not sound by themselves, they play in silence, and people turn it on.
+  if (on) start(() => { movie.muted = true; start(() => {}); });
   else movie.pause();
 };
 // What moves here cannot be played in 3D: it follows a field, not windows of time.

@@ -29,7 +29,7 @@ const wayWords: Record<Way, string> = {
 };
 
 const howOf = (one: Coloring): string => one.way === 'kept' ? (one.automatic ? 'automatic colours' : 'coloured by you')
-  : one.way === 'strokes' ? (one.strokes?.length ? `painted, ${one.strokes.length} strokes` : 'not painted yet')
+  : one.way === 'strokes' ? (one.strokes?.length ? `painted, ${one.strokes.length === 1 ? 'one stroke' : `${one.strokes.length} strokes`}` : 'not painted yet')
     : one.way === 'picture' ? one.pictureName ?? 'no picture yet' : wayWords[one.way];
 
 export class ColoringPanel {

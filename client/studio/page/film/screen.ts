@@ -107,9 +107,7 @@ export class Screen {
     if (this.playsMovie) {
       this.video.loop = this.loops;
       this.video.playbackRate = this.speed;
-      if (on) void this.video.play().catch((error: Error) => {
-        if (error.name !== 'AbortError') this.playFrames();
-      });
+      if (on) this.startMovie();
       else this.video.pause();
     }
     this.last = performance.now();
@@ -145,6 +143,15 @@ export class Screen {
     this.video.load();
   }
 
+  private startMovie(): void {
+    this.video.play().catch((error: Error) => {
+      if (error.name === 'AbortError' || !this.playing) return;
+      if (error.name !== 'NotAllowedError' || this.video.muted) return this.playFrames();
+      this.video.muted = true; // until somebody presses a button, browsers play in silence only
+      this.startMovie();
+    });
+  }
+
   // The browser cannot play the movie.
   private playFrames(): void {
     if (this.ended || !this.source?.video) return;
@@ -168,7 +175,7 @@ export class Screen {
         this.seek(this.times.length - 1);
         return this.play(false);
       }
-      if (this.position >= end) this.position = this.times[0]!;
+      if (this.position >= end) this.position = this.times[0]! + ((this.position - end) % secondsOf(this.times));
       frame = frameAt(this.times, this.position);
     }
     this.last = now;

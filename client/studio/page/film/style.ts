@@ -23,7 +23,7 @@ position:relative;top:calc(50% - 1.2rem)}
 .film-bar button,.film-bar select,.film-tools button{padding:.3rem .8rem}
 .film-bar .main-button{min-width:5.4rem;justify-content:center}
 .film-bar button[aria-pressed=true]{background:var(--wash);border-color:var(--accent)}
-#film-wishes>:last-child{margin:0}
+#film-wishes>p:empty{display:none}#film-wishes>:last-child{margin:0}#film-wishes{padding-bottom:.6rem}
 .film-clock{white-space:nowrap;font-variant-numeric:tabular-nums;padding-inline:.4rem;min-width:9.5rem}
 .film-gap{flex:1}
 .film-timeline{border:1px solid var(--line);border-top:0;border-radius:0 0 var(--radius) var(--radius);background:var(--card);padding:.4rem .9rem .9rem}
