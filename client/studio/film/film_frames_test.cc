@@ -123,7 +123,7 @@ TEST_F(FilmChoicesTest, ReadsFramesAndParts) {
   const FilmChoices choices =
       Read({{"preset", "best"},
             {"poses", true},
-            {"keys", {{{"kept", 0}}, {{"view", "f000003"}, {"color", "automatic"}}}},
+            {"keys", {{{"kept", 0u}}, {{"view", "f000003"}, {"color", "automatic"}}}},
             {"parts",
              {{{"view", "f000007"},
                {"color", "nothing"},
@@ -146,7 +146,7 @@ TEST_F(FilmChoicesTest, RefusesWhatIsNoChoice) {
   EXPECT_THAT(WhyNot({{"keys", nlohmann::json::array({1})}}), HasSubstr("JSON object"));
   EXPECT_THAT(WhyNot({{"keys", {{{"kept", -1}}}}}), HasSubstr("kept"));
   EXPECT_THAT(WhyNot({{"keys", {{{"color", "automatic"}}}}}), HasSubstr("frame"));
-  EXPECT_THAT(WhyNot({{"parts", {{{"kept", 0}, {"begin_s", "now"}}}}}), HasSubstr("begin_s"));
+  EXPECT_THAT(WhyNot({{"parts", {{{"kept", 0u}, {"begin_s", "now"}}}}}), HasSubstr("begin_s"));
   EXPECT_THAT(WhyNot({{"keys", {{{"view", "f1"}, {"color", "nothing"}}}}}), HasSubstr("strokes"));
   EXPECT_THAT(WhyNot({{"preset", "../x"}}), HasSubstr("preset"));
   nlohmann::json many;

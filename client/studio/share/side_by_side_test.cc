@@ -31,7 +31,8 @@ TEST(SideBySideTest, GrayIsLeftAndColorRight) {
   const ScratchFolder scratch;
   const auto movie = scratch.path() / "a.mp4", both = scratch.path() / "both.mp4";
   ThreadPool pool(1);
-  Mp4Writer writer(movie, {.width = kMovieWidth, .height = kMovieHeight, .frames_per_second = 10.0});
+  Mp4Writer writer(movie,
+                   {.width = kMovieWidth, .height = kMovieHeight, .frames_per_second = 10.0});
   for (int i = 0; i < kMovieFrames; ++i) writer.Add(Frame(i), pool);
   writer.Finish();
   const CancellationToken cancel;
