@@ -125,9 +125,10 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
   };
 
   // A run that waited was put elsewhere in the queue, as another one.
-  const goWhereMoved = async (): Promise<void> => {
+  const goWhereMoved = async (): Promise<boolean> => {
     const to = await movedTo(id).catch(() => '');
     if (to && !left) location.replace(`#job/${to}`);
+    return !!to;
   };
 
   const act = async (what: Promise<unknown>, again: boolean): Promise<void> => {
@@ -189,7 +190,7 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
       end: () => undefined,
     });
   };
-  watch();
+  void goWhereMoved().then((isElsewhere) => { if (!isElsewhere && !left) watch(); });
   return () => {
     left = true;
     clearTimeout(timer);
