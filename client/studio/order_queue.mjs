@@ -42,6 +42,7 @@ const use = async () => {
   for (const [i, name] of ['one', 'two', 'three', 'four'].entries()) runs.push(await start(name, photos[i + 1]));
   await waitFor('document.querySelectorAll(".queue-item").length === 4');
   await waitFor('!!document.querySelector(".queue-item .state-running")');
+  await waitFor('![...document.querySelectorAll(".queue-name")].some((name) => name.textContent.startsWith("Scene "))');
   const before = await names();
   await look('queue');
   await click(button('First: four'));
