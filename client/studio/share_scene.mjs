@@ -61,7 +61,7 @@ const share = async () => {
   await send('Page.reload');
   await waitFor('document.querySelector("#credit-colored_by")?.value === "Erika Müller"');
   await click('#go-sheet');
-  await waitFor('document.querySelector("main").dataset.state === "done"', 120000);
+  await waitFor('document.querySelector("#print")?.disabled === false', 240000);
   const failed = await evaluate('[...document.querySelectorAll(".sheet img")].filter((image) => !image.naturalWidth).length');
   const figures = await evaluate('document.querySelectorAll(".sheet figure").length');
   await look('sheet');

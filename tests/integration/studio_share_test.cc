@@ -44,8 +44,8 @@ TEST_F(StudioShareTest, SceneIsSavedWithItsCredit) {
   for (const char* list : {"errors", "requests", "wide"}) {
     EXPECT_THAT(seen.at(list), IsEmpty()) << seen.at(list);
   }
-  // A key photo in colour and in grey, and the others.
-  EXPECT_EQ(seen.at("figures"), 9);
+  // A key photo in colour and in grey, and all photos.
+  EXPECT_EQ(seen.at("figures"), 10);
   EXPECT_EQ(seen.at("failed"), 0);
 
   const std::string key = ReadFile(out / "key_view_colored.png");
@@ -55,7 +55,7 @@ TEST_F(StudioShareTest, SceneIsSavedWithItsCredit) {
   const MemorySource source(packed);
   const ZipReader zip(source);
   EXPECT_THAT(zip.records(), SizeIs(8));
-  const std::string photo = zip.Read("view03_coloured.jpg", 1 << 24);
+  const std::string photo = zip.Read("view003_coloured.jpg", 1 << 24);
   EXPECT_THAT(ReadPictureTexts(photo, "photo"), Contains(Pair("2:120", kCredit)));
   for (const char* file : {"scene.spz", "scene.mp4", "side_by_side.mp4"}) {
     EXPECT_GT(fs::file_size(out / file), 1000u) << file;

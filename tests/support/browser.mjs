@@ -32,7 +32,7 @@ export const openBrowser = (chromium, flags, isError = () => true) => {
     if (method === 'Runtime.consoleAPICalled' && isError(params.type)) {
       errors.push(params.args.map((arg) => arg.value ?? arg.description).join(' '));
     }
-    if (method === 'Log.entryAdded' && params.entry.level === 'error') errors.push(params.entry.text);
+    if (method === 'Log.entryAdded' && params.entry.level === 'error') errors.push(`${params.entry.text} ${params.entry.url ?? ''}`.trim());
     if (method === 'Network.requestWillBeSent' && !/^(data|blob|file):/.test(params.request.url)) {
       requests.push(params.request.url);
     }

@@ -1,5 +1,5 @@
 // A contact sheet for print: A4 pages as they will come out of the printer.
-import { artifactUrl, describeSet, follow, getState, photoUrl, type PhotoSet, type Run } from '../api';
+import { artifactUrl, describeSet, follow, getState, type PhotoSet, type Run } from '../api';
 import { button, h, problem, replace, say } from '../dom';
 import { setStepsOf } from '../main';
 import { coloredUrl, getCredit } from './calls';
@@ -7,7 +7,7 @@ import { adoptShareStyle } from './style';
 import { creditText, pagesOf, spread, stem } from './texts';
 
 const onFirstPage = 9, onOthers = 12, mostPhotos = 57;
-const sideOfThumb = 640, sideOfKey = 1200;
+const sideOfThumb = 640; // px
 
 interface Picture { src: string; text: string }
 
@@ -22,16 +22,14 @@ const lastState = (id: string): Promise<Run> => new Promise((done, failed) => {
 const picturesOf = async (run: Run, set: PhotoSet | undefined): Promise<{ key: Picture[]; others: Picture[] }> => {
   const key: Picture[] = run.artifacts.some(({ name }) => name === 'key_view_colored.png')
     ? [{ src: artifactUrl(run.id, 'key_view_colored.png'), text: 'Key photo, coloured' }] : [];
+  const original = run.artifacts.find(({ name }) => name === 'key_view.png');
+  if (original) key.unshift({ src: artifactUrl(run.id, original.name), text: `Key photo, original${run.key_view ? `: ${stem(run.key_view)}` : ''}` });
   const found = set && (await describeSet(set.id)).found;
   if (!set || !found || found.kind !== 'photos') {
-    if (run.artifacts.some(({ name }) => name === 'key_view.png')) key.unshift({ src: artifactUrl(run.id, 'key_view.png'), text: 'Key photo, original' });
     const drawn = run.artifacts.filter(({ name }) => /^renders\/.*\.png$/.test(name));
     return { key, others: spread(drawn, mostPhotos).map(({ name }) => ({ src: artifactUrl(run.id, name), text: `${stem(name)}, drawn from the scene` })) };
   }
-  const view = run.key_view || found.photos[0]?.name || '';
-  const photo = found.photos.find(({ name }) => name === view || stem(name) === stem(view));
-  if (photo) key.unshift({ src: photoUrl(set.id, photo.name, sideOfKey, true), text: `Key photo, original: ${stem(photo.name)}` });
-  const rest = found.photos.filter((one) => one !== photo);
+  const rest = found.photos.filter(({ name }) => !run.key_view || stem(name) !== stem(run.key_view));
   return { key, others: spread(rest, mostPhotos).map(({ name }) => ({ src: coloredUrl(run.id, set.id, name, sideOfThumb), text: stem(name) })) };
 };
 
