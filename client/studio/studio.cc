@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
@@ -21,6 +20,7 @@
 #include "client/studio/photo_sets.h"
 #include "client/studio/queue/queue_routes.h"
 #include "client/studio/run_progress.h"
+#include "client/studio/set_routes.h"
 #include "client/studio/share/share_routes.h"
 #include "client/studio/studio_answers.h"
 #include "client/studio/studio_calls.h"
@@ -29,8 +29,6 @@
 #include "client/studio/studio_routes.h"
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/base/text/lower_case.h"
-#include "core/image/probe/probe.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -42,7 +40,6 @@ using httplib::Response;
 using Json = nlohmann::ordered_json;
 using Steady = std::chrono::steady_clock;
 
-constexpr int64_t kMaxPictureBytes = 256 << 20;
 constexpr int kMaxEventStreams = 8;
 constexpr auto Pattern = ApiPattern;
 
@@ -93,21 +90,15 @@ class Studio::Parts {
   void Get(const std::string& pattern, Handler handler);
   void Post(const std::string& pattern, BodyHandler handler);
   void AddPageRoutes();
-  void AddSetRoutes();
   void AddJobRoutes();
 
   void Open(const Request& request, Response& response);
-  void Receive(const Request& request, Response& response, const ContentReader& reader);
-  void KeepPicture(const Request& request, Response& response, const ContentReader& reader);
-  void Colorize(const Request& request, Response& response, const ContentReader& reader);
   void StreamEvents(const Request& request, Response& response);
   // Answers with the states that `watch` passes to `send` as events.
   void Stream(Response& response, std::function<void(const StudioRoutes::Send& send)> watch);
   void SendArtifact(const Request& request, Response& response);
 
   PhotoFolder FolderOf(const std::string& id) const { return CollectSet(sets_.Get(id)); }
-  // A photo or a frame of the set's film.
-  LocalFile PhotoOf(const PhotoFolder& folder, const std::string& view);
   // Its file and media type.
   std::pair<fs::path, std::string> FetchArtifact(const std::string& job,
                                                  const std::string& name) const;
@@ -175,7 +166,6 @@ void Studio::Parts::Post(const std::string& pattern, BodyHandler handler) {
 void Studio::Parts::AddRoutes() {
   http_.set_payload_max_length(static_cast<size_t>(options_.max_file_bytes));
   AddPageRoutes();
-  AddSetRoutes();
   AddJobRoutes();
   const StudioRoutes routes{
       [this](const std::string& pattern, Handler handler) { Get(pattern, std::move(handler)); },
@@ -186,6 +176,9 @@ void Studio::Parts::AddRoutes() {
         Stream(response, std::move(watch));
       }};
   const auto folder_of = [this](const std::string& set) { return FolderOf(set); };
+  const auto scene_of = [this](const std::string& set) { return SceneOf(set); };
+  AddSetRoutes({sets_, calls_, films_, cancel_, options_.max_file_bytes, folder_of, scene_of},
+               routes);
   AddShareRoutes(
       routes, {options_.folder, downloads_.path(), folder_of, &calls_, &cancel_}, share_);
   AddQueueRoutes(routes, queue_);
@@ -194,15 +187,11 @@ void Studio::Parts::AddRoutes() {
                  calls_,
                  films_,
                  folder_of,
-                 [this](const std::string& set) { return SceneOf(set); },
+                 scene_of,
                  [this](const std::string& job, const std::string& name) {
                    return FetchArtifact(job, name).first;
                  }},
                 routes);
-}
-
-LocalFile Studio::Parts::PhotoOf(const PhotoFolder& folder, const std::string& view) {
-  return folder.film ? films_.File(folder, view) : PhotoOfView(folder, view);
 }
 
 void Studio::Parts::AddPageRoutes() {
@@ -220,78 +209,6 @@ void Studio::Parts::AddPageRoutes() {
     AnswerJson({{"server", calls_.ServerFacts()}, {"sets", sets}, {"jobs", calls_.Jobs()}},
                response);
   });
-}
-
-void Studio::Parts::AddSetRoutes() {
-  Post("/api/sets", [this](const Request& request, Response& response, const ContentReader& body) {
-    AnswerJson(SetJson(sets_.Create(TextOf(ReadJsonBody(request, body), "name"))), response);
-  });
-  Get(Pattern("sets", ""), [this](const Request& request, Response& response) {
-    const PhotoSet set = sets_.Get(request.matches[1]);
-    Json json = SetJson(set);
-    try {
-      json["found"] = DescribePhotos(CollectSet(set), cancel_);
-    } catch (const Error& e) {  // no error of the call: the page says what is wrong with the files
-      if (e.code() == ErrorCode::kCancelled) throw;
-      json["problem"] = e.what();
-    }
-    AnswerJson(json, response);
-  });
-  Get(Pattern("sets", "/photo"), [this](const Request& request, Response& response) {
-    const PhotoFolder folder = FolderOf(request.matches[1]);
-    const LocalFile photo = PhotoOf(folder, request.get_param_value("name"));
-    const bool gray = request.get_param_value("gray") == "1";
-    response.set_content(PhotoJpeg(photo, SideOf(request), gray), "image/jpeg");
-  });
-  Post(Pattern("sets", "/files"),
-       [this](const Request& request, Response& response, const ContentReader& body) {
-         Receive(request, response, body);
-       });
-  Post(Pattern("sets", "/pictures"),
-       [this](const Request& request, Response& response, const ContentReader& body) {
-         KeepPicture(request, response, body);
-       });
-  Post(Pattern("sets", "/plan"),
-       [this](const Request& request, Response& response, const ContentReader& body) {
-         const std::string id = request.matches[1];
-         const RunChoices choices = ReadChoices(ReadJsonBody(request, body), id, sets_);
-         AnswerJson(calls_.Plan(FolderOf(id), choices), response);
-       });
-  Post(Pattern("sets", "/key"),
-       [this](const Request& request, Response& response, const ContentReader& body) {
-         const int count = ReadJsonBody(request, body).value("count", 1);
-         const std::string id = request.matches[1];
-         const PhotoFolder folder = FolderOf(id);
-         const size_t views = folder.film ? 5 : folder.photos.size();  // one for each shot
-         const int most = std::max<int>(1, static_cast<int>(views));
-         const v1::Job job =
-             calls_.SelectKeyView(SceneOf(id), std::clamp(count, 1, std::min(most, 5)));
-         AnswerJson(JobFacts(job), response);
-       });
-  Post(Pattern("sets", "/preview"),
-       [this](const Request& request, Response& response, const ContentReader& body) {
-         const auto json = ReadJsonBody(request, body);
-         const std::string id = request.matches[1];
-         const PhotoFolder folder = FolderOf(id);
-         const int side = json.value("max_side", 1000);
-         response.set_content(calls_.Preview(PhotoOf(folder, TextOf(json, "photo")),
-                                             ReadColor(json, id, sets_),
-                                             TextOf(json, "made_by"),
-                                             side == 0 ? 0 : std::clamp(side, 16, 2000)),
-                              "image/png");
-       });
-  Post(Pattern("sets", "/below"),
-       [this](const Request& request, Response& response, const ContentReader& body) {
-         const auto json = ReadJsonBody(request, body);
-         const std::string id = request.matches[1];
-         const ColorChoice color = ReadColor(json, id, sets_);
-         AnswerJson(JobFacts(calls_.ColorBelow(SceneOf(id), TextOf(json, "photo"), color)),
-                    response);
-       });
-  Post(Pattern("sets", "/colorize"),
-       [this](const Request& request, Response& response, const ContentReader& body) {
-         Colorize(request, response, body);
-       });
 }
 
 void Studio::Parts::AddJobRoutes() {
@@ -320,7 +237,7 @@ void Studio::Parts::AddJobRoutes() {
       [this](const Request& request, Response& response) { SendArtifact(request, response); });
   Get(Pattern("jobs", "/preview"), [this](const Request& request, Response& response) {
     const PhotoFolder folder = FolderOf(request.get_param_value("set"));
-    const LocalFile photo = PhotoOf(folder, request.get_param_value("name"));
+    const LocalFile photo = PhotoOrFrame(folder, request.get_param_value("name"), films_);
     response.set_content(calls_.PreviewOfRun(request.matches[1], photo, SideOf(request)),
                          "image/png");
   });
@@ -341,50 +258,12 @@ void Studio::Parts::Open(const Request& request, Response& response) {
   response.set_content("<!doctype html><title>Color3D</title>", "text/html; charset=utf-8");
 }
 
-void Studio::Parts::Receive(const Request& request,
-                            Response& response,
-                            const ContentReader& reader) {
-  RequireLength(request, options_.max_file_bytes);
-  const std::string name = request.get_param_value("name");
-  int64_t received = 0;  // not announced in pieces, and more than announced where compressed
-  const int64_t bytes = sets_.Receive(request.matches[1], name, [&](const PhotoSets::Sink& sink) {
-    return reader([&](const char* piece, size_t count) {
-      received += static_cast<int64_t>(count);
-      return received <= options_.max_file_bytes && sink(piece, count);
-    });
-  });
-  AnswerJson({{"name", name}, {"bytes", bytes}}, response);
-}
-
-void Studio::Parts::KeepPicture(const Request& request,
-                                Response& response,
-                                const ContentReader& reader) {
-  const std::string name = request.get_param_value("name");
-  const std::string ending = LowerCase(fs::path(name).extension().string());
-  if (!HasImageExtension(name)) {
-    throw InvalidArgument("{} is not a picture: {} are read", name, ReadableImageFormats());
-  }
-  const std::string bytes = ReadBody(request, reader, kMaxPictureBytes);
-  const ImageInfo info = ProbeImage(bytes, name);
-  const fs::path file = sets_.KeepPicture(request.matches[1], ending, bytes);
-  AnswerJson({{"picture", file.filename()}, {"width", info.width}, {"height", info.height}},
-             response);
-}
-
 std::string Studio::Parts::SceneOf(const std::string& id) {
   // Uploaded again each time: what is there already is not sent, and a changed folder is another
   // scene.
   std::string scene = calls_.Upload(FolderOf(id));
   sets_.SetScene(id, scene);
   return scene;
-}
-
-void Studio::Parts::Colorize(const Request& request,
-                             Response& response,
-                             const ContentReader& reader) {
-  const std::string id = request.matches[1];
-  const RunChoices choices = ReadChoices(ReadJsonBody(request, reader), id, sets_);
-  AnswerJson(JobFacts(calls_.Colorize(SceneOf(id), choices)), response);
 }
 
 void Studio::Parts::StreamEvents(const Request& request, Response& response) {
