@@ -127,7 +127,8 @@ KeyColorFlags FlagsOf(const ColorChoice& color, const std::filesystem::path& str
 
 // Weights that understand words, by their name on the server.
 std::string ModelOfWords(Connection& connection) {
-  for (const v1::ModelInfo& model : GetServerInfo(connection).models()) {
+  const v1::ServerInfo info = GetServerInfo(connection);
+  for (const v1::ModelInfo& model : info.models()) {
     if (model.kind() == "clip") return model.name();
   }
   throw Error(ErrorCode::kFailedPrecondition,
