@@ -20,7 +20,6 @@ using httplib::Response;
 using Json = nlohmann::ordered_json;
 
 constexpr int64_t kMaxPictureBytes = 256 << 20;
-constexpr auto Pattern = ApiPattern;
 
 void ReceiveFile(const SetRouteParts& parts,
                  const Request& request,
@@ -67,7 +66,7 @@ void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes) {
                 AnswerJson(SetJson(parts.sets.Create(TextOf(ReadJsonBody(request, body), "name"))),
                            response);
               });
-  routes.get(Pattern("sets", ""), [parts](const Request& request, Response& response) {
+  routes.get(ApiPattern("sets", ""), [parts](const Request& request, Response& response) {
     const PhotoSet set = parts.sets.Get(request.matches[1]);
     Json json = SetJson(set);
     try {
@@ -78,27 +77,27 @@ void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes) {
     }
     AnswerJson(json, response);
   });
-  routes.get(Pattern("sets", "/photo"), [parts](const Request& request, Response& response) {
+  routes.get(ApiPattern("sets", "/photo"), [parts](const Request& request, Response& response) {
     const PhotoFolder folder = parts.folder_of(request.matches[1]);
     const LocalFile photo = PhotoOrFrame(folder, request.get_param_value("name"), parts.films);
     const bool gray = request.get_param_value("gray") == "1";
     response.set_content(PhotoJpeg(photo, SideOf(request), gray), "image/jpeg");
   });
-  routes.post(Pattern("sets", "/files"),
+  routes.post(ApiPattern("sets", "/files"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 ReceiveFile(parts, request, response, body);
               });
-  routes.post(Pattern("sets", "/pictures"),
+  routes.post(ApiPattern("sets", "/pictures"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 KeepPicture(parts, request, response, body);
               });
-  routes.post(Pattern("sets", "/plan"),
+  routes.post(ApiPattern("sets", "/plan"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const std::string id = request.matches[1];
                 const RunChoices choices = ReadChoices(ReadJsonBody(request, body), id, parts.sets);
                 AnswerJson(parts.calls.Plan(parts.folder_of(id), choices), response);
               });
-  routes.post(Pattern("sets", "/key"),
+  routes.post(ApiPattern("sets", "/key"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const int count = ReadJsonBody(request, body).value("count", 1);
                 const std::string id = request.matches[1];
@@ -109,7 +108,7 @@ void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes) {
                     parts.scene_of(id), std::clamp(count, 1, std::min(most, 5)));
                 AnswerJson(JobFacts(job), response);
               });
-  routes.post(Pattern("sets", "/preview"),
+  routes.post(ApiPattern("sets", "/preview"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const auto json = ReadJsonBody(request, body);
                 const std::string id = request.matches[1];
@@ -122,7 +121,7 @@ void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes) {
                                         side == 0 ? 0 : std::clamp(side, 16, 2000)),
                     "image/png");
               });
-  routes.post(Pattern("sets", "/below"),
+  routes.post(ApiPattern("sets", "/below"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const auto json = ReadJsonBody(request, body);
                 const std::string id = request.matches[1];
@@ -131,7 +130,7 @@ void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes) {
                                parts.scene_of(id), TextOf(json, "photo"), color)),
                            response);
               });
-  routes.post(Pattern("sets", "/colorize"),
+  routes.post(ApiPattern("sets", "/colorize"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const std::string id = request.matches[1];
                 const RunChoices choices = ReadChoices(ReadJsonBody(request, body), id, parts.sets);

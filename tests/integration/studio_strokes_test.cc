@@ -1,5 +1,10 @@
 // Strokes that the studio's page sends and those of the command line: the same bytes, through a
 // real server.
+// Macros of httplib break Eigen after it.
+// clang-format off
+#include <Eigen/Core>
+// clang-format on
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <httplib.h>
