@@ -32,7 +32,7 @@ constexpr char kStrokes[] =
     "{\"x\": 200, \"y\": 150, \"radius\": 4, \"color\": \"#3366cc\"},\n"
     "{\"region\": [[100, 20], [140, 20], [120, 60]], \"keep\": \"auto\"}\n"
     "]\n";
-constexpr char kView[] = "view03.png";
+constexpr char kView[] = "view003.png";
 
 class StudioStrokesTest : public ServiceTest {
  protected:

@@ -13,6 +13,7 @@
 #include "core/base/run_control.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
+#include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/image/probe/orientation.h"
 #include "core/image/reduced.h"
@@ -61,6 +62,8 @@ StrokePreview::Shared StrokePreview::Luminance(const Request& request,
 
 StrokePreview::Shared StrokePreview::Automatic(const Prepared& luminance, const std::string& key) {
   return cache_.Get("automatic " + key, [&] {
+    // As the stage: its sums depend on the number of threads.
+    SetTorchThreads(pool_.thread_count(), /*blas_threads=*/1);
     Prepared prepared;
     prepared.planes = AutomaticColorizer::Embedded()->Colorize(luminance.planes).ab;
     prepared.bytes = BytesOfPlanes(prepared.planes);

@@ -25,7 +25,7 @@ test('a job is read as it was sent', () => {
 
 test('what is sent has the colours of each frame', () => {
   const plan = fresh();
-  const strokes = [{ x: 1, y: 2, color: '#aa0000' }];
+  const strokes = [{ x: 1, y: 2, radius: 2, color: '#aa0000' }];
   plan.color('parts', plan.addPart(20), { way: 'strokes', strokes });
   plan.color('keys', plan.addKey(9), { way: 'picture', picture: 'p.png' });
   const { keys, parts } = plan.toBody();
