@@ -89,6 +89,7 @@ template <typename Select>
 std::vector<int64_t> FirstInTurn(SqlDatabase& db, const Select& select) {
   struct Candidate {
     int64_t priority, turn, deadline_ms, id;
+    // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 means the compiler's own code.
     auto operator<=>(const Candidate&) const = default;
   };
   const std::string first =
