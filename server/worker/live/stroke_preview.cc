@@ -94,7 +94,7 @@ StrokePreview::Shared StrokePreview::Below(const Request& request,
         DecodeImageWithin(bytes, "the picture below the strokes", std::max(width, height));
     if (srgb.channels != 3) throw InvalidArgument("the picture below the strokes has no colour");
     Prepared prepared{
-        ChromaOfLab(LabFromSrgb(Resize(srgb, width, height))), own.width, own.height, 0};
+        ChromaOfLab(LabFromSrgb(Resize(srgb, width, height))), own.width, own.height, nullptr, 0};
     prepared.bytes = BytesOfPlanes(prepared.planes);
     return prepared;
   });
