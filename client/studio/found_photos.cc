@@ -202,8 +202,12 @@ const LocalFile& PhotoOfView(const PhotoFolder& folder, const std::string& name)
 }
 
 std::string PhotoJpeg(const LocalFile& photo, int max_side_px, bool gray) {
-  const Image image = FitWithin(ReadPhoto(photo), max_side_px);
-  return EncodeJpeg(gray ? GrayOf(image) : image, kJpegQuality);
+  return PictureJpeg(ReadPhoto(photo), max_side_px, gray, kJpegQuality);
+}
+
+std::string PictureJpeg(const Image& picture, int max_side_px, bool gray, int quality) {
+  const Image small = FitWithin(picture, max_side_px);
+  return EncodeJpeg(gray ? GrayOf(small) : small, quality);
 }
 
 }  // namespace color3d::client

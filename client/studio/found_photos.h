@@ -9,6 +9,7 @@
 #include "client/studio/photo_sets.h"
 #include "color3d/v1/job.pb.h"
 #include "core/base/cancellation.h"
+#include "core/base/image.h"
 
 namespace color3d::client {
 
@@ -37,5 +38,7 @@ const LocalFile& PhotoOfView(const PhotoFolder& folder, const std::string& name)
 // The photo as a JPEG with its longer side at most `max_side_px` (0: its own size), upright, in
 // sRGB. `gray`: its luminance. Throws Error{kInvalidArgument} if it cannot be decoded.
 std::string PhotoJpeg(const LocalFile& photo, int max_side_px, bool gray);
+// The same of a picture in sRGB. `quality`: of the JPEG, 1 to 100.
+std::string PictureJpeg(const Image& picture, int max_side_px, bool gray, int quality);
 
 }  // namespace color3d::client

@@ -56,10 +56,6 @@ void KeepPicture(const SetRouteParts& parts,
 
 }  // namespace
 
-LocalFile PhotoOrFrame(const PhotoFolder& folder, const std::string& view, FilmFrames& films) {
-  return folder.film ? films.File(folder, view) : PhotoOfView(folder, view);
-}
-
 void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes) {
   routes.post("/api/sets",
               [parts](const Request& request, Response& response, const ContentReader& body) {
@@ -79,7 +75,7 @@ void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes) {
   });
   routes.get(ApiPattern("sets", "/photo"), [parts](const Request& request, Response& response) {
     const PhotoFolder folder = parts.folder_of(request.matches[1]);
-    const LocalFile photo = PhotoOrFrame(folder, request.get_param_value("name"), parts.films);
+    const LocalFile photo = parts.films.File(folder, request.get_param_value("name"));
     const bool gray = request.get_param_value("gray") == "1";
     response.set_content(PhotoJpeg(photo, SideOf(request), gray), "image/jpeg");
   });
@@ -115,7 +111,7 @@ void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes) {
                 const PhotoFolder folder = parts.folder_of(id);
                 const int side = json.value("max_side", 1000);
                 response.set_content(
-                    parts.calls.Preview(PhotoOrFrame(folder, TextOf(json, "photo"), parts.films),
+                    parts.calls.Preview(parts.films.File(folder, TextOf(json, "photo")),
                                         ReadColor(json, id, parts.sets),
                                         TextOf(json, "made_by"),
                                         side == 0 ? 0 : std::clamp(side, 16, 2000)),

@@ -29,7 +29,4 @@ struct SetRouteParts {
 
 void AddSetRoutes(const SetRouteParts& parts, const StudioRoutes& routes);
 
-// The photo of a view, or the frame of the folder's film as a picture.
-LocalFile PhotoOrFrame(const PhotoFolder& folder, const std::string& view, FilmFrames& films);
-
 }  // namespace color3d::client

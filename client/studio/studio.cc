@@ -237,7 +237,7 @@ void Studio::Parts::AddJobRoutes() {
       [this](const Request& request, Response& response) { SendArtifact(request, response); });
   Get(Pattern("jobs", "/preview"), [this](const Request& request, Response& response) {
     const PhotoFolder folder = FolderOf(request.get_param_value("set"));
-    const LocalFile photo = PhotoOrFrame(folder, request.get_param_value("name"), films_);
+    const LocalFile photo = films_.File(folder, request.get_param_value("name"));
     response.set_content(calls_.PreviewOfRun(request.matches[1], photo, SideOf(request)),
                          "image/png");
   });
@@ -341,7 +341,7 @@ Studio::~Studio() = default;
 
 std::string Studio::OfferPhotos(const fs::path& path) {
   const PhotoSet set = parts_->sets_.Adopt(path);
-  CollectPhotos(set.folder);  // what cannot be used is said before the browser opens
+  CollectSet(set);  // what cannot be used is said before the browser opens
   return "set/" + set.id;
 }
 

@@ -51,6 +51,11 @@ Json SetJson(const PhotoSet& set) {
           {"as_frames", set.as_frames}};
 }
 
+bool FlagOf(const nlohmann::json& body, const char* field) {
+  const auto value = body.find(field);
+  return value != body.end() && *value == true;
+}
+
 ColorChoice ReadColor(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
   using From = ColorChoice::From;
   static const std::map<std::string, From> kNames = {{"", From::kAutomatic},
@@ -91,16 +96,19 @@ KeyChoice ReadKey(const nlohmann::json& body, const std::string& set, PhotoSets&
   return key;
 }
 
+std::string PresetOf(const nlohmann::json& body) {
+  const std::string preset = TextOf(body, "preset");
+  if (preset.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != preset.npos) {
+    throw InvalidArgument("the preset {} is unknown", preset.substr(0, 40));
+  }
+  return preset.empty() ? "fast" : preset;
+}
+
 RunChoices ReadChoices(const nlohmann::json& body, const std::string& set, PhotoSets& sets) {
   RunChoices choices;
   choices.key = ReadKey(body, set, sets);
-  const std::string preset = TextOf(body, "preset");
-  if (preset.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != preset.npos) {
-    throw InvalidArgument("the preset {} is unknown", preset.substr(0, 40));  // never a file
-  }
-  if (!preset.empty()) choices.preset = preset;
-  const auto poses = body.find("poses");
-  choices.poses = poses != body.end() && *poses == true;
+  choices.preset = PresetOf(body);
+  choices.poses = FlagOf(body, "poses");
   const auto further = body.find("further");
   if (further == body.end()) return choices;
   if (!further->is_array()) throw InvalidArgument("further is not a list");

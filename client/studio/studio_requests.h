@@ -13,6 +13,10 @@ namespace color3d::client {
 
 // Returns "" if the field is missing. Throws Error{kInvalidArgument} if it is no text.
 std::string TextOf(const nlohmann::json& body, const char* field);
+// Whether the field is true.
+bool FlagOf(const nlohmann::json& body, const char* field);
+// `preset` of a request, "fast" by default: a name, never a file. Throws Error{kInvalidArgument}.
+std::string PresetOf(const nlohmann::json& body);
 
 // Longer side of a picture, px; 0 if it is not given. Throws Error{kInvalidArgument}.
 int SideOf(const httplib::Request& request);

@@ -52,15 +52,6 @@ FilmFrameColor ReadFrameColor(const nlohmann::json& entry,
   return frame;
 }
 
-// The name of a preset, never a file.
-std::string PresetOf(const nlohmann::json& body) {
-  const std::string preset = TextOf(body, "preset");
-  if (preset.find_first_not_of("abcdefghijklmnopqrstuvwxyz_") != preset.npos) {
-    throw InvalidArgument("the preset {} is unknown", preset.substr(0, 40));
-  }
-  return preset.empty() ? "fast" : preset;
-}
-
 std::vector<FilmFrameColor> ReadFrames(const nlohmann::json& body,
                                        const char* field,
                                        const std::string& set,
@@ -73,11 +64,6 @@ std::vector<FilmFrameColor> ReadFrames(const nlohmann::json& body,
   }
   for (const nlohmann::json& entry : *list) frames.push_back(ReadFrameColor(entry, set, sets));
   return frames;
-}
-
-bool FlagOf(const nlohmann::json& body, const char* field) {
-  const auto value = body.find(field);
-  return value != body.end() && value->is_boolean() && value->get<bool>();
 }
 
 // ---- what the service is asked -----------------------------------------------------------------

@@ -11,7 +11,6 @@
 #include "core/base/error.h"
 #include "core/base/text/utf8.h"
 #include "core/catalogue/film_rate.h"
-#include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/video/film_reader.h"
 
@@ -38,15 +37,6 @@ int FrameOfView(const std::string& view) {
   const auto [end, error] = std::from_chars(stem.data() + 1, stem.data() + stem.size(), frame);
   if (error != std::errc() || end != stem.data() + stem.size() || frame < 0) NoFrame(view);
   return frame;
-}
-
-std::string JpegOf(const Image& frame, int max_side_px, bool gray) {
-  Image small = FitWithin(frame, max_side_px);
-  if (gray && small.channels == 3) {
-    small = LuminanceFromSrgb(small);
-    for (float& value : small.data) value = static_cast<float>(GrayFromLuminance(value));
-  }
-  return EncodeJpeg(small, kFrameQuality);
 }
 
 double RateOf(const std::vector<double>& times, double seconds) {
@@ -152,7 +142,7 @@ std::string FilmFrames::Jpeg(const PhotoFolder& folder,
 }
 
 std::string FilmFrames::JpegOfFile(const fs::path& film, int frame, int max_side_px, bool gray) {
-  return JpegOf(Read(film, frame), max_side_px, gray);
+  return PictureJpeg(Read(film, frame), max_side_px, gray, kFrameQuality);
 }
 
 LocalFile FilmFrames::File(const PhotoFolder& folder, const std::string& view) {

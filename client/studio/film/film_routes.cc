@@ -22,10 +22,6 @@ using httplib::Response;
 
 constexpr size_t kPieceBytes = 256 << 10;
 
-std::string FilmPattern(const std::string& of, const std::string& after) {
-  return "/api/" + of + "/([0-9a-f-]{1,64})/film" + after;
-}
-
 // By its ending; browsers look at the bytes themselves.
 const char* MediaTypeOfFilm(const fs::path& film) {
   const std::string ending = LowerCase(film.extension().string());
@@ -73,25 +69,27 @@ void AnswerFile(const fs::path& file, const std::string& media_type, Response& r
 }
 
 void AddFilmRoutes(const FilmRouteParts& parts, const StudioRoutes& routes) {
-  routes.get(FilmPattern("sets", ""), [parts](const Request& request, Response& response) {
+  routes.get(ApiPattern("sets", "/film"), [parts](const Request& request, Response& response) {
     const PhotoFolder folder = parts.folder_of(request.matches[1]);
     AnswerJson(parts.frames.Describe(RequireFilm(folder)), response);
   });
-  routes.get(FilmPattern("sets", "/frame"), [parts](const Request& request, Response& response) {
-    const PhotoFolder folder = parts.folder_of(request.matches[1]);
-    const std::string name = request.get_param_value("name");
-    const bool gray = request.get_param_value("gray") == "1";
-    response.set_content(parts.frames.Jpeg(RequireFilm(folder), name, SideOf(request), gray),
-                         "image/jpeg");
-  });
-  routes.get(FilmPattern("sets", "/video"), [parts](const Request& request, Response& response) {
-    const PhotoFolder folder = parts.folder_of(request.matches[1]);
-    if (!folder.film) {
-      throw Error(ErrorCode::kNotFound, "{} has pictures, and no video file", folder.Name());
-    }
-    AnswerFile(folder.film->file, MediaTypeOfFilm(folder.film->file), response);
-  });
-  routes.post(FilmPattern("sets", "/colorize"),
+  routes.get(
+      ApiPattern("sets", "/film/frame"), [parts](const Request& request, Response& response) {
+        const PhotoFolder folder = parts.folder_of(request.matches[1]);
+        const std::string name = request.get_param_value("name");
+        const bool gray = request.get_param_value("gray") == "1";
+        response.set_content(parts.frames.Jpeg(RequireFilm(folder), name, SideOf(request), gray),
+                             "image/jpeg");
+      });
+  routes.get(
+      ApiPattern("sets", "/film/video"), [parts](const Request& request, Response& response) {
+        const PhotoFolder folder = parts.folder_of(request.matches[1]);
+        if (!folder.film) {
+          throw Error(ErrorCode::kNotFound, "{} has pictures, and no video file", folder.Name());
+        }
+        AnswerFile(folder.film->file, MediaTypeOfFilm(folder.film->file), response);
+      });
+  routes.post(ApiPattern("sets", "/film/colorize"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const std::string id = request.matches[1];
                 const FilmChoices choices =
@@ -100,7 +98,7 @@ void AddFilmRoutes(const FilmRouteParts& parts, const StudioRoutes& routes) {
                 const FilmCalls films(parts.calls);
                 AnswerJson(JobFacts(films.Colorize(parts.scene_of(id), choices)), response);
               });
-  routes.post(FilmPattern("sets", "/frames"),
+  routes.post(ApiPattern("sets", "/film/frames"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const auto json = ReadJsonBody(request, body);
                 const auto value = json.find("are_frames");
@@ -110,10 +108,10 @@ void AddFilmRoutes(const FilmRouteParts& parts, const StudioRoutes& routes) {
                 parts.sets.SetAsFrames(request.matches[1], value->get<bool>());
                 AnswerJson(SetJson(parts.sets.Get(request.matches[1])), response);
               });
-  routes.get(FilmPattern("jobs", ""), [parts](const Request& request, Response& response) {
+  routes.get(ApiPattern("jobs", "/film"), [parts](const Request& request, Response& response) {
     AnswerJson(FilmCalls(parts.calls).Timeline(request.matches[1]), response);
   });
-  routes.post(FilmPattern("jobs", "/change"),
+  routes.post(ApiPattern("jobs", "/film/change"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const auto json = ReadJsonBody(request, body);
                 const std::string set = TextOf(json, "set");
@@ -122,17 +120,20 @@ void AddFilmRoutes(const FilmRouteParts& parts, const StudioRoutes& routes) {
                 AnswerJson(JobFacts(films.Change(request.matches[1], choices)), response);
               });
   // A finished movie, and its frames for browsers that cannot play it.
-  routes.get(FilmPattern("jobs", "/video"), [parts](const Request& request, Response& response) {
-    AnswerFile(
-        parts.fetch(request.matches[1], request.get_param_value("name")), "video/mp4", response);
-  });
-  routes.get(FilmPattern("jobs", "/frame"), [parts](const Request& request, Response& response) {
-    const fs::path film = parts.fetch(request.matches[1], request.get_param_value("name"));
-    const bool gray = request.get_param_value("gray") == "1";
-    response.set_content(
-        parts.frames.JpegOfFile(film, NumberOf(request, "frame"), SideOf(request), gray),
-        "image/jpeg");
-  });
+  routes.get(ApiPattern("jobs", "/film/video"),
+             [parts](const Request& request, Response& response) {
+               AnswerFile(parts.fetch(request.matches[1], request.get_param_value("name")),
+                          "video/mp4",
+                          response);
+             });
+  routes.get(
+      ApiPattern("jobs", "/film/frame"), [parts](const Request& request, Response& response) {
+        const fs::path film = parts.fetch(request.matches[1], request.get_param_value("name"));
+        const bool gray = request.get_param_value("gray") == "1";
+        response.set_content(
+            parts.frames.JpegOfFile(film, NumberOf(request, "frame"), SideOf(request), gray),
+            "image/jpeg");
+      });
 }
 
 }  // namespace color3d::client

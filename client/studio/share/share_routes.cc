@@ -77,8 +77,7 @@ MovieWish ReadWish(const nlohmann::json& json) {
     }
     wish.max_side_px = static_cast<int>(*side);
   }
-  const auto bounce = json.find("bounce");
-  wish.bounce = bounce != json.end() && *bounce == true;
+  wish.bounce = FlagOf(json, "bounce");
   return wish;
 }
 
