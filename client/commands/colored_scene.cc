@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
@@ -15,8 +16,6 @@
 namespace color3d::client {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr int kPageSize = 200;
 
 const v1::Artifact* FindModel(const v1::Job& job) {
   const auto found = std::ranges::find_if(
@@ -75,17 +74,14 @@ fs::path FindModelFile(const fs::path& folder) {
 
 v1::Job FindJobOfModel(Connection& connection, const fs::path& model) {
   const FileDigest digest = DigestFile(model);
-  v1::ListJobsRequest request;
-  request.set_page_size(kPageSize);
-  do {
-    const auto jobs = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
-    for (const v1::Job& job : jobs.jobs()) {
-      if (job.state() != v1::Job::STATE_SUCCEEDED || !job.parent().empty()) continue;
-      const v1::Artifact* theirs = FindModel(job);
-      if (theirs != nullptr && theirs->digest().sha256() == digest.sha256) return job;
-    }
-    request.set_page_token(jobs.next_page_token());
-  } while (!request.page_token().empty());
+  std::optional<v1::Job> found;
+  ForEachJob(connection, "", [&](const v1::Job& job) {
+    if (job.state() != v1::Job::STATE_SUCCEEDED || !job.parent().empty()) return true;
+    const v1::Artifact* theirs = FindModel(job);
+    if (theirs != nullptr && theirs->digest().sha256() == digest.sha256) found = job;
+    return !found;
+  });
+  if (found) return *std::move(found);
   throw Error(ErrorCode::kFailedPrecondition,
               "no job of the server at {} made {}; name the server that has it with --server, "
               "or colour the scene again",
@@ -103,19 +99,15 @@ bool IsOnServer(const std::string& target) {
 
 v1::Job NewestResult(Connection& connection, const std::string& scene) {
   GetScene(connection, scene);
-  v1::ListJobsRequest request;
-  request.set_parent(scene);
-  request.set_page_size(kPageSize);
+  std::optional<v1::Job> newest;
   std::string unfinished;
-  do {
-    const auto jobs = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
-    for (const v1::Job& job : jobs.jobs()) {
-      if (job.kind() != kind::kColorizeScene || !job.parent().empty()) continue;
-      if (job.state() == v1::Job::STATE_SUCCEEDED) return job;
-      if (unfinished.empty() && !IsFinished(job.state())) unfinished = job.name();
-    }
-    request.set_page_token(jobs.next_page_token());
-  } while (!request.page_token().empty());
+  ForEachJob(connection, scene, [&](const v1::Job& job) {
+    if (job.kind() != kind::kColorizeScene || !job.parent().empty()) return true;
+    if (job.state() == v1::Job::STATE_SUCCEEDED) newest = job;
+    if (unfinished.empty() && !IsFinished(job.state())) unfinished = job.name();
+    return !newest;
+  });
+  if (newest) return *std::move(newest);
   if (!unfinished.empty()) {
     throw Error(ErrorCode::kFailedPrecondition,
                 "{} is still being coloured; follow it with `color3d job watch {}`",

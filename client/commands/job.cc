@@ -149,11 +149,7 @@ ExitCode RunWatch(const Context& context, const std::string& text) {
 
 ExitCode RunCancel(const Context& context, const std::string& name) {
   Connection connection(context.server, *context.interrupt);
-  v1::CancelJobRequest request;
-  request.set_name(ResourceName(name, "jobs"));
-  request.set_request_id(NewUuid());
-  return PrintJob(context,
-                  connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), request));
+  return PrintJob(context, CancelJob(connection, ResourceName(name, "jobs")));
 }
 
 ExitCode RunRetry(const Context& context, const std::string& name, bool from_scratch) {

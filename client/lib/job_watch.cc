@@ -5,6 +5,7 @@
 #include <optional>
 #include <thread>
 
+#include "client/lib/names.h"
 #include "core/base/mutex.h"
 
 namespace color3d::client {
@@ -19,6 +20,7 @@ constexpr std::chrono::seconds kPatience{60};
 constexpr std::chrono::seconds kSilence{100};
 // The current state of all jobs comes first; a stream that broke earlier may have sent part of it.
 constexpr std::chrono::seconds kSnapshotTime{2};
+constexpr int kJobsInPage = 500;
 
 // One WatchJobs stream, read on a thread of its own so that the caller stays responsive.
 class Stream {
@@ -149,16 +151,34 @@ v1::Scene GetScene(Connection& connection, const std::string& name) {
   return connection.Call(&v1::SceneService::Stub::GetScene, connection.scenes(), request);
 }
 
+void ForEachJob(Connection& connection,
+                const std::string& parent,
+                const std::function<bool(const v1::Job&)>& visit) {
+  v1::ListJobsRequest request;
+  request.set_parent(parent);
+  request.set_page_size(kJobsInPage);
+  do {
+    const auto page = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
+    for (const v1::Job& job : page.jobs()) {
+      if (!visit(job)) return;
+    }
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+}
+
+v1::Job CancelJob(Connection& connection, const std::string& name) {
+  v1::CancelJobRequest request;
+  request.set_name(name);
+  request.set_request_id(NewUuid());
+  return connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), request);
+}
+
 std::vector<v1::Job> ListChildren(Connection& connection, const std::string& name) {
   std::vector<v1::Job> jobs;
-  v1::ListJobsRequest request;
-  request.set_parent(name);
-  request.set_page_size(1000);
-  do {
-    auto response = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
-    for (v1::Job& job : *response.mutable_jobs()) jobs.push_back(std::move(job));
-    request.set_page_token(response.next_page_token());
-  } while (!request.page_token().empty());
+  ForEachJob(connection, name, [&](const v1::Job& job) {
+    jobs.push_back(job);
+    return true;
+  });
   std::ranges::reverse(jobs);
   return jobs;
 }

@@ -28,6 +28,13 @@ WatchEnd WatchJobs(Connection& connection,
 v1::Job GetJob(Connection& connection, const std::string& name);
 // Returns a scene. Throws RpcError if there is none of this name.
 v1::Scene GetScene(Connection& connection, const std::string& name);
+// Passes the jobs of a scene or of a job, of the whole server if `parent` is empty, the newest
+// first, to `visit` until it returns false. Long specs are left out of them.
+void ForEachJob(Connection& connection,
+                const std::string& parent,
+                const std::function<bool(const v1::Job&)>& visit);
+// Cancels a job and returns it.
+v1::Job CancelJob(Connection& connection, const std::string& name);
 // Returns the jobs whose parent is `name`, oldest first.
 std::vector<v1::Job> ListChildren(Connection& connection, const std::string& name);
 

@@ -35,7 +35,6 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 constexpr int kJobsInList = 100;
-constexpr int kJobsInPage = 500;
 constexpr milliseconds kBetweenStates{250};
 constexpr milliseconds kQuiet{10'000};
 
@@ -206,12 +205,8 @@ v1::Job StudioCalls::Colorize(const std::string& scene, const RunChoices& choice
 }
 
 v1::Job StudioCalls::Cancel(const std::string& job) const {
-  v1::CancelJobRequest request;
-  request.set_name(ResourceName(job, "jobs"));
-  request.set_request_id(NewUuid());
   const std::shared_ptr<Connection> kept = Kept();
-  Connection& connection = *kept;
-  return connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), request);
+  return CancelJob(*kept, ResourceName(job, "jobs"));
 }
 
 v1::Job StudioCalls::Retry(const std::string& job) const {
@@ -232,24 +227,18 @@ v1::Job StudioCalls::Job(const std::string& job) const {
 Json StudioCalls::Jobs() const {
   const std::shared_ptr<Connection> kept = Kept();
   Connection& connection = *kept;
-  v1::ListJobsRequest request;
-  request.set_page_size(kJobsInPage);
   Json list = Json::array();
   std::set<std::string> versions;
-  do {
-    const auto page = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
-    for (const v1::Job& job : page.jobs()) {
-      if (job.kind() != kind::kColorizeScene || !job.parent().empty()) continue;
-      const std::string plain = WithoutCorrections(job.spec());
-      if (versions.contains(plain)) continue;  // a newer one is in the list
-      const bool is_over =
-          job.state() == v1::Job::STATE_FAILED || job.state() == v1::Job::STATE_CANCELLED;
-      if (!is_over) versions.insert(plain);
-      list.push_back(JobFacts(job));
-      if (list.size() == kJobsInList) return list;
-    }
-    request.set_page_token(page.next_page_token());
-  } while (!request.page_token().empty());
+  ForEachJob(connection, "", [&](const v1::Job& job) {
+    if (job.kind() != kind::kColorizeScene || !job.parent().empty()) return true;
+    const std::string plain = WithoutCorrections(job.spec());
+    if (versions.contains(plain)) return true;  // a newer one is in the list
+    const bool is_over =
+        job.state() == v1::Job::STATE_FAILED || job.state() == v1::Job::STATE_CANCELLED;
+    if (!is_over) versions.insert(plain);
+    list.push_back(JobFacts(job));
+    return list.size() < kJobsInList;
+  });
   return list;
 }
 

@@ -33,7 +33,6 @@ using std::chrono::steady_clock;
 
 constexpr size_t kMaxOpenRuns = 16;
 constexpr size_t kMaxOpenScenes = 2;
-constexpr int kVersionsInPage = 200;
 constexpr milliseconds kBetweenLooks{2000};
 constexpr milliseconds kStillHere{10'000};
 constexpr int64_t kMaxStrokesBytes = 4 << 20;
@@ -96,19 +95,13 @@ bool IsOver(const v1::Job& job) {
 std::vector<v1::Job> VersionsOf(Connection& connection, const v1::Job& run) {
   const std::string plain = WithoutCorrections(run.spec());
   std::vector<v1::Job> versions;
-  v1::ListJobsRequest request;
-  request.set_parent(run.spec().scene());
-  request.set_page_size(kVersionsInPage);
-  do {
-    const auto page = connection.Call(&v1::JobService::Stub::ListJobs, connection.jobs(), request);
-    for (const v1::Job& job : page.jobs()) {
-      if (job.kind() == kind::kColorizeScene && job.parent().empty() &&
-          WithoutCorrections(job.spec()) == plain) {
-        versions.push_back(job);
-      }
+  ForEachJob(connection, run.spec().scene(), [&](const v1::Job& job) {
+    if (job.kind() == kind::kColorizeScene && job.parent().empty() &&
+        WithoutCorrections(job.spec()) == plain) {
+      versions.push_back(job);
     }
-    request.set_page_token(page.next_page_token());
-  } while (!request.page_token().empty());
+    return true;
+  });
   return versions;
 }
 
@@ -359,10 +352,7 @@ v1::Job Corrections::Change(const std::string& name, const nlohmann::json& json)
     submitted = SubmitJob(connection, Changed(NewestSpec(versions, run->job), change));
     for (const v1::Job& version : versions) {
       if (IsFinished(version.state())) continue;
-      v1::CancelJobRequest cancel;
-      cancel.set_name(version.name());
-      cancel.set_request_id(NewUuid());
-      connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), cancel);
+      CancelJob(connection, version.name());
     }
   }
   const MutexLock lock(mutex_);

@@ -22,10 +22,7 @@ bool HasBegun(const v1::Job& stage) {
 }
 
 void Remove(Connection& connection, const std::string& job) {
-  v1::CancelJobRequest cancel;
-  cancel.set_name(job);
-  cancel.set_request_id(NewUuid());
-  connection.Call(&v1::JobService::Stub::CancelJob, connection.jobs(), cancel);
+  CancelJob(connection, job);
   v1::DeleteJobRequest remove;
   remove.set_name(job);
   remove.set_request_id(NewUuid());
