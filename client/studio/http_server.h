@@ -2,10 +2,10 @@
 // request per connection. Thread-safe.
 #pragma once
 
-#include <httplib.h>
-
 #include <chrono>
 #include <cstdint>
+
+#include "client/studio/http_library.h"
 
 namespace color3d::client {
 

@@ -74,10 +74,11 @@ class Studio::Parts {
   const int port_;
   std::optional<StudioGuard> guard_;
   PhotoSets sets_;
-  StudioCalls calls_;
-  ShareCalls share_;
-  QueueCalls queue_;
-  Corrections corrections_{calls_};
+  SharedConnection connection_;
+  StudioCalls calls_{connection_};
+  ShareCalls share_{connection_};
+  QueueCalls queue_{connection_};
+  Corrections corrections_{connection_};
   FilmFrames films_;
   const ScratchFolder downloads_;
   std::atomic<int> streams_{0};
@@ -112,9 +113,7 @@ Studio::Parts::Parts(const StudioOptions& options, const CancellationToken& canc
       http_(options.http),
       port_(http_.Bind(options.port)),
       sets_(options.folder),
-      calls_(options.server, cancel),
-      share_(options.server, cancel),
-      queue_(options.server, cancel),
+      connection_(options.server, cancel),
       films_(cancel) {
   if (port_ < 0) {
     throw Error(ErrorCode::kFailedPrecondition,
@@ -184,7 +183,7 @@ void Studio::Parts::AddRoutes() {
   AddQueueRoutes(routes, queue_);
   AddCorrectRoutes(corrections_, routes);
   AddFilmRoutes({sets_,
-                 calls_,
+                 connection_,
                  films_,
                  folder_of,
                  scene_of,

@@ -1,12 +1,12 @@
 // Answers of the studio: JSON, files, errors and the headers that protect the page. Pure functions.
 #pragma once
 
-#include <httplib.h>
-
 #include <exception>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "client/studio/http_library.h"
 
 namespace color3d::client {
 

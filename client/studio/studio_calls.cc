@@ -10,7 +10,6 @@
 #include "client/lib/blob_transfer.h"
 #include "client/lib/job_watch.h"
 #include "client/lib/live_coloring.h"
-#include "client/lib/local_server.h"
 #include "client/lib/names.h"
 #include "client/lib/scene_upload.h"
 #include "client/lib/text.h"
@@ -112,7 +111,7 @@ std::optional<v1::Job> ColoredKey(Connection& connection, const v1::Job& run) {
 }  // namespace
 
 Json StudioCalls::ServerFacts() const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   const v1::ServerInfo info = GetServerInfo(connection);
   const bool knows_words = std::ranges::any_of(
@@ -132,15 +131,15 @@ Json StudioCalls::Plan(const PhotoFolder& folder, const RunChoices& choices) con
   // Every source of colour takes about the same time.
   request.mutable_spec()->mutable_colorize_scene()->mutable_key_color()->set_automatic(true);
   *request.mutable_facts() = CaptureFactsOf(folder);
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   return PlanJson(connection.Call(&v1::JobService::Stub::PlanJob, connection.jobs(), request));
 }
 
 std::string StudioCalls::Upload(const PhotoFolder& folder) const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
-  const auto entries = BuildManifest(folder, MaxFileBytes(connection), cancel_);
+  const auto entries = BuildManifest(folder, MaxFileBytes(connection), connection_.cancel());
   return UploadScene(connection, entries, folder.Name(), [](int64_t, int64_t) {}).name();
 }
 
@@ -149,13 +148,13 @@ v1::Job StudioCalls::SelectKeyView(const std::string& scene, int count) const {
   spec.set_scene(ResourceName(scene, "scenes"));
   spec.mutable_select_key_view();
   if (count > 1) spec.mutable_select_key_view()->set_count(count);
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   return SubmitJob(connection, spec);
 }
 
 Json StudioCalls::KeyViews(const std::string& job) const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   const v1::Job select = GetJob(connection, ResourceName(job, "jobs"));
   const Json found = Json::parse(
@@ -190,7 +189,7 @@ v1::Job StudioCalls::Colorize(const std::string& scene, const RunChoices& choice
     throw InvalidArgument("choose the photo that the colours belong to");
   }
   CheckKeyViews(choices);
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   v1::JobSpec spec = ColorizeSpec(OptionsOf(choices), ResourceName(scene, "scenes"));
   v1::ColorizeSceneSpec& job = *spec.mutable_colorize_scene();
@@ -205,7 +204,7 @@ v1::Job StudioCalls::Colorize(const std::string& scene, const RunChoices& choice
 }
 
 v1::Job StudioCalls::Cancel(const std::string& job) const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   return CancelJob(*kept, ResourceName(job, "jobs"));
 }
 
@@ -213,19 +212,19 @@ v1::Job StudioCalls::Retry(const std::string& job) const {
   v1::RetryJobRequest request;
   request.set_name(ResourceName(job, "jobs"));
   request.set_request_id(NewUuid());
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   return connection.Call(&v1::JobService::Stub::RetryJob, connection.jobs(), request);
 }
 
 v1::Job StudioCalls::Job(const std::string& job) const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   return GetJob(connection, ResourceName(job, "jobs"));
 }
 
 Json StudioCalls::Jobs() const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   Json list = Json::array();
   std::set<std::string> versions;
@@ -244,7 +243,7 @@ Json StudioCalls::Jobs() const {
 
 void StudioCalls::Watch(const std::string& job,
                         const std::function<bool(const std::string&)>& send) const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   v1::PlanJobRequest plan;
@@ -271,7 +270,7 @@ void StudioCalls::Watch(const std::string& job,
     is_new = is_new || event.has_job();
   };
   const auto keep_going = [&] {
-    cancel_.ThrowIfCancelled();
+    connection_.cancel().ThrowIfCancelled();
     return tell(/*at_once=*/false);
   };
   WatchJobs(connection, {run.name()}, on_event, keep_going);
@@ -282,7 +281,7 @@ void StudioCalls::Watch(const std::string& job,
 std::string StudioCalls::Fetch(const std::string& job,
                                const std::string& artifact,
                                const std::filesystem::path& file) const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   const v1::Job made = GetJob(connection, ResourceName(job, "jobs"));
   const v1::Artifact& found = FindArtifact(made, artifact);
@@ -294,7 +293,7 @@ std::string StudioCalls::Fetch(const std::string& job,
 std::string StudioCalls::PreviewOfRun(const std::string& job,
                                       const LocalFile& photo,
                                       int max_side_px) const {
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   const std::optional<v1::Job> colored = ColoredKey(connection, run);
@@ -312,7 +311,7 @@ std::string StudioCalls::Preview(const LocalFile& photo,
                                  const std::string& made_by,
                                  int max_side_px) const {
   using From = ColorChoice::From;
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   LiveSource source;
   source.points = color.strokes;
@@ -339,7 +338,7 @@ v1::Job StudioCalls::ColorBelow(const std::string& scene,
                                 const std::string& view,
                                 const ColorChoice& color) const {
   if (view.empty()) throw InvalidArgument("choose the photo that the colours belong to");
-  const std::shared_ptr<Connection> kept = Kept();
+  const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   v1::JobSpec select;
   select.set_scene(ResourceName(scene, "scenes"));
@@ -351,14 +350,6 @@ v1::Job StudioCalls::ColorBelow(const std::string& scene,
   const v1::Job selected = SubmitJob(connection, select);
   for (const std::string& input : JobAndInputs(connection, selected)) spec.add_inputs(input);
   return SubmitJob(connection, spec);
-}
-
-std::shared_ptr<Connection> StudioCalls::Kept() const {
-  const MutexLock lock(mutex_);
-  // A server of the user's own ends when it is idle: then another one is started.
-  const bool has_ended = kept_ && server_.own_server && !AcceptsConnections(kept_->address());
-  if (!kept_ || has_ended) kept_ = std::make_shared<Connection>(server_, cancel_);
-  return kept_;
 }
 
 }  // namespace color3d::client

@@ -1,5 +1,5 @@
 // What the page asks of the service, one function each: the same calls as the commands make.
-// Thread-safe; all functions share one channel, and a server that ended is found or started again.
+// Thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -10,13 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "client/lib/connection.h"
 #include "client/lib/photos/photo_folder.h"
 #include "client/studio/color_choice.h"
 #include "client/studio/kept_blobs.h"
 #include "client/studio/photo_sets.h"
+#include "client/studio/shared_connection.h"
 #include "color3d/v1/job.pb.h"
-#include "core/base/mutex.h"
 
 namespace color3d::client {
 
@@ -32,11 +31,8 @@ struct RunChoices {
 
 class StudioCalls {
  public:
-  StudioCalls(ServerTarget server, const CancellationToken& cancel)
-      : server_(std::move(server)), cancel_(cancel) {}
-
-  // A connection of its own, over a channel of its own.
-  Connection Connect() const { return Connection(server_, cancel_); }
+  // `connection` must outlive the calls.
+  explicit StudioCalls(SharedConnection& connection) : connection_(connection) {}
 
   nlohmann::ordered_json ServerFacts() const;
   nlohmann::ordered_json Plan(const PhotoFolder& folder, const RunChoices& choices) const;
@@ -81,13 +77,7 @@ class StudioCalls {
                      const ColorChoice& color) const;
 
  private:
-  // The connection that all calls share. Finds or starts a server where the user's own has ended.
-  std::shared_ptr<Connection> Kept() const;
-
-  const ServerTarget server_;
-  const CancellationToken& cancel_;
-  mutable Mutex mutex_;
-  mutable std::shared_ptr<Connection> kept_ COLOR3D_GUARDED_BY(mutex_);
+  SharedConnection& connection_;
   mutable KeptBlobs blobs_;
 };
 

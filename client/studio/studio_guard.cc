@@ -1,7 +1,6 @@
 #include "client/studio/studio_guard.h"
 
 #include <fmt/core.h>
-#include <httplib.h>
 #include <sys/random.h>
 
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
+#include "client/studio/http_library.h"
 #include "core/base/error.h"
 
 namespace color3d::client {

@@ -2,9 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <httplib.h>
 
 #include <set>
+
+#include "client/studio/http_library.h"
 
 namespace color3d::client {
 namespace {

@@ -1,11 +1,10 @@
 // What requests of the page say. Functions of requests and files; thread-safe as PhotoSets.
 #pragma once
 
-#include <httplib.h>
-
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "client/studio/http_library.h"
 #include "client/studio/photo_sets.h"
 #include "client/studio/studio_calls.h"
 

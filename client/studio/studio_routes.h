@@ -1,10 +1,10 @@
 // What parts of the studio add their calls to. Exceptions of handlers become answers.
 #pragma once
 
-#include <httplib.h>
-
 #include <functional>
 #include <string>
+
+#include "client/studio/http_library.h"
 
 namespace color3d::client {
 

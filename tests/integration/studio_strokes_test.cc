@@ -1,19 +1,14 @@
 // Strokes that the studio's page sends and those of the command line: the same bytes, through a
 // real server.
-// Macros of httplib break Eigen after it.
-// clang-format off
-#include <Eigen/Core>
-// clang-format on
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <httplib.h>
 #include <signal.h>
 
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "client/studio/http_library.h"
 #include "core/base/files.h"
 #include "core/image/codec.h"
 #include "tests/integration/service_fixture.h"

@@ -160,8 +160,8 @@ std::shared_ptr<const SceneViews> Corrections::OpenViews(Connection& connection,
     }
     const fs::path path = SafePathBelow(folder, name);
     if (fs::exists(path)) return;
-    Connection own = calls_.Connect();
-    DownloadBlob(own, file->second, path, [](int64_t) {});
+    const std::shared_ptr<Connection> own = connection_.Get();
+    DownloadBlob(*own, file->second, path, [](int64_t) {});
   };
   Scene read = SceneFromJson(ReadArtifact(connection, job, artifact::kScene));
   if (read.HasTimes()) throw NotCorrectable("the scene moves; its film has a timeline");
@@ -177,7 +177,8 @@ std::shared_ptr<const Corrections::Run> Corrections::Open(const std::string& nam
     const MutexLock lock(mutex_);
     if (const auto known = runs_.find(full); known != runs_.end()) return known->second;
   }
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   auto run = std::make_shared<Run>();
   run->job = GetJob(connection, full);
   if (run->job.kind() != kind::kColorizeScene) throw NotCorrectable("this is no coloured scene");
@@ -205,7 +206,8 @@ std::shared_ptr<const Corrections::Run> Corrections::Open(const std::string& nam
 
 Json Corrections::Describe(const std::string& name) {
   const std::shared_ptr<const Run> run = Open(name);
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   Json corrections = Json::array();
   for (const auto& correction : run->job.spec().colorize_scene().correct_colors().corrections()) {
     const std::string id = CorrectionId(correction);
@@ -241,7 +243,8 @@ std::string Corrections::MapPng(
     const std::string& name, const std::string& trial, Map map, const std::string& view, int side) {
   const std::shared_ptr<const Run> run = Open(name);
   run->views->Find(view);
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   std::vector<v1::Job> jobs;
   if (trial.empty()) {
     jobs = run->stages;
@@ -314,7 +317,8 @@ VersionChange Corrections::ReadChange(Connection& connection,
 
 v1::Job Corrections::Try(const std::string& name, const nlohmann::json& json) {
   const std::shared_ptr<const Run> run = Open(name);
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   const VersionChange change = ReadChange(connection, *run, json);
   const v1::JobSpec whole = Changed(NewestSpec(VersionsOf(connection, run->job), run->job), change);
   if (whole.colorize_scene().correct_colors().corrections().empty()) {
@@ -343,7 +347,8 @@ v1::Job Corrections::Try(const std::string& name, const nlohmann::json& json) {
 
 v1::Job Corrections::Change(const std::string& name, const nlohmann::json& json) {
   const std::shared_ptr<const Run> run = Open(name);
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   const VersionChange change = ReadChange(connection, *run, json);
   v1::Job submitted;
   {
@@ -364,7 +369,8 @@ v1::Job Corrections::Change(const std::string& name, const nlohmann::json& json)
 void Corrections::Watch(const std::string& name,
                         const std::function<bool(const std::string&)>& send) {
   const std::shared_ptr<const Run> run = Open(name);
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   std::string last;
   auto sent = steady_clock::now();
   while (true) {

@@ -12,18 +12,19 @@
 #include <vector>
 
 #include "client/studio/correct/versions.h"
-#include "client/studio/studio_calls.h"
+#include "client/studio/shared_connection.h"
 #include "color3d/v1/job.pb.h"
 #include "core/base/files.h"
 #include "core/base/mutex.h"
 
 namespace color3d::client {
 
-class SceneViews;  // Eigen, which it includes, and httplib exclude each other
+class SceneViews;
 
 class Corrections {
  public:
-  explicit Corrections(const StudioCalls& calls) : calls_(calls) {}
+  // `connection` must outlive the corrections.
+  explicit Corrections(SharedConnection& connection) : connection_(connection) {}
 
   // key, views (SceneViews::Facts), has_sources, tone (saturation, tint, warmth) and corrections
   // (id, view, strokes or null) of a run. Throws Error{kFailedPrecondition} for runs that cannot be
@@ -71,7 +72,7 @@ class Corrections {
   VersionChange ReadChange(Connection& connection, const Run& run, const nlohmann::json& change);
   v1::FurtherKeyView Uploaded(Connection& connection, const Run& run, const nlohmann::json& stroke);
 
-  const StudioCalls& calls_;
+  SharedConnection& connection_;
   const ScratchFolder files_;
   Mutex mutex_;
   CondVar changed_;

@@ -12,13 +12,13 @@
 namespace color3d::client {
 namespace {
 
-using Json = nlohmann::json;
+using nlohmann::json;
 constexpr int64_t kCacheBytes = int64_t{256} << 20;
 constexpr int kQuality = 90;  // of JPEG
 constexpr size_t kMaxStrokes = 1000;
 constexpr size_t kMaxPointsOfStroke = 10'000;
 
-double StrokeNumber(const Json& stroke, const char* field, double otherwise) {
+double StrokeNumber(const json& stroke, const char* field, double otherwise) {
   const auto value = stroke.find(field);
   if (value == stroke.end()) return otherwise;
   if (!value->is_number() || !std::isfinite(value->get<double>())) {
@@ -28,7 +28,7 @@ double StrokeNumber(const Json& stroke, const char* field, double otherwise) {
 }
 
 // Text fields that keep their meaning in any picture.
-void CopyFill(const Json& stroke, Json* captured) {
+void CopyFill(const json& stroke, json* captured) {
   for (const char* field : {"color", "keep"}) {
     const auto value = stroke.find(field);
     if (value == stroke.end()) continue;
@@ -97,16 +97,16 @@ std::array<double, 2> SceneViews::Captured(int view, double x, double y) const {
   return {std::clamp(at.x(), 0.0, w - 1.0), std::clamp(at.y(), 0.0, h - 1.0)};
 }
 
-Json SceneViews::CapturedStrokes(int view, const Json& strokes) const {
+json SceneViews::CapturedStrokes(int view, const json& strokes) const {
   if (!strokes.is_array() || strokes.empty() || strokes.size() > kMaxStrokes) {
     throw InvalidArgument("draw 1 to {} strokes", kMaxStrokes);
   }
   const View& of = scene_.views.at(static_cast<size_t>(view));
   const double scale = static_cast<double>(of.captured_camera.width) / PictureCamera(view).width;
-  Json captured = Json::array();
-  for (const Json& stroke : strokes) {
+  json captured = json::array();
+  for (const json& stroke : strokes) {
     if (!stroke.is_object()) throw InvalidArgument("a stroke is not an object");
-    Json out = Json::object();
+    json out = json::object();
     CopyFill(stroke, &out);
     const auto line = stroke.find("line");
     if (line == stroke.end()) {
@@ -119,8 +119,8 @@ Json SceneViews::CapturedStrokes(int view, const Json& strokes) const {
       if (!line->is_array() || line->empty() || line->size() > kMaxPointsOfStroke) {
         throw InvalidArgument("a line has 1 to {} points", kMaxPointsOfStroke);
       }
-      out["line"] = Json::array();
-      for (const Json& point : *line) {
+      out["line"] = json::array();
+      for (const json& point : *line) {
         if (!point.is_array() || point.size() != 2 || !point[0].is_number() ||
             !point[1].is_number()) {
           throw InvalidArgument("a point of a line is not a pair of numbers");

@@ -238,7 +238,8 @@ FilmChoices ReadFilmChoices(const nlohmann::json& body, const std::string& set, 
 }
 
 Json FilmCalls::Timeline(const std::string& job) const {
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   const std::vector<v1::Job> jobs = JobsAround(connection, run);
   Json timeline = {{"names", Json::array()},
@@ -272,14 +273,16 @@ Json FilmCalls::Timeline(const std::string& job) const {
 }
 
 v1::Job FilmCalls::Colorize(const std::string& scene, const FilmChoices& choices) const {
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   v1::JobSpec spec = SpecOf(choices, ResourceName(scene, "scenes"));
   SetEntries(connection, choices, {}, spec.mutable_colorize_scene());
   return SubmitJob(connection, spec);
 }
 
 v1::Job FilmCalls::Change(const std::string& job, const FilmChoices& choices) const {
-  Connection connection = calls_.Connect();
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   const v1::Job run = GetJob(connection, ResourceName(job, "jobs"));
   if (!run.spec().has_colorize_scene()) {
     throw Error(ErrorCode::kFailedPrecondition, "{} does not colour a film", run.name());

@@ -39,7 +39,8 @@ FilmChoices ReadFilmChoices(const nlohmann::json& body, const std::string& set, 
 
 class FilmCalls {
  public:
-  explicit FilmCalls(const StudioCalls& calls) : calls_(calls) {}
+  // `connection` must outlive the calls.
+  explicit FilmCalls(SharedConnection& connection) : connection_(connection) {}
 
   // Of a job that selects key views or colours a film, as far as it has got: names, times (s) and
   // shots of the frames; coverage (share of each frame that key frames show, null if unknown), keys
@@ -53,7 +54,7 @@ class FilmCalls {
   v1::Job Change(const std::string& job, const FilmChoices& choices) const;
 
  private:
-  const StudioCalls& calls_;
+  SharedConnection& connection_;
 };
 
 }  // namespace color3d::client

@@ -95,7 +95,7 @@ void AddFilmRoutes(const FilmRouteParts& parts, const StudioRoutes& routes) {
                 const FilmChoices choices =
                     ReadFilmChoices(ReadJsonBody(request, body), id, parts.sets);
                 RequireFilm(parts.folder_of(id));
-                const FilmCalls films(parts.calls);
+                const FilmCalls films(parts.connection);
                 AnswerJson(JobFacts(films.Colorize(parts.scene_of(id), choices)), response);
               });
   routes.post(ApiPattern("sets", "/film/frames"),
@@ -109,14 +109,14 @@ void AddFilmRoutes(const FilmRouteParts& parts, const StudioRoutes& routes) {
                 AnswerJson(SetJson(parts.sets.Get(request.matches[1])), response);
               });
   routes.get(ApiPattern("jobs", "/film"), [parts](const Request& request, Response& response) {
-    AnswerJson(FilmCalls(parts.calls).Timeline(request.matches[1]), response);
+    AnswerJson(FilmCalls(parts.connection).Timeline(request.matches[1]), response);
   });
   routes.post(ApiPattern("jobs", "/film/change"),
               [parts](const Request& request, Response& response, const ContentReader& body) {
                 const auto json = ReadJsonBody(request, body);
                 const std::string set = TextOf(json, "set");
                 const FilmChoices choices = ReadFilmChoices(json, set, parts.sets);
-                const FilmCalls films(parts.calls);
+                const FilmCalls films(parts.connection);
                 AnswerJson(JobFacts(films.Change(request.matches[1], choices)), response);
               });
   // A finished movie, and its frames for browsers that cannot play it.

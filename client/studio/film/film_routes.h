@@ -1,13 +1,12 @@
 // The part of the studio's HTTP calls that is about films (client/studio/README.md).
 #pragma once
 
-#include <httplib.h>
-
 #include <functional>
 #include <string>
 
 #include "client/studio/film/film_calls.h"
 #include "client/studio/film/film_frames.h"
+#include "client/studio/http_library.h"
 #include "client/studio/photo_sets.h"
 #include "client/studio/studio_calls.h"
 #include "client/studio/studio_routes.h"
@@ -17,7 +16,7 @@ namespace color3d::client {
 // What the calls work with; all must outlive the routes.
 struct FilmRouteParts {
   PhotoSets& sets;
-  const StudioCalls& calls;
+  SharedConnection& connection;
   FilmFrames& frames;
   // Files of a set, as frames if it says so.
   std::function<PhotoFolder(const std::string& set)> folder_of;

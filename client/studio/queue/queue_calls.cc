@@ -56,7 +56,8 @@ std::vector<QueueCalls::Run> QueueCalls::Unfinished(Connection& connection) cons
 }
 
 Json QueueCalls::List() const {
-  Connection connection(server_, cancel_);
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   Json list = Json::array();
   for (const Run& run : Unfinished(connection)) {
     Json facts = JobFacts(run.job);
@@ -74,7 +75,8 @@ std::string QueueCalls::SubmitAgain(Connection& connection, const v1::Job& run) 
 
 Json QueueCalls::Reorder(const std::vector<std::string>& order) {
   const MutexLock one(reordering_);
-  Connection connection(server_, cancel_);
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   std::vector<Run> waiting = Unfinished(connection);
   std::erase_if(waiting, [](const Run& run) { return run.has_begun; });
   const auto find = [&](const std::string& id) {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/lib/connection.h"
+#include "client/studio/shared_connection.h"
 #include "color3d/v1/job.pb.h"
 #include "core/base/mutex.h"
 
@@ -14,8 +14,8 @@ namespace color3d::client {
 
 class QueueCalls {
  public:
-  QueueCalls(ServerTarget server, const CancellationToken& cancel)
-      : server_(std::move(server)), cancel_(cancel) {}
+  // `connection` must outlive the calls.
+  explicit QueueCalls(SharedConnection& connection) : connection_(connection) {}
 
   // Facts of each run (JobFacts) with has_begun, first those that are worked on.
   nlohmann::ordered_json List() const;
@@ -37,8 +37,7 @@ class QueueCalls {
   std::vector<Run> Unfinished(Connection& connection) const;
   std::string SubmitAgain(Connection& connection, const v1::Job& run) const;
 
-  const ServerTarget server_;
-  const CancellationToken& cancel_;
+  SharedConnection& connection_;
   mutable Mutex mutex_;
   Mutex reordering_;  // one at a time
   std::map<std::string, std::string> moved_ COLOR3D_GUARDED_BY(mutex_);

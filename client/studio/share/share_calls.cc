@@ -42,7 +42,8 @@ v1::Job ShareCalls::MakeMovie(const std::string& run, const MovieWish& wish) con
     throw InvalidArgument(
         "a movie of {} s; {} to {} s are possible", *wish.seconds, kLeastSeconds, kMostSeconds);
   }
-  Connection connection(server_, cancel_);
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   const v1::Job of = RunToShare(connection, run);
   v1::JobSpec spec = SpecOn(connection, of);
   v1::RenderSpec* render = spec.mutable_render();
@@ -59,7 +60,8 @@ v1::Job ShareCalls::MakeMovie(const std::string& run, const MovieWish& wish) con
 
 v1::Job ShareCalls::MakeFile(const std::string& run, const std::string& format) const {
   const v1::ExportSpec wanted = ExportOf({format});
-  Connection connection(server_, cancel_);
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   v1::JobSpec spec = SpecOn(connection, RunToShare(connection, run));
   *spec.mutable_export_() = wanted;
   return SubmitJob(connection, spec);
@@ -68,7 +70,8 @@ v1::Job ShareCalls::MakeFile(const std::string& run, const std::string& format) 
 std::string ShareCalls::ColoredPhoto(const std::string& run,
                                      const LocalFile& photo,
                                      int max_side_px) const {
-  Connection connection(server_, cancel_);
+  const std::shared_ptr<Connection> kept = connection_.Get();
+  Connection& connection = *kept;
   const v1::Job of = RunToShare(connection, run);
   LiveSource source;
   const auto has = [&](const char* name) {

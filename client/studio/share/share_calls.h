@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include "client/lib/connection.h"
 #include "client/lib/photos/photo_folder.h"
+#include "client/studio/shared_connection.h"
 #include "color3d/v1/job.pb.h"
 
 namespace color3d::client {
@@ -20,8 +20,8 @@ struct MovieWish {
 
 class ShareCalls {
  public:
-  ShareCalls(ServerTarget server, const CancellationToken& cancel)
-      : server_(std::move(server)), cancel_(cancel) {}
+  // `connection` must outlive the calls.
+  explicit ShareCalls(SharedConnection& connection) : connection_(connection) {}
 
   // Submits a movie of the scene that the job `run` coloured. Throws Error{kInvalidArgument} for
   // other paths and for lengths beyond 1 to 120 s.
@@ -33,8 +33,7 @@ class ShareCalls {
   std::string ColoredPhoto(const std::string& run, const LocalFile& photo, int max_side_px) const;
 
  private:
-  const ServerTarget server_;
-  const CancellationToken& cancel_;
+  SharedConnection& connection_;
 };
 
 }  // namespace color3d::client
