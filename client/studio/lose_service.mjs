@@ -5,17 +5,12 @@
 // photos that were dropped meanwhile.
 import { writeFileSync } from 'node:fs';
 
-import { openBrowser } from '../../tests/support/browser.mjs';
-import { handOn } from '../../tests/support/page_hand.mjs';
+import { openPage } from '../../tests/support/page_hand.mjs';
 
 const [chromium, address, mark, screenshots] = process.argv.slice(2);
-const browser = openBrowser(chromium, ['--window-size=1280,900']);
-const { send, open, evaluate, close } = browser;
-const { waitFor, keep } = handOn(browser, screenshots);
+const { evaluate, waitFor, tell } = openPage(chromium, address, screenshots, { flags: ['--window-size=1280,900'] });
 
 const use = async () => {
-  await open();
-  await send('Page.navigate', { url: address });
   await waitFor('!!document.querySelector("#go-on")');
   const set = await evaluate('location.hash.split("/")[1]');
   await evaluate(`(async () => {
@@ -31,17 +26,8 @@ const use = async () => {
     const answer = await fetch('/api/sets/' + made.id + '/files?name=a.jpg', { method: 'POST', body: 'bytes' });
     return answer.status;
   })()`);
-  await waitFor('document.querySelector("main").dataset.state === "done"', 300000, true);
+  await waitFor('document.querySelector("main").dataset.state === "done"', 300000, { despite: true });
   return { second, done: !(await evaluate('!!document.querySelector(".problem")')) };
 };
 
-let failed = 0;
-try {
-  console.log(JSON.stringify(await use(), null, 1));
-} catch (error) {
-  console.error(error.stack, await evaluate('document.body.innerText').catch(() => ''));
-  await keep('failed').catch(() => undefined);
-  failed = 1;
-}
-await close();
-process.exit(failed);
+await tell(use);

@@ -7,14 +7,12 @@
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
 
-import { openBrowser, pause } from '../../tests/support/browser.mjs';
-import { handOn } from '../../tests/support/page_hand.mjs';
+import { pause } from '../../tests/support/browser.mjs';
+import { openPage } from '../../tests/support/page_hand.mjs';
 
 const [chromium, address, folder, screenshots] = process.argv.slice(2);
-const browser = openBrowser(chromium, ['--window-size=1280,900'], (type) => ['error', 'assert'].includes(type));
-const { send, open, evaluate, close, errors, requests } = browser;
-const origin = new URL(address).origin;
-const { waitFor, click, keep, look, wide } = handOn(browser, screenshots);
+const { send, evaluate, origin, waitFor, click, look, tell } =
+    openPage(chromium, address, screenshots, { flags: ['--window-size=1280,900'] });
 
 const files = readdirSync(folder, { recursive: true, withFileTypes: true }).filter((entry) => entry.isFile())
   .map((entry) => [join(entry.parentPath ?? entry.path, entry.name)])
@@ -34,8 +32,6 @@ const names = () => evaluate('[...document.querySelectorAll(".queue-item .queue-
 const button = (text) => `//button[@aria-label="${text}"]`;
 
 const use = async () => {
-  await open();
-  await send('Page.navigate', { url: address });
   await waitFor('!!document.querySelector(".drop-area")');
   const runs = [];
   const photos = files.map(([path]) => path).filter((path) => /\.(png|jpg)$/.test(path)).sort();
@@ -49,7 +45,7 @@ const use = async () => {
   await waitFor('document.querySelectorAll(".queue-item .queue-name")[1]?.textContent === "four"');
   const after = await names();
   await send('Page.navigate', { url: `${origin}/#job/${runs[3]}` });
-  await waitFor(`location.hash.startsWith("#job/") && !location.hash.endsWith("${runs[3]}")`, 60000, true);
+  await waitFor(`location.hash.startsWith("#job/") && !location.hash.endsWith("${runs[3]}")`, 60000, { despite: true });
   const moved = await evaluate('location.hash');
   // The browser's page goes away while a run goes on.
   await send('Page.navigate', { url: 'about:blank' });
@@ -59,16 +55,7 @@ const use = async () => {
   await click(button('Cancel: two'));
   await waitFor('![...document.querySelectorAll(".queue-name")].some((name) => name.textContent === "two")');
   const left = await names();
-  return { before, after, moved: moved !== `#job/${runs[3]}`, left, wide, errors, requests: requests.filter((url) => !url.startsWith(origin + '/')) };
+  return { before, after, moved: moved !== `#job/${runs[3]}`, left };
 };
 
-let failed = 0;
-try {
-  console.log(JSON.stringify(await use(), null, 1));
-} catch (error) {
-  console.error(error.stack, JSON.stringify({ errors, requests }), await evaluate('document.body.innerText').catch(() => ''));
-  await keep('failed').catch(() => undefined);
-  failed = 1;
-}
-await close();
-process.exit(failed);
+await tell(use);

@@ -5,15 +5,13 @@
 import { existsSync, mkdirSync, readdirSync, statSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 
-import { openBrowser, pause } from '../../tests/support/browser.mjs';
-import { handOn } from '../../tests/support/page_hand.mjs';
+import { pause } from '../../tests/support/browser.mjs';
+import { openPage } from '../../tests/support/page_hand.mjs';
 
 const [chromium, address, out, screenshots] = process.argv.slice(2);
 mkdirSync(out, { recursive: true });
-const browser = openBrowser(chromium, ['--window-size=1280,900'], (type) => ['error', 'assert'].includes(type));
-const { send, open, evaluate, close, errors, requests } = browser;
-const origin = new URL(address).origin;
-const { waitFor, click, type, look, wide, keep } = handOn(browser, screenshots);
+const { send, evaluate, waitFor, click, type, look, tell } =
+    openPage(chromium, address, screenshots, { flags: ['--window-size=1280,900'] });
 
 const savedAs = async (name, limit = 120000) => {
   for (const end = Date.now() + limit; Date.now() < end; await pause(100)) {
@@ -24,9 +22,7 @@ const savedAs = async (name, limit = 120000) => {
 const clickText = (text) => click(`//main//*[self::a or self::button][normalize-space()="${text}"]`);
 
 const share = async () => {
-  await open();
   await send('Browser.setDownloadBehavior', { behavior: 'allow', downloadPath: resolve(out) }, null);
-  await send('Page.navigate', { url: address });
   await waitFor('!!document.querySelector("#go-on")');
   const name = await evaluate('document.querySelector("h1").textContent');
   await evaluate(`(async () => {
@@ -68,19 +64,9 @@ const share = async () => {
   const { data } = await send('Page.printToPDF', { preferCSSPageSize: true, printBackground: true });
   writeFileSync(join(out, 'sheet.pdf'), Buffer.from(data, 'base64'));
   return {
-    failed, figures, pages: await evaluate('document.querySelectorAll(".sheet").length'), wide,
+    failed, figures, pages: await evaluate('document.querySelectorAll(".sheet").length'),
     saved: Object.fromEntries(readdirSync(out).map((name) => [name, statSync(join(out, name)).size])),
-    errors, requests: requests.filter((url) => !url.startsWith(origin + '/')),
   };
 };
 
-let failed = 0;
-try {
-  console.log(JSON.stringify(await share(), null, 1));
-} catch (error) {
-  console.error(error.stack, JSON.stringify({ errors, requests }), await evaluate('document.body.innerText').catch(() => ''));
-  await keep('failed').catch(() => undefined);
-  failed = 1;
-}
-await close();
-process.exit(failed);
+await tell(share);

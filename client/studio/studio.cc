@@ -41,7 +41,6 @@ using Json = nlohmann::ordered_json;
 using Steady = std::chrono::steady_clock;
 
 constexpr int kMaxEventStreams = 8;
-constexpr auto Pattern = ApiPattern;
 
 // Counts event streams, so that they leave threads for other requests.
 class StreamPlace {
@@ -214,15 +213,15 @@ void Studio::Parts::AddJobRoutes() {
   Get("/api/jobs", [this](const Request&, Response& response) {
     AnswerJson({{"jobs", calls_.Jobs()}}, response);
   });
-  Get(Pattern("jobs", ""), [this](const Request& request, Response& response) {
+  Get(ApiPattern("jobs", ""), [this](const Request& request, Response& response) {
     AnswerJson(JobFacts(calls_.Job(request.matches[1])), response);
   });
-  Get(Pattern("jobs", "/key-views"), [this](const Request& request, Response& response) {
+  Get(ApiPattern("jobs", "/key-views"), [this](const Request& request, Response& response) {
     AnswerJson(calls_.KeyViews(request.matches[1]), response);
   });
   const auto change = [this](const char* what,
                              v1::Job (StudioCalls::*call)(const std::string&) const) {
-    Post(Pattern("jobs", what),
+    Post(ApiPattern("jobs", what),
          [this, call](const Request& request, Response& response, const ContentReader& body) {
            ReadJsonBody(request, body);
            AnswerJson(JobFacts((calls_.*call)(request.matches[1])), response);
@@ -230,11 +229,11 @@ void Studio::Parts::AddJobRoutes() {
   };
   change("/cancel", &StudioCalls::Cancel);
   change("/retry", &StudioCalls::Retry);
-  Get(Pattern("jobs", "/events"),
+  Get(ApiPattern("jobs", "/events"),
       [this](const Request& request, Response& response) { StreamEvents(request, response); });
-  Get(Pattern("jobs", "/artifact"),
+  Get(ApiPattern("jobs", "/artifact"),
       [this](const Request& request, Response& response) { SendArtifact(request, response); });
-  Get(Pattern("jobs", "/preview"), [this](const Request& request, Response& response) {
+  Get(ApiPattern("jobs", "/preview"), [this](const Request& request, Response& response) {
     const PhotoFolder folder = FolderOf(request.get_param_value("set"));
     const LocalFile photo = films_.File(folder, request.get_param_value("name"));
     response.set_content(calls_.PreviewOfRun(request.matches[1], photo, SideOf(request)),
@@ -254,7 +253,8 @@ void Studio::Parts::Open(const Request& request, Response& response) {
   std::string page = request.get_param_value("page");
   if (page.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789/-") != page.npos) page.clear();
   response.set_header("Refresh", "0; url=/#" + page);
-  response.set_content("<!doctype html><title>Color3D</title>", "text/html; charset=utf-8");
+  response.set_content("<!doctype html><link rel=icon href=data:,><title>Color3D</title>",
+                       "text/html; charset=utf-8");
 }
 
 std::string Studio::Parts::SceneOf(const std::string& id) {

@@ -183,7 +183,7 @@ std::shared_ptr<const Corrections::Run> Corrections::Open(const std::string& nam
   run->job = GetJob(connection, full);
   if (run->job.kind() != kind::kColorizeScene) throw NotCorrectable("this is no coloured scene");
   run->stages = StagesOf(connection, run->job);
-  for (const std::string needed : {artifact::kModel, artifact::kColorizer, artifact::kScene}) {
+  for (const auto* needed : {artifact::kModel, artifact::kColorizer, artifact::kScene}) {
     if (FindIn(run->stages, needed).artifact == nullptr) {
       throw NotCorrectable(IsFinished(run->job.state()) ? "this run made no scene in 3D"
                                                         : "the scene is still being coloured");

@@ -216,10 +216,7 @@ HintLayer LayerOfHints(const Image& luminance,
                        const HintPictures& pictures,
                        GridHierarchy* prepared) {
   options.Validate();
-  RequireLuminance(luminance, "the strokes above other colours");
-  if (!IsFinite(luminance)) {
-    throw InvalidArgument("the key view's luminance has a value that is not finite");
-  }
+  RequireFiniteLuminance(luminance, "the strokes above other colours");
   HintPictures above = pictures;
   above.automatic_ab = &below;
   HintMap map =

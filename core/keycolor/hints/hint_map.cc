@@ -12,6 +12,7 @@
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
 #include "core/image/codec.h"
+#include "core/image/image_checks.h"
 
 namespace color3d {
 namespace {
@@ -237,6 +238,13 @@ void CheckPicture(const Image* picture, const char* what, int channels, int widt
 }
 
 }  // namespace
+
+void RequireFiniteLuminance(const Image& luminance, const char* user) {
+  RequireLuminance(luminance, user);
+  if (!IsFinite(luminance)) {
+    throw InvalidArgument("the key view's luminance has a value that is not finite");
+  }
+}
 
 HintMap DrawHints(const std::vector<ColorHint>& hints,
                   const HintPictures& pictures,

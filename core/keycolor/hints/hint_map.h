@@ -17,6 +17,9 @@ struct HintMap {
   bool IsKept(size_t i) const { return !kept.empty() && kept[i] != 0; }
 };
 
+// Throws Error{kInvalidArgument} unless the key view's luminance is one plane of finite values.
+// `user`: what needs it, for the message.
+void RequireFiniteLuminance(const Image& luminance, const char* user);
 // Throws Error{kInvalidArgument} naming an entry that is malformed or lies outside the picture of
 // this size. Reports contradicting hints as one warning.
 HintMap DrawHints(const std::vector<ColorHint>& hints,

@@ -19,13 +19,6 @@
 namespace color3d {
 namespace {
 
-void CheckLuminance(const Image& luminance) {
-  RequireLuminance(luminance, "the colouring of the key view");
-  if (!IsFinite(luminance)) {
-    throw InvalidArgument("the key view's luminance has a value that is not finite");
-  }
-}
-
 // Propagates hints over a picture of the same size. Sets all of the solution but hinted_pixels.
 HintSolution SolveAtSize(const Image& luminance,
                          HintMap hints,
@@ -101,7 +94,7 @@ HintSolution KeyColorFromStrokes(const Image& luminance,
                                  const HintOptions& options,
                                  const RunControl& control) {
   options.Validate();
-  CheckLuminance(luminance);
+  RequireFiniteLuminance(luminance, "the colouring of the key view");
   if (strokes.width != luminance.width || strokes.height != luminance.height) {
     throw InvalidArgument("the strokes picture is {}x{} px, but the key view {}x{}",
                           strokes.width,
@@ -130,7 +123,7 @@ HintSolution KeyColorFromHints(const Image& luminance,
                                const HintPictures& pictures,
                                GridHierarchy* prepared) {
   options.Validate();
-  CheckLuminance(luminance);
+  RequireFiniteLuminance(luminance, "the colouring of the key view");
   return Solve(
       luminance,
       DrawHints(
@@ -144,7 +137,7 @@ std::shared_ptr<GridHierarchy> PrepareHints(const Image& luminance,
                                             const HintOptions& options,
                                             ThreadPool& pool) {
   options.Validate();
-  CheckLuminance(luminance);
+  RequireFiniteLuminance(luminance, "the colouring of the key view");
   return std::make_shared<GridHierarchy>(
       SystemOfLuminance(luminance, options.sigma, pool), pool, CancellationToken());
 }

@@ -100,14 +100,21 @@ StrokePreview::Shared StrokePreview::Below(const Request& request,
   });
 }
 
+StrokePreview::Shared StrokePreview::Grid(
+    const std::string& key, const std::function<std::shared_ptr<GridHierarchy>()>& prepare) {
+  return cache_.Get(key, [&] {
+    Prepared prepared;
+    prepared.grid = prepare();
+    prepared.bytes = BytesOf(*prepared.grid);
+    return prepared;
+  });
+}
+
 Image StrokePreview::Spread(const Prepared& luminance,
                             const std::vector<ColorHint>& hints,
                             bool is_preview,
                             const std::string& key) {
   const Image& l = luminance.planes;
-  NoCheckpoints checkpoints;
-  NullObserver progress;
-  const CancellationToken never;
   HintPictures pictures;
   pictures.is_reduced = is_preview;
   const bool asks_automatic = std::ranges::any_of(
@@ -118,19 +125,10 @@ Image StrokePreview::Spread(const Prepared& luminance,
   Shared grid;
   if (is_preview) {
     options.tolerance = kPreviewTolerance;
-    grid = cache_.Get("spread " + key, [&] {
-      Prepared prepared;
-      prepared.grid = PrepareHints(l, options, pool_);
-      prepared.bytes = BytesOf(*prepared.grid);
-      return prepared;
-    });
+    grid = Grid("spread " + key, [&] { return PrepareHints(l, options, pool_); });
   }
-  return KeyColorFromHints(l,
-                           hints,
-                           options,
-                           {pool_, checkpoints, progress, never},
-                           pictures,
-                           grid ? grid->grid.get() : nullptr)
+  return KeyColorFromHints(
+             l, hints, options, Control(), pictures, grid ? grid->grid.get() : nullptr)
       .ab;
 }
 
@@ -140,9 +138,6 @@ Image StrokePreview::LayAboveColors(const Prepared& luminance,
                                     bool is_preview,
                                     const std::string& key) {
   const Image& l = luminance.planes;
-  NoCheckpoints checkpoints;
-  NullObserver progress;
-  const CancellationToken never;
   HintPictures pictures;
   pictures.is_reduced = is_preview;
   LayerOptions options;
@@ -150,22 +145,12 @@ Image StrokePreview::LayAboveColors(const Prepared& luminance,
   if (is_preview) {
     options.tolerance = kPreviewTolerance;
     options.max_side_px = kPreviewLayerSidePx;
-    grid = cache_.Get("layer " + key, [&] {
-      Prepared prepared;
-      prepared.grid = PrepareLayer(l, options, pool_);
-      prepared.bytes = BytesOf(*prepared.grid);
-      return prepared;
-    });
+    grid = Grid("layer " + key, [&] { return PrepareLayer(l, options, pool_); });
   }
   Image ab = below.planes;
-  LayAbove(LayerOfHints(l,
-                        ab,
-                        hints,
-                        options,
-                        {pool_, checkpoints, progress, never},
-                        pictures,
-                        grid ? grid->grid.get() : nullptr),
-           &ab);
+  LayAbove(
+      LayerOfHints(l, ab, hints, options, Control(), pictures, grid ? grid->grid.get() : nullptr),
+      &ab);
   return ab;
 }
 

@@ -55,7 +55,15 @@ class StrokePreview {
                        bool is_preview,
                        const std::string& key);
   Image SrgbOf(const Image& luminance, const Image& ab);
+  // What `prepare` makes of a photo for quick solutions, or what is kept of it.
+  Shared Grid(const std::string& key,
+              const std::function<std::shared_ptr<GridHierarchy>()>& prepare);
+  // Of solutions that nobody watches or ends.
+  RunControl Control() { return {pool_, checkpoints_, progress_, never_}; }
 
+  NoCheckpoints checkpoints_;
+  NullObserver progress_;
+  const CancellationToken never_;
   ThreadPool pool_;
   ByteBoundCache<Prepared> cache_;
 };

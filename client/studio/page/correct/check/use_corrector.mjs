@@ -4,77 +4,22 @@
 // studio; wide: states that are wider than a screen of 360 px; faint: texts with a contrast below 4.5; seconds: from a
 // stroke to its heat map, from `Apply` to the colours in the photos and in the scene; frames: ms between frames while
 // the saturation moves. With a third argument every state leaves PNGs there: light, dark and narrow.
-import { mkdirSync, writeFileSync } from 'node:fs';
-import { join } from 'node:path';
-
-import { openBrowser, pause } from '../../../../../tests/support/browser.mjs';
-import { faintTexts } from '../../../faint_texts.mjs';
+import { pause } from '../../../../../tests/support/browser.mjs';
+import { drawnBySoftware, openPage } from '../../../../../tests/support/page_hand.mjs';
 
 const [chromium, address, screenshots] = process.argv.slice(2);
-if (screenshots) mkdirSync(screenshots, { recursive: true });
-const flags = ['--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist', '--window-size=1440,1000'];
-const { send, open, evaluate, close, errors, requests } =
-    openBrowser(chromium, flags, (type) => ['error', 'assert'].includes(type));
-const origin = new URL(address).origin;
-const seen = { wide: [], faint: [], seconds: {}, frames: {}, colors: {} };
+const hand = openPage(chromium, address, screenshots, {
+  flags: [...drawnBySoftware, '--window-size=1440,1000'], limit: 120000, every: 25, narrowHeight: 1600,
+});
+const { send, evaluate, waitFor, boxOf, mouse, clickAt, click, press, tell } = hand;
+const seen = { seconds: {}, frames: {}, colors: {} };
+const look = async (name) => {
+  await evaluate('scrollTo(0, 0)');
+  await hand.look(name);
+};
 
-const waitFor = async (expression, limit = 120000, read = evaluate) => {
-  const end = Date.now() + limit;
-  while (Date.now() < end) {
-    const value = await read(expression);
-    if (value) return value;
-    const problem = await read('document.querySelector(".problem p")?.textContent');
-    if (problem) throw new Error('the page says: ' + problem);
-    await pause(25);
-  }
-  throw new Error('waited in vain for ' + expression + ' at ' + await read('location.href + JSON.stringify(document.querySelector("#corrector")?.dataset)'));
-};
-const boxOf = (selector) => evaluate(`(() => {
-  const element = document.querySelector(${JSON.stringify(selector)});
-  element.scrollIntoView({ block: 'center' });
-  const { x, y, width, height } = element.getBoundingClientRect();
-  return { x, y, width, height };
-})()`);
-const mouse = (type, x, y) => send('Input.dispatchMouseEvent', { type, x, y, button: type === 'mouseMoved' ? 'none' : 'left', buttons: type === 'mouseReleased' ? 0 : 1, clickCount: 1 });
-const clickAt = async (x, y) => {
-  await mouse('mousePressed', x, y);
-  await mouse('mouseReleased', x, y);
-};
-const click = async (selector) => {
-  await waitFor(`!!document.querySelector(${JSON.stringify(selector)})`);
-  const { x, y, width, height } = await boxOf(selector);
-  await clickAt(x + width / 2, y + height / 2);
-};
-const press = async (key, code) => {
-  for (const type of ['keyDown', 'keyUp']) {
-    await send('Input.dispatchKeyEvent', { type, key, code: key, windowsVirtualKeyCode: code, ...(key === 'Enter' && type === 'keyDown' ? { text: '\r' } : {}) });
-  }
-};
 const data = (name) => `(document.querySelector('#corrector').dataset.${name} ?? '')`;
 const main = '.co-panes figure:nth-of-type(2) canvas:last-child';
-
-const keep = async (name) => {
-  if (!screenshots) return;
-  const { data: png } = await send('Page.captureScreenshot', { format: 'png' });
-  writeFileSync(join(screenshots, name + '.png'), Buffer.from(png, 'base64'));
-};
-const look = async (name) => {
-  await pause(400);
-  await evaluate('scrollTo(0, 0)');
-  for (const scheme of ['light', 'dark']) {
-    await send('Emulation.setEmulatedMedia', { features: [{ name: 'prefers-color-scheme', value: scheme }] });
-    await pause(200);
-    for (const text of await evaluate(faintTexts)) seen.faint.push(`${name} ${scheme}: ${text}`);
-    await keep(`${name}_${scheme}`);
-  }
-  await send('Emulation.setEmulatedMedia', { features: [] });
-  await send('Emulation.setDeviceMetricsOverride', { width: 360, height: 1600, deviceScaleFactor: 1, mobile: true });
-  await pause(400);
-  if (await evaluate('document.documentElement.scrollWidth') > 360) seen.wide.push(name);
-  await keep(`${name}_narrow`);
-  await send('Emulation.clearDeviceMetricsOverride');
-  await pause(200);
-};
 
 // Mean colour of a part of the coloured photo, in shares of it.
 const colorAt = (x, y) => evaluate(`(() => {
@@ -114,9 +59,7 @@ const setColor = (hex) => evaluate(`(() => {
 const draw = async (from, to) => {
   const { x, y, width, height } = await boxOf(main);
   const at = ([u, v]) => [x + u * width, y + v * height];
-  await mouse('mousePressed', ...at(from));
-  for (let i = 1; i <= 8; ++i) await mouse('mouseMoved', ...at([from[0] + (to[0] - from[0]) * i / 8, from[1] + (to[1] - from[1]) * i / 8]));
-  await mouse('mouseReleased', ...at(to));
+  await hand.drag(at(from), at(to));
 };
 const seconds = (since) => (Date.now() - since) / 1000;
 const tried = async () => {
@@ -138,7 +81,7 @@ const apply = async () => {
   return { photos, solved, scene: seconds(begun) };
 };
 // Moves a slider by the mouse. Returns the times between frames, ms.
-const drag = async (selector, from, to) => {
+const slide = async (selector, from, to) => {
   const { x, y, width, height } = await boxOf(selector);
   await evaluate(`(() => {
     window.color3dFrames = [];
@@ -154,8 +97,6 @@ const drag = async (selector, from, to) => {
 };
 
 const use = async () => {
-  await open();
-  await send('Page.navigate', { url: address });
   await waitFor('!!document.querySelector("#corrector")');
   await waitFor(data('scene'), 180000);
   await waitFor(data('shown'));
@@ -176,7 +117,7 @@ const use = async () => {
   // Its reach by keyboard.
   const first = await evaluate(data('trial'));
   await evaluate('document.querySelector("#co-reach").focus()');
-  for (let i = 0; i < 12; ++i) await press('ArrowLeft', 37);
+  for (let i = 0; i < 12; ++i) await press('ArrowLeft');
   await waitFor(`${data('trial')} && ${data('trial')} !== ${JSON.stringify(first)}`);
   await pause(600);
   seen.touches_less = await evaluate('document.querySelector(".co-draft p").textContent');
@@ -195,7 +136,7 @@ const use = async () => {
     return answer.result.value;
   };
   const theirs = (name) => `(document.querySelector('#corrector')?.dataset.${name} ?? '')`;
-  await waitFor(`${theirs('corrections')} === '1'`, 60000, other);
+  await waitFor(`${theirs('corrections')} === '1'`, 60000, { read: other });
 
   // A second stroke on another photo, by keyboard.
   const { targetInfo } = await send('Target.getTargetInfo', {});
@@ -205,12 +146,12 @@ const use = async () => {
   await pause(500);
   await setColor('#2b5fc4');
   await evaluate(`document.querySelector(${JSON.stringify(main)}).focus()`);
-  for (let i = 0; i < 3; ++i) await press('ArrowUp', 38);
-  await press('Enter', 13);
+  for (let i = 0; i < 3; ++i) await press('ArrowUp');
+  await press('Enter');
   seen.seconds.tried_again = await tried();
   seen.seconds.apply_again = await apply();
   await waitFor(`${data('corrections')} === '2'`);
-  await waitFor(`${theirs('corrections')} === '2'`, 30000, other);
+  await waitFor(`${theirs('corrections')} === '2'`, 30000, { read: other });
   seen.other_page_followed = true;
 
   // The first one is looked at without, and removed.
@@ -221,14 +162,14 @@ const use = async () => {
   await click('.co-history li:first-child .co-remove');
   await waitFor(`${data('corrections')} === '1'`);
   seen.left_over = await evaluate('document.querySelector(".co-history .co-what span").textContent');
-  await waitFor(`${theirs('corrections')} === '1'`, 30000, other);
+  await waitFor(`${theirs('corrections')} === '1'`, 30000, { read: other });
   await send('Target.closeTarget', { targetId }, null);
   await waitFor(`!(${data('working')})`);
 
   // Saturation by mouse; the scene follows when it is let go of.
   const run = await evaluate(data('run'));
   seen.colors.tone_before = await colorAt(0.3, 0.3);
-  seen.frames = await drag('#co-saturation', 0.5, 0.95);
+  seen.frames = await slide('#co-saturation', 0.5, 0.95);
   seen.colors.tone_after = await colorAt(0.3, 0.3);
   const begun = Date.now();
   await waitFor(`${data('run')} !== ${JSON.stringify(run)}`);
@@ -258,16 +199,7 @@ const use = async () => {
   await tried();
   seen.scene_click = true;
   await click('#co-discard');
-  return { ...seen, errors, requests: requests.filter((url) => !url.startsWith(origin + '/')) };
+  return seen;
 };
 
-let failed = 0;
-try {
-  console.log(JSON.stringify(await use(), null, 1));
-} catch (error) {
-  console.error(error.stack, JSON.stringify({ seen, errors, requests: requests.slice(-5) }));
-  await keep('failed').catch(() => undefined);
-  failed = 1;
-}
-await close();
-process.exit(failed);
+await tell(use);
