@@ -3,7 +3,10 @@
 // interface.
 #pragma once
 
+#include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/base/image.h"
@@ -24,6 +27,17 @@ struct Correction {
   Image painted;       // 1 channel, 0..1: opacity of the paint
   double reach = 1.0;  // of its colours to similar places, > 0; 1: as measured
 };
+
+// The cells of a picture as a corrector compares them. They depend on the colorizer, luminance and
+// position alone, so that they can be kept for further corrections.
+struct PictureCells {
+  std::vector<float> features;   // cell after cell
+  std::vector<float> positions;  // as PlaceSample::positions
+};
+
+std::string SerializePictureCells(const PictureCells& cells);
+// nullopt: damaged.
+std::optional<PictureCells> ParsePictureCells(std::string_view bytes);
 
 // Places sampled from a picture for Corrector::Propose. A place is a cell of the encoder's grid.
 struct PlaceSample {
@@ -59,8 +73,15 @@ struct ProposedPlace {
 class Corrector {
  public:
   virtual ~Corrector() = default;
-  // Returns maps of the picture's size and up to `samples` places.
-  virtual CorrectedColor Predict(const PlacedPicture& picture, int samples) const = 0;
+  virtual PictureCells Describe(const Image& luminance, const Image& position) const = 0;
+  // Returns maps of the picture's size and up to `samples` places. `cells`: of Describe;
+  // `picture.position` is not used. Throws Error{kInvalidArgument} if they are of another picture.
+  virtual CorrectedColor Predict(const PlacedPicture& picture,
+                                 const PictureCells& cells,
+                                 int samples) const = 0;
+  CorrectedColor Predict(const PlacedPicture& picture, int samples) const {
+    return Predict(picture, Describe(picture.luminance, picture.position), samples);
+  }
   // Returns at most `count` places, best first, each given strokes at those before it.
   virtual std::vector<ProposedPlace> Propose(std::span<const PlaceSample> samples,
                                              int count) const = 0;

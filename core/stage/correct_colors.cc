@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -6,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/digest.h"
+#include "core/base/file_cache.h"
 #include "core/base/mutex.h"
 #include "core/base/range_check.h"
 #include "core/carry/confidence.h"
@@ -30,6 +34,9 @@ constexpr int kMaxProposals = 16;
 constexpr size_t kPlacesOfAllViews = 3000;  // candidates of proposals
 constexpr int kPullPx = 480;                // longer side of the pictures of the pull
 constexpr double kHardlyKnown = 0.2;        // least share of a stroke that lies on the geometry
+constexpr int64_t kCacheBytes = int64_t{256} << 20;
+// Version of the cache. Increase when the features of a colorizer change.
+constexpr char kCellsRecipe[] = "cells of corrections 1\n";
 
 // Marks masked pixels as seen, so that no stroke is proposed for them.
 void MarkMaskedAsSeen(const Image& mask, PlacedPicture* picture) {
@@ -55,6 +62,8 @@ class ColoredViews {
   const Scene& scene() const { return scene_; }
   const ViewImages& images() const { return images_; }
 
+  // Maps but the position.
+
   PlacedPicture Picture(int view) const {
     PlacedPicture picture{*images_.Luminance(view), {}, {}, {}};
     picture.ab = ReadTargetAb(context_,
@@ -63,8 +72,6 @@ class ColoredViews {
                               picture.luminance.width,
                               picture.luminance.height);
     const auto mask = images_.Mask(view);
-    picture.position =
-        positions_.Of(view, images_.WorkingCamera(view), picture.luminance, mask.get());
     const Image provenance = Provenance(view, picture.luminance);
     if (!provenance.Empty()) {
       picture.seen = Image(provenance.width, provenance.height, 1);
@@ -72,6 +79,10 @@ class ColoredViews {
     }
     if (mask) MarkMaskedAsSeen(*mask, &picture);
     return picture;
+  }
+  Image Position(int view, const Image& luminance) const {
+    const auto mask = images_.Mask(view);
+    return positions_.Of(view, images_.WorkingCamera(view), luminance, mask.get());
   }
   Image Provenance(int view, const Image& size) const {
     return ReadProvenance(context_, scene_.views[view], size.width, size.height);
@@ -83,6 +94,50 @@ class ColoredViews {
   const int key_;
   const ViewImages images_;
   const ViewPositions positions_;
+};
+
+// Cells of the views for the corrector, kept between jobs: a user tries several strokes.
+class KeptCells {
+ public:
+  KeptCells(const ColoredViews& views, const StageContext& context)
+      : views_(views), cache_(context.cache_folder(), kCacheBytes) {
+    for (const char* input : {artifact::kColorizer, artifact::kScene, artifact::kGeometry}) {
+      if (context.HasInput(input)) inputs_ += DigestFile(context.Input(input)).sha256;
+    }
+  }
+  ~KeptCells() { cache_.Trim(); }
+  KeptCells(const KeptCells&) = delete;
+  KeptCells& operator=(const KeptCells&) = delete;
+
+  PictureCells Of(int view, const Image& luminance, const Corrector& corrector) const {
+    const std::string key = Key(view, luminance);
+    if (const auto bytes = cache_.Get(key)) {
+      if (auto cells = ParsePictureCells(*bytes)) return *std::move(cells);
+    }
+    PictureCells cells = corrector.Describe(luminance, views_.Position(view, luminance));
+    cache_.Put(key, SerializePictureCells(cells));
+    return cells;
+  }
+
+ private:
+  std::string Key(int view, const Image& luminance) const {
+    Sha256 key;
+    key.Update(kCellsRecipe);
+    key.Update(inputs_);
+    key.Update(views_.scene().views[view].name);
+    UpdateDigest(luminance, &key);
+    if (const auto mask = views_.images().Mask(view)) UpdateDigest(*mask, &key);
+    return key.FinishHex();
+  }
+  static void UpdateDigest(const Image& image, Sha256* digest) {
+    digest->Update(fmt::format("{}x{}", image.width, image.height));
+    digest->Update({reinterpret_cast<const char*>(image.data.data()),
+                    image.data.size() * sizeof(image.data.front())});
+  }
+
+  const ColoredViews& views_;
+  const FileCache cache_;
+  std::string inputs_;
 };
 
 // A correction at the size of the working pictures.
@@ -121,6 +176,7 @@ Painted ReadCorrection(const ColorCorrection& wanted,
   }
   Painted painted{index, {views.Picture(index), {}, {}, 1.0}};
   Correction& correction = painted.correction;
+  correction.picture.position = views.Position(index, correction.picture.luminance);
   const GivenColors given =
       ReadGivenColors(wanted.colors,
                       ReadKeyPhoto(context.scene_folder() / view.image_file, context.MemoryBytes()),
@@ -178,8 +234,11 @@ CorrectedView CorrectView(int number,
                           const PlacedPicture& picture,
                           const std::vector<Painted>& painted,
                           const Corrector& corrector,
+                          const KeptCells& cells,
                           int samples) {
-  CorrectedView corrected{corrector.Predict(picture, samples), picture.ab};
+  CorrectedView corrected{
+      corrector.Predict(picture, cells.Of(number, picture.luminance, corrector), samples),
+      picture.ab};
   auto& [answer, ab] = corrected;
   for (size_t i = 0; i < ab.data.size(); ++i) ab.data[i] += answer.change.data[i];
   for (const Painted& one : painted) {
@@ -255,8 +314,11 @@ void RunCorrectColors(const CorrectColorsOptions& options,
                                        context.LoadEncoder(encoder),
                                        /*threads=*/1);
   const auto corrector = colorizer->Correct(corrections);
+  const KeptCells cells(views, context);
   const auto total = std::ssize(scene.views);
-  const int samples = static_cast<int>(kPlacesOfAllViews / scene.TrainingViews().size() + 1);
+  const int samples = options.proposals == 0
+                          ? 0
+                          : static_cast<int>(kPlacesOfAllViews / scene.TrainingViews().size() + 1);
   std::vector<PlaceSample> samples_of(total);
   Mutex outputs;
   int64_t done = 0;
@@ -267,7 +329,7 @@ void RunCorrectColors(const CorrectColorsOptions& options,
     const View& view = scene.views[index];
     const PlacedPicture picture = views.Picture(number);
     auto [answer, ab] =
-        CorrectView(number, picture, painted, *corrector, view.held_out ? 0 : samples);
+        CorrectView(number, picture, painted, *corrector, cells, view.held_out ? 0 : samples);
     Image provenance = views.Provenance(number, picture.luminance);
     if (!provenance.Empty()) CountAsSeen(answer.share, &provenance);
     const std::string ab_png = EncodeAbPng(ab);
@@ -290,13 +352,14 @@ void RunCorrectColors(const CorrectColorsOptions& options,
   for (const int view : training) places.push_back(std::move(samples_of[view]));
   // The colours of the few proposed views are computed again, which bounds memory.
   const auto colors = [&](int view) {
-    return CorrectView(view, views.Picture(view), painted, *corrector, 0).ab;
+    return CorrectView(view, views.Picture(view), painted, *corrector, cells, 0).ab;
   };
   nlohmann::ordered_json facts;
   facts["corrections"] = painted.size();
   facts["share_changed"] = changed / static_cast<double>(total);
-  facts["proposals"] = WriteProposals(
-      corrector->Propose(places, options.proposals), training, colors, views, context);
+  const std::vector<ProposedPlace> proposed =
+      samples == 0 ? std::vector<ProposedPlace>() : corrector->Propose(places, options.proposals);
+  facts["proposals"] = WriteProposals(proposed, training, colors, views, context);
   context.WriteOutput(artifact::kCorrections, facts.dump(2));
 }
 

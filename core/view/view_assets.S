@@ -20,6 +20,7 @@ SYMBOL(color3d_\name\()_end):
   ASSET page_script, page/page.js
   ASSET page_framed_script, page/framed.js
   ASSET page_shading_script, page/shading.js
+  ASSET page_toned_still_script, page/toned_still.js
   ASSET page_motion_script, page/motion.js
   ASSET page_player_script, page/player.js
   ASSET viewer_program, viewer_program.gz

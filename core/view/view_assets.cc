@@ -11,6 +11,7 @@ ASSET(page_style);
 ASSET(page_script);
 ASSET(page_framed_script);
 ASSET(page_shading_script);
+ASSET(page_toned_still_script);
 ASSET(page_motion_script);
 ASSET(page_player_script);
 ASSET(viewer_program);
@@ -38,6 +39,9 @@ std::string_view PageFramedScript() {
 }
 std::string_view PageShadingScript() {
   return Between(color3d_page_shading_script_begin, color3d_page_shading_script_end);
+}
+std::string_view PageTonedStillScript() {
+  return Between(color3d_page_toned_still_script_begin, color3d_page_toned_still_script_end);
 }
 std::string_view PageMotionScript() {
   return Between(color3d_page_motion_script_begin, color3d_page_motion_script_end);

@@ -11,6 +11,7 @@ std::string_view PageScript();    // page/page.js
 // Before it.
 std::string_view PageFramedScript();   // page/framed.js
 std::string_view PageShadingScript();  // page/shading.js
+std::string_view PageTonedStillScript();  // page/toned_still.js
 
 // For scenes that move, before the script of the page.
 std::string_view PageMotionScript();  // page/motion.js

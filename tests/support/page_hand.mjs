@@ -109,6 +109,14 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
     await pause(200);
   };
 
+  // Waits until the page is there: the address may lead to another one, which ends what is evaluated on it.
+  const arrive = async () => {
+    const isThere = "document.readyState === 'complete' && location.pathname !== '/open'";
+    for (const end = Date.now() + patience * usual; Date.now() < end; await pause(every)) {
+      if (await evaluate(isThere).catch(() => false)) return;
+    }
+    throw new Error(`the page of ${address} does not come`);
+  };
   // Opens the page, does `use`, prints what it returns as JSON with seen, errors (of the console) and requests (beyond
   // the address's origin), and ends the program: status 1 if `use` fails.
   const tell = async (use) => {
@@ -117,6 +125,7 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
     try {
       await open();
       await send('Page.navigate', { url: address });
+      await arrive();
       console.log(JSON.stringify({ ...seen, ...await use(), errors, requests: beyond() }, null, 1));
     } catch (error) {
       console.error(error.stack, JSON.stringify({ ...seen, texts: undefined, errors, requests: beyond() }),

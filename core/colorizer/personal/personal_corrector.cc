@@ -146,24 +146,46 @@ PersonalCorrector::PersonalCorrector(const TapEncoder& encoder,
       torch::cat(reaches));
 }
 
-CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samples) const {
+PictureCells PersonalCorrector::Describe(const Image& luminance, const Image& position) const {
   return WithTorchErrors("correction", [&] {
     torch::NoGradGuard no_grad;
     SetTorchThreads(threads_);
-    const PlacedPicture small = Reduced(picture, max_side_px_);
+    const PlacedPicture small = Reduced({luminance, {}, position, {}}, max_side_px_);
     const torch::Tensor padded = PaddedTensor(small.luminance);
     const CellFeatures cells =
         DescribeCells(encoder_.config(), encoder_.Taps(encoder_.Input(padded)), padded);
+    return PictureCells{TensorValues(learnt_.whitening().Apply(cells.blocks)),
+                        TensorValues(CellPositions(small.position, cells.Count()))};
+  });
+}
+
+CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture,
+                                          const PictureCells& cells,
+                                          int samples) const {
+  return WithTorchErrors("correction", [&] {
+    torch::NoGradGuard no_grad;
+    SetTorchThreads(threads_);
+    const PlacedPicture small =
+        Reduced({picture.luminance, picture.ab, {}, picture.seen}, max_side_px_);
+    const torch::Tensor padded = PaddedTensor(small.luminance);
+    const int64_t rows = padded.size(2) / kCellPx, columns = padded.size(3) / kCellPx;
+    const int64_t count = rows * columns;
+    const auto values = static_cast<int64_t>(cells.features.size());
+    if (values == 0 || values % count != 0 || std::ssize(cells.positions) != 4 * count) {
+      throw InvalidArgument("the cells are not those of a picture of {}x{} px",
+                            picture.luminance.width,
+                            picture.luminance.height);
+    }
     const FieldPlaces places{
-        learnt_.whitening().Apply(cells.blocks),
+        torch::tensor(cells.features).reshape({count, -1}),
         CellMeans(PaddedTensor(ToRelative(relative_chroma_, small.luminance, small.ab))),
-        CellPositions(small.position, cells.Count()),
-        CellSeenShares(small.seen, cells.Count())};
+        torch::tensor(cells.positions).reshape({count, 4}),
+        CellSeenShares(small.seen, count)};
     const ChangeField::Answer answer = field_->At(places);
     const Image coarse =
         ImageFromTensor(torch::cat({answer.change, torch::stack({answer.share, answer.pull}, 1)}, 1)
                             .t()
-                            .reshape({4, cells.rows, cells.columns}));
+                            .reshape({4, rows, columns}));
     const int width = picture.luminance.width, height = picture.luminance.height;
     Image fine = Crop(UpsampleGuided(coarse, ImageFromTensor(padded)),
                       0,
@@ -185,7 +207,7 @@ CorrectedColor PersonalCorrector::Predict(const PlacedPicture& picture, int samp
     copy_share(2, &color.share);
     copy_share(3, &color.pull);
     color.change = FromRelative(relative_chroma_, picture.luminance, std::move(color.change));
-    color.sample = Sample(places, cells.columns, small.luminance, samples);
+    if (samples > 0) color.sample = Sample(places, columns, small.luminance, samples);
     return color;
   });
 }

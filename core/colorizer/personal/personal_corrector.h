@@ -25,7 +25,10 @@ class PersonalCorrector : public Corrector {
                     int threads,
                     std::span<const Correction> corrections);
 
-  CorrectedColor Predict(const PlacedPicture& picture, int samples) const override;
+  PictureCells Describe(const Image& luminance, const Image& position) const override;
+  CorrectedColor Predict(const PlacedPicture& picture,
+                         const PictureCells& cells,
+                         int samples) const override;
   std::vector<ProposedPlace> Propose(std::span<const PlaceSample> samples,
                                      int count) const override;
 

@@ -291,10 +291,25 @@ const hooksOfFrame = () => {
   const entity = viewer.app.root.findByName('camera');
   const Vec3 = entity.getPosition().constructor;
   const numbers = ({ x, y, z }) => [x, y, z];
+  const canvas = document.querySelector('#viewer canvas');
   let centers = null;
+  let shown = 0;  // mode of the shades
+  const setTone = (tone) => {
+    splats.setParameter('uTone', tone);
+    viewer.app.renderNextFrame = true;
+  };
+  const still = color3dTonedStill.attach({ app: viewer.app, canvas, above: $('viewer'), setTone,
+    camera: () => [...entity.getWorldTransform().data, entity.camera.fov, canvas.width, canvas.height].join() });
   return {
-    photos, stage, canvas: document.querySelector('#viewer canvas'), showShades, goTo,
+    photos, stage, canvas, goTo,
+    showShades: (mode) => {
+      if (mode === shown) return;
+      shown = mode;
+      still.forget();
+      showShades(mode);
+    },
     showChanges: (changes) => {
+      still.forget();
       ['colorChangeA', 'colorChangeB'].forEach((name, channel) => {
         if (!changes) return;
         const texture = splats.resource.getTexture(name), texels = texture.lock();
@@ -304,10 +319,7 @@ const hooksOfFrame = () => {
       splats.setParameter('uChanged', changes ? 1 : 0);
       viewer.app.renderNextFrame = true;
     },
-    showTone: (tone) => {
-      splats.setParameter('uTone', tone);
-      viewer.app.renderNextFrame = true;
-    },
+    showTone: (tone) => (shown === 0 && !player ? still.show(tone) : setTone(tone)),
     held: () => held && !held.film && performance.now() - held.since > 700
       ? { photo: held.photo, frame: frameOf(held.photo) } : null,
     eye: () => numbers(entity.getPosition()),

@@ -2,15 +2,8 @@
 const color3dShading = (() => {
 'use strict';
 // Tone and changes of colours in Lab, with the constants of core/color/lab.cc.
-// Lightness that people see, as sRGB; shades for where a colour comes from, over the grey picture.
-const glsl = (moved) => `
-uniform float uShades;
-uniform vec3 uGuessed;
-uniform vec3 uInferred;
-uniform vec3 uSeen;
+const toned = `
 uniform vec4 uTone;
-uniform float uChanged;
-${moved.declare}
 vec3 toned(vec3 srgb, vec2 change) {
   vec3 encoded = clamp(srgb, 0.0, 1.0);
   vec3 linear = mix(encoded / 12.92, pow((encoded + 0.055) / 1.055, vec3(2.4)), step(0.04045, encoded));
@@ -27,7 +20,16 @@ vec3 toned(vec3 srgb, vec2 change) {
                       dot(xyz, vec3(0.052887, -0.204026, 1.151138))), 0.0, 1.0);
   return mix(12.92 * linear, 1.055 * pow(max(linear, 1e-6), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, linear));
 }
-void modifySplatCenter(inout vec3 center) {${moved.center}}
+`;
+// Lightness that people see, as sRGB; shades for where a colour comes from, over the grey picture.
+const glsl = (moved) => `
+uniform float uShades;
+uniform vec3 uGuessed;
+uniform vec3 uInferred;
+uniform vec3 uSeen;
+uniform float uChanged;
+${moved.declare}
+${toned}void modifySplatCenter(inout vec3 center) {${moved.center}}
 void modifySplatRotationScale(vec3 before, vec3 after, inout vec4 rotation, inout vec3 scale) {${moved.rotation}}
 void modifySplatColor(vec3 center, inout vec4 color) {${moved.color}
   if (uShades < 0.5) {
@@ -101,5 +103,5 @@ fn modifySplatColor(center: vec3f, color: ptr<function, vec4f>) {${moved.color}
 }
 `;
 
-return { glsl, wgsl };
+return { glsl, wgsl, toned };
 })();

@@ -15,7 +15,7 @@ export class PictureStore {
 
   constructor(private readonly run: string, private readonly shader: Shader) {}
 
-  // Parts of a view for a look at it. `side`: longer side, px.
+  // Parts of a view for a look at it. `side`: longer side, px. Throws AbortError if they were forgotten meanwhile.
   async parts(view: string, side: number, colors: Colors, wants: { source: boolean; pull: boolean }): Promise<Parts> {
     const { run, trial, isBase } = colors;
     const map = (name: MapName, of: string): Promise<ImageBitmap | null> =>
@@ -26,6 +26,8 @@ export class PictureStore {
       wants.source ? map('source', trial) : null,
       wants.pull && trial ? map('pull', trial) : null,
     ]);
+    // A closed bitmap has no width.
+    if ([photo, color, source, pull].some((bitmap) => bitmap?.width === 0)) throw new DOMException('forgotten', 'AbortError');
     return { photo: photo!, color, source, pull };
   }
 
