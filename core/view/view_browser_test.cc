@@ -1,6 +1,7 @@
 // The page in a real browser: headless Chromium without a graphics card, driven by Node.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -181,6 +182,42 @@ TEST_F(BrowserTest, SaysWhyMotionOfAFieldDoesNotPlay) {
   EXPECT_TRUE(looked.at("errors").empty());
   EXPECT_NE(looked.at("note").get<std::string>().find("stands at one moment"), std::string::npos);
   EXPECT_GT(Seen(looked, "film", "left")[1], Seen(looked, "film", "left")[0] + 80);
+}
+
+// While a slider moves, a picture of the scene is drawn in the tones; the scene itself follows.
+TEST_F(BrowserTest, FramedSceneIsDrawnInTones) {
+  const nlohmann::json shown =
+      RunInBrowser(COLOR3D_SHOW_TONES, PageOfWall(scratch_, "scene.sog"), {});
+  SCOPED_TRACE(shown.dump(1));
+  EXPECT_TRUE(shown.at("errors").empty());
+  const auto color = [&](const char* tone, const char* when, const char* half) {
+    return shown.at("seen").at(tone).at(when).at(half).get<std::array<int, 3>>();
+  };
+  for (const char* tone : {"plain", "half", "warm", "gray", "again"}) {
+    for (const char* half : {"left", "right"}) {
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(color(tone, "at_once", half)[c], color(tone, "at_rest", half)[c], 6)
+            << tone << " " << half << " " << c;
+      }
+    }
+  }
+  const auto redness = [&](const char* tone) {
+    const auto rgb = color(tone, "at_once", "left");
+    return rgb[0] - rgb[2];
+  };
+  EXPECT_GT(redness("plain"), 180);
+  EXPECT_LT(redness("half"), 0.8 * redness("plain"));
+  EXPECT_NEAR(redness("gray"), 0, 4);
+  EXPECT_GT(redness("again"), 180);
+  const auto bluer = [&](const char* tone) {
+    const auto rgb = color(tone, "at_once", "right");
+    return rgb[2] - rgb[0];
+  };
+  EXPECT_LT(bluer("warm"), bluer("plain") - 20);
+  for (const char* half : {"left", "right"}) {
+    const auto moved = shown.at("seen").at("moved").at(half).get<std::array<int, 3>>();
+    EXPECT_NEAR(moved[0], moved[2], 4) << "grey after the camera has moved";
+  }
 }
 
 }  // namespace
