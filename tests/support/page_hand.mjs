@@ -13,10 +13,10 @@ export const drawnBySoftware = ['--use-angle=swiftshader', '--enable-unsafe-swif
 
 const codes = { Enter: 13, ' ': 32, ArrowLeft: 37, ArrowUp: 38, ArrowRight: 39, ArrowDown: 40, Home: 36, '.': 190, ',': 188 };
 
-// Options: flags of Chromium; limit: ms to wait for something; every: ms between looks while waiting; whole: pictures of
+// Options: flags of Chromium; byTouch: clicks and drags are those of a finger; limit: ms to wait for something; every: ms between looks while waiting; whole: pictures of
 // the page beyond the window; narrowHeight: px of the narrow screen.
 export const openPage = (chromium, address, screenshots, options = {}) => {
-  const { flags = [], limit: usual = 60000, every = 100, whole = false, narrowHeight = 740 } = options;
+  const { flags = [], byTouch = false, limit: usual = 60000, every = 100, whole = false, narrowHeight = 740 } = options;
   if (screenshots) mkdirSync(screenshots, { recursive: true });
   const browser = openBrowser(chromium, flags, (type) => ['error', 'assert'].includes(type));
   const { send, open, evaluate, close, errors, requests } = browser;
@@ -51,18 +51,26 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
 
   const mouse = (type, x, y) => send('Input.dispatchMouseEvent',
     { type, x, y, button: 'left', buttons: type === 'mouseReleased' ? 0 : 1, clickCount: 1 });
+  const touch = (type, ...places) => send('Input.dispatchTouchEvent', { type, touchPoints: places.map(([x, y]) => ({ id: 0, x, y })) });
   const clickAt = async (x, y) => {
+    if (byTouch) {
+      await touch('touchStart', [x, y]);
+      return touch('touchEnd');
+    }
     await mouse('mousePressed', x, y);
-    await mouse('mouseReleased', x, y);
+    return mouse('mouseReleased', x, y);
   };
   const click = async (selector) => {
     const { x, y, width, height } = await boxOf(selector);
     await clickAt(x + width / 2, y + height / 2);
   };
   const drag = async ([x0, y0], [x1, y1], steps = 8) => {
-    await mouse('mousePressed', x0, y0);
-    for (let i = 1; i <= steps; ++i) await mouse('mouseMoved', x0 + ((x1 - x0) * i) / steps, y0 + ((y1 - y0) * i) / steps);
-    await mouse('mouseReleased', x1, y1);
+    const [down, move, up] = byTouch
+      ? [(x, y) => touch('touchStart', [x, y]), (x, y) => touch('touchMove', [x, y]), () => touch('touchEnd')]
+      : ['mousePressed', 'mouseMoved', 'mouseReleased'].map((type) => (x, y) => mouse(type, x, y));
+    await down(x0, y0);
+    for (let i = 1; i <= steps; ++i) await move(x0 + ((x1 - x0) * i) / steps, y0 + ((y1 - y0) * i) / steps);
+    await up(x1, y1);
   };
   const press = async (key, modifiers = 0) => {
     const text = key === 'Enter' ? '\r' : key.length === 1 && !modifiers ? key : undefined;
@@ -73,6 +81,15 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
   const type = async (selector, text) => {
     await click(selector);
     await send('Input.insertText', { text });
+  };
+  // Drags a file or folder of the machine to the middle of an element and drops it.
+  const drop = async (selector, file) => {
+    const { x, y, width, height } = await boxOf(selector);
+    for (const event of ['dragEnter', 'dragOver', 'drop']) {
+      await send('Input.dispatchDragEvent', {
+        type: event, x: x + width / 2, y: y + height / 2, data: { items: [], files: [resolve(file)], dragOperationsMask: 1 },
+      });
+    }
   };
   // Chooses a file or folder in a field for files.
   const choose = async (selector, file) => {
@@ -124,6 +141,7 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
     const beyond = () => requests.filter((url) => !url.startsWith(origin + '/'));
     try {
       await open();
+      if (byTouch) await send('Emulation.setTouchEmulationEnabled', { enabled: true });
       await send('Page.navigate', { url: address });
       await arrive();
       console.log(JSON.stringify({ ...seen, ...await use(), errors, requests: beyond() }, null, 1));
@@ -136,5 +154,5 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
     await close();
     process.exit(failed);
   };
-  return { send, evaluate, origin, seen, waitFor, boxOf, mouse, clickAt, click, drag, press, type, choose, keep, look, tell };
+  return { send, evaluate, origin, seen, waitFor, boxOf, mouse, clickAt, click, drag, press, type, drop, choose, keep, look, tell };
 };

@@ -13,6 +13,7 @@
 #include "core/base/random.h"
 #include "core/color/difference.h"
 #include "core/color/lab.h"
+#include "core/colorizer/corrector.h"
 #include "core/colorizer/personal/train_colorizer.h"
 
 namespace color3d {
@@ -334,6 +335,35 @@ TEST(ColorizerTest, ForOtherSceneForgetsPositions) {
   EXPECT_EQ(colors(other, there), colors(bytes, {}));
   EXPECT_THROW(ColorizerForOtherScene(bytes.substr(1), TheEncoder()), Error);
   EXPECT_THROW(ColorizerForOtherScene(bytes, std::make_shared<OtherEncoder>()), Error);
+}
+
+TEST(ColorizerTest, CorrectsByCellsThatWereKept) {
+  const Key key = MakeKey(96, 72);
+  const auto colorizer = Train(key, Quick(0));
+  Correction correction{{key.luminance, key.ab, {}, {}}, key.ab, Image(96, 72, 1), 1.0};
+  for (int y = 20; y < 40; ++y) {
+    for (int x = 20; x < 60; ++x) {
+      correction.painted.At(0, y, x) = 1.0f;
+      correction.ab.At(0, y, x) += 30.0f;
+    }
+  }
+  const auto corrector = colorizer->Correct({&correction, 1});
+  const PictureCells cells = corrector->Describe(key.luminance, {});
+  const std::string bytes = SerializePictureCells(cells);
+  const auto kept = ParsePictureCells(bytes);
+  ASSERT_TRUE(kept);
+  const CorrectedColor fresh = corrector->Predict(correction.picture, 5);
+  const CorrectedColor again = corrector->Predict(correction.picture, *kept, 5);
+  EXPECT_EQ(again.change.data, fresh.change.data);
+  EXPECT_EQ(again.share.data, fresh.share.data);
+  EXPECT_EQ(again.sample.features, fresh.sample.features);
+  EXPECT_GT(*std::ranges::max_element(fresh.share.data), 0.5f);
+  EXPECT_TRUE(corrector->Predict(correction.picture, *kept, 0).sample.places.empty());
+  EXPECT_FALSE(ParsePictureCells(""));
+  EXPECT_FALSE(ParsePictureCells(bytes.substr(0, bytes.size() - 1)));
+  EXPECT_FALSE(ParsePictureCells(bytes.substr(0, bytes.size() / 2)));
+  const Key other = MakeKey(64, 64);
+  EXPECT_THROW(corrector->Predict({other.luminance, other.ab, {}, {}}, *kept, 0), Error);
 }
 
 TEST(ColorizerTest, RefusesOtherEncoder) {

@@ -4,12 +4,14 @@ import type { SceneView } from '../calls';
 import type { Look, Parts, Shader } from './shading';
 
 export const stripSide = 240; // px
+const delay = 150; // ms: the photos follow when a slider rests
 
 interface Cell { readonly view: SceneView; readonly button: HTMLButtonElement; readonly canvas: HTMLCanvasElement; readonly note: HTMLElement; parts: Parts | null; isSeen: boolean }
 
 export class Strip {
   readonly root = h('ul', { class: 'co-strip', 'aria-label': 'Photos' });
   private readonly cells = new Map<string, Cell>();
+  private later: ReturnType<typeof setTimeout> | undefined;
   private readonly sight = new IntersectionObserver((entries) => {
     for (const { target, isIntersecting } of entries) {
       const cell = this.cells.get((target as HTMLElement).dataset.view!)!;
@@ -55,9 +57,13 @@ export class Strip {
     if (cell.note.textContent !== text) replace(cell.note, text);
   }
   setLook(look: Look): void {
-    for (const cell of this.cells.values()) if (cell.isSeen) this.draw(cell, look);
+    clearTimeout(this.later);
+    this.later = setTimeout(() => {
+      for (const cell of this.cells.values()) if (cell.isSeen) this.draw(cell, look);
+    }, delay);
   }
   destroy(): void {
+    clearTimeout(this.later);
     this.sight.disconnect();
   }
 
