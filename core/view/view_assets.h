@@ -9,8 +9,8 @@ std::string_view PageTemplate();  // page/page.html
 std::string_view PageStyle();     // page/page.css
 std::string_view PageScript();    // page/page.js
 // Before it.
-std::string_view PageFramedScript();   // page/framed.js
-std::string_view PageShadingScript();  // page/shading.js
+std::string_view PageFramedScript();      // page/framed.js
+std::string_view PageShadingScript();     // page/shading.js
 std::string_view PageTonedStillScript();  // page/toned_still.js
 
 // For scenes that move, before the script of the page.

@@ -156,7 +156,8 @@ std::string RenderViewPage(const Scene& scene, const ViewPage& page) {
   const std::string program = Base64(ViewerProgram());
   const std::string motion = page.motion ? Base64(Gzip(page.motion->file)) : "";
   const std::string movie = Base64(page.movie.bytes);
-  std::string player = fmt::format("{}\n{}\n{}", PageShadingScript(), PageTonedStillScript(), PageFramedScript());
+  std::string player =
+      fmt::format("{}\n{}\n{}", PageShadingScript(), PageTonedStillScript(), PageFramedScript());
   if (page.motion) player += fmt::format("\n{}\n{}", PageMotionScript(), PagePlayerScript());
   const std::pair<std::string_view, std::string_view> parts[] = {{"@STYLE@", PageStyle()},
                                                                  {"@FACTS@", facts},
