@@ -36,6 +36,7 @@ constexpr size_t kMaxOpenScenes = 2;
 constexpr milliseconds kBetweenLooks{2000};
 constexpr milliseconds kStillHere{10'000};
 constexpr int64_t kMaxStrokesBytes = 4 << 20;
+constexpr int kPreparing = 200;  // priority of what nobody waits for; that of jobs is 100
 
 Error NotCorrectable(const std::string& why) {
   return Error(ErrorCode::kFailedPrecondition, "the colours cannot be corrected here: {}", why);
@@ -124,6 +125,29 @@ Json StateOf(const std::vector<v1::Job>& versions) {
   return state;
 }
 
+// The correction stage of `whole` alone, on what the stages of a run have made.
+v1::JobSpec CorrectionOf(const std::vector<v1::Job>& stages, const v1::JobSpec& whole) {
+  v1::JobSpec spec;
+  spec.set_scene(whole.scene());
+  spec.set_seed(whole.seed());
+  *spec.mutable_correct_colors() = whole.colorize_scene().correct_colors();
+  std::set<std::string> kinds;
+  for (const v1::Job& stage : stages) {
+    if (stage.kind() == kind::kCorrectColors || stage.state() != v1::Job::STATE_SUCCEEDED) continue;
+    const Stage* row = FindStage(stage.kind());
+    const Stage& correct = StageOf(kind::kCorrectColors);
+    if (row == nullptr) continue;
+    const auto is_read = [&](const char* output) {
+      const auto same = [&](const char* wanted) { return std::string_view(wanted) == output; };
+      return std::ranges::any_of(correct.needs, same) || std::ranges::any_of(correct.reads, same);
+    };
+    if (std::ranges::any_of(row->outputs, is_read) && kinds.insert(stage.kind()).second) {
+      spec.add_inputs(stage.name());
+    }
+  }
+  return spec;
+}
+
 // R and G of EncodeAbPng, with 8 bits; blue is the confidence.
 std::string SmallAbPng(const std::string& png, const std::string& name, int side) {
   const AbMap map = DecodeAbPng(png, name);
@@ -204,10 +228,29 @@ std::shared_ptr<const Corrections::Run> Corrections::Open(const std::string& nam
   return stays ? runs_.emplace(full, std::move(run)).first->second : run;
 }
 
+void Corrections::Prepare(Connection& connection, const Run& run) {
+  {
+    const MutexLock lock(mutex_);
+    if (!prepared_.insert(FindIn(run.stages, artifact::kColorizer).artifact->digest().sha256())
+             .second) {
+      return;
+    }
+  }
+  v1::JobSpec nothing = run.job.spec();
+  v1::CorrectColorsSpec* correct = nothing.mutable_colorize_scene()->mutable_correct_colors();
+  correct->clear_corrections();
+  correct->set_proposals(0);
+  try {
+    SubmitJob(connection, CorrectionOf(run.stages, nothing), {.priority = kPreparing});
+  } catch (const std::exception&) {  // the first stroke takes longer
+  }
+}
+
 Json Corrections::Describe(const std::string& name) {
   const std::shared_ptr<const Run> run = Open(name);
   const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
+  Prepare(connection, *run);
   Json corrections = Json::array();
   for (const auto& correction : run->job.spec().colorize_scene().correct_colors().corrections()) {
     const std::string id = CorrectionId(correction);
@@ -324,25 +367,7 @@ v1::Job Corrections::Try(const std::string& name, const nlohmann::json& json) {
   if (whole.colorize_scene().correct_colors().corrections().empty()) {
     throw Error(ErrorCode::kFailedPrecondition, "no correction is left to show");
   }
-  v1::JobSpec spec;
-  spec.set_scene(whole.scene());
-  spec.set_seed(whole.seed());
-  *spec.mutable_correct_colors() = whole.colorize_scene().correct_colors();
-  std::set<std::string> kinds;
-  for (const v1::Job& stage : run->stages) {
-    if (stage.kind() == kind::kCorrectColors || stage.state() != v1::Job::STATE_SUCCEEDED) continue;
-    const Stage* row = FindStage(stage.kind());
-    const Stage& correct = StageOf(kind::kCorrectColors);
-    if (row == nullptr) continue;
-    const auto is_read = [&](const char* output) {
-      const auto same = [&](const char* wanted) { return std::string_view(wanted) == output; };
-      return std::ranges::any_of(correct.needs, same) || std::ranges::any_of(correct.reads, same);
-    };
-    if (std::ranges::any_of(row->outputs, is_read) && kinds.insert(stage.kind()).second) {
-      spec.add_inputs(stage.name());
-    }
-  }
-  return SubmitJob(connection, spec);
+  return SubmitJob(connection, CorrectionOf(run->stages, whole));
 }
 
 v1::Job Corrections::Change(const std::string& name, const nlohmann::json& json) {

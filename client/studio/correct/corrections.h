@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -69,6 +70,8 @@ class Corrections {
   std::shared_ptr<const SceneViews> OpenViews(Connection& connection,
                                               const v1::Job& job,
                                               const v1::Artifact& scene);
+  // Has the service keep what strokes on this scene need, once.
+  void Prepare(Connection& connection, const Run& run);
   VersionChange ReadChange(Connection& connection, const Run& run, const nlohmann::json& change);
   v1::FurtherKeyView Uploaded(Connection& connection, const Run& run, const nlohmann::json& stroke);
 
@@ -79,7 +82,8 @@ class Corrections {
   int64_t changes_ COLOR3D_GUARDED_BY(mutex_) = 0;
   std::map<std::string, std::shared_ptr<const Run>> runs_ COLOR3D_GUARDED_BY(mutex_);
   std::map<std::string, std::shared_ptr<const SceneViews>> views_ COLOR3D_GUARDED_BY(mutex_);
-  Mutex submitting_;  // one change follows the other
+  std::set<std::string> prepared_ COLOR3D_GUARDED_BY(mutex_);  // colorizers
+  Mutex submitting_;                                           // one change follows the other
 };
 
 }  // namespace color3d::client
