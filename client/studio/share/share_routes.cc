@@ -3,7 +3,6 @@
 #include <memory>
 #include <utility>
 
-#include "client/lib/out_folder.h"
 #include "client/options/credit_flags.h"
 #include "client/studio/found_photos.h"
 #include "client/studio/run_progress.h"
@@ -98,10 +97,8 @@ class SharePages {
 
   // A picture of a job with the credit.
   void SendPicture(const Request& request, Response& response) const {
-    const std::string job = request.matches[1], name = request.get_param_value("name");
-    if (!IsSafeRelativePath(name)) throw InvalidArgument("the name of the file is not possible");
-    const fs::path file = SafePathBelow(parts_.downloads / job, name);
-    const std::string type = parts_.calls->Fetch(job, name, file);
+    const std::string name = request.get_param_value("name");
+    const auto [file, type] = parts_.fetched->Of(request.matches[1], name);
     const CreditFlags credit = CreditOf(request);
     response.set_content(WithCredit(ReadFile(file), credit, name), type);
     SetDownloadName(fs::path(name).filename().string(), response);
@@ -142,13 +139,10 @@ class SharePages {
   }
 
   void SendSideBySide(const Request& request, Response& response) const {
-    const std::string job = request.matches[1], name = request.get_param_value("name");
-    if (!IsSafeRelativePath(name) || !name.ends_with(".mp4")) {
-      throw InvalidArgument("the name of the movie is not possible");
-    }
-    const fs::path movie = SafePathBelow(parts_.downloads / job, name);
-    parts_.calls->Fetch(job, name, movie);
-    const ScratchFolder scratch(parts_.downloads);
+    const std::string name = request.get_param_value("name");
+    if (!name.ends_with(".mp4")) throw InvalidArgument("the name of the movie is not possible");
+    const fs::path movie = parts_.fetched->Of(request.matches[1], name).file;
+    const ScratchFolder scratch(parts_.fetched->folder());
     const fs::path both = scratch.path() / "both.mp4";
     WriteSideBySide(movie, both, *parts_.cancel);
     response.set_content(ReadFile(both), "video/mp4");
