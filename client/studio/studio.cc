@@ -174,7 +174,7 @@ void Studio::Parts::AddRoutes() {
   const auto scene_of = [this](const std::string& set) { return SceneOf(set); };
   AddSetRoutes({sets_, calls_, films_, cancel_, options_.max_file_bytes, folder_of, scene_of},
                routes);
-  AddShareRoutes(routes, {options_.folder, folder_of, &fetched_, &cancel_}, share_);
+  AddShareRoutes(routes, {options_.folder, folder_of, &fetched_, &films_, &cancel_}, share_);
   AddQueueRoutes(routes, queue_);
   AddCorrectRoutes(corrections_, routes);
   AddFilmRoutes({sets_,

@@ -6,10 +6,14 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
+#include "core/image/credit/picture_credit.h"
+#include "core/image/probe/probe.h"
+#include "core/video/film_reader.h"
 #include "core/video/mp4_writer.h"
 #include "tests/integration/service_fixture.h"
 #include "tests/support/formats/sound_film.h"
@@ -17,10 +21,13 @@
 
 namespace color3d {
 namespace {
+namespace fs = std::filesystem;
 using std::chrono::seconds;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Pair;
 
 constexpr int kWidth = 192, kHeight = 128;
 constexpr int kFramesOfShot = 14;
@@ -72,8 +79,9 @@ TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
   EXPECT_TRUE(WaitUntil([&] { return studio.Out().find('\n') != std::string::npos; }, seconds(30)))
       << studio.Err();
   const std::string out = studio.Out();
+  const fs::path saved = Path("saved");
   std::vector<std::string> command = {
-      "node", COLOR3D_USE_FILM, "chromium", out.substr(0, out.find('\n')), WriteFilm()};
+      "node", COLOR3D_USE_FILM, "chromium", out.substr(0, out.find('\n')), WriteFilm(), saved};
   const char* screenshots = std::getenv("COLOR3D_SCREENSHOTS");
   if (screenshots != nullptr) command.emplace_back(screenshots);
   const ProcessResult used = RunProcess(command, Path("browser"), seconds(800));
@@ -82,6 +90,7 @@ TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
   EXPECT_THAT(seen.at("errors"), IsEmpty()) << seen.at("errors");
   EXPECT_THAT(seen.at("requests"), IsEmpty()) << seen.at("requests");
   EXPECT_THAT(seen.at("wide"), IsEmpty()) << seen.at("wide");
+  EXPECT_THAT(seen.at("faint"), IsEmpty()) << seen.at("faint");
   const auto& facts = seen.at("facts");
   SCOPED_TRACE(facts.dump(1));
   const auto text = [&](const char* page) { return seen.at("texts").at(page).get<std::string>(); };
@@ -110,6 +119,15 @@ TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
   EXPECT_THAT(facts.at("part_by_key"), ElementsAre(1, end));
   EXPECT_THAT(facts.at("part_undone"), ElementsAre(0, end));
   EXPECT_THAT(facts.at("part_kept"), ElementsAre(1, end));
+  // What was saved before: pictures with the credit, the movie with its sound and its frames.
+  const std::string frame = ReadFile(saved / "scene_frame_000005.jpg");
+  EXPECT_THAT(ReadPictureTexts(frame, "frame"),
+              Contains(Pair("2:120", HasSubstr("Coloured by Erika Müller."))));
+  EXPECT_EQ(ProbeImage(frame, "frame").width, kWidth);
+  EXPECT_THAT(ReadPictureTexts(ReadFile(saved / "key_view_colored.png"), "key"),
+              Contains(Pair("Description", HasSubstr("Coloured by Erika Müller."))));
+  EXPECT_TRUE(FilmReader(saved / "scene.mp4").facts().has_sound);
+  EXPECT_EQ(FilmReader(saved / "side_by_side.mp4").times().size(), 2u * kFramesOfShot);
   const v1::Job job = NewestJob("colorize_scene");
   EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED);
   const auto& part = job.spec().colorize_scene().correct_colors().corrections(0);

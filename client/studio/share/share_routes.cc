@@ -1,5 +1,7 @@
 #include "client/studio/share/share_routes.h"
 
+#include <fmt/core.h>
+
 #include <memory>
 #include <utility>
 
@@ -104,6 +106,15 @@ class SharePages {
     SetDownloadName(fs::path(name).filename().string(), response);
   }
 
+  // A frame of a movie of a job with the credit.
+  void SendFrame(const Request& request, Response& response) const {
+    const fs::path movie = MovieOf(request);
+    const int frame = FrameNumberOf(request);
+    const std::string jpeg = parts_.frames->JpegOfFile(movie, frame, 0, /*gray=*/false);
+    response.set_content(WithCredit(jpeg, CreditOf(request), "frame.jpg"), "image/jpeg");
+    SetDownloadName(fmt::format("{}_frame_{:06}.jpg", PlainName(movie), frame), response);
+  }
+
   // A photo of the user's in the colours of the scene: for the page, or to keep with the credit.
   void SendColored(const Request& request, Response& response) const {
     const PhotoFolder photos = parts_.photos_of(request.get_param_value("set"));
@@ -139,9 +150,7 @@ class SharePages {
   }
 
   void SendSideBySide(const Request& request, Response& response) const {
-    const std::string name = request.get_param_value("name");
-    if (!name.ends_with(".mp4")) throw InvalidArgument("the name of the movie is not possible");
-    const fs::path movie = parts_.fetched->Of(request.matches[1], name).file;
+    const fs::path movie = MovieOf(request);
     const ScratchFolder scratch(parts_.fetched->folder());
     const fs::path both = scratch.path() / "both.mp4";
     WriteSideBySide(movie, both, *parts_.cancel);
@@ -150,6 +159,11 @@ class SharePages {
   }
 
  private:
+  fs::path MovieOf(const Request& request) const {
+    const std::string name = request.get_param_value("name");
+    if (!name.ends_with(".mp4")) throw InvalidArgument("the name of the movie is not possible");
+    return parts_.fetched->Of(request.matches[1], name).file;
+  }
   CreditFlags CreditOf(const Request& request) const {
     return {KeptCredit(parts_.folder), request.get_param_value("caption") == "1"};
   }
@@ -195,6 +209,7 @@ void AddShareRoutes(const StudioRoutes& routes, const ShareParts& parts, const S
                });
   };
   send("/picture", &SharePages::SendPicture);
+  send("/film/picture", &SharePages::SendFrame);
   send("/colored", &SharePages::SendColored);
   send("/colored\\.zip", &SharePages::SendZip);
   send("/side-by-side", &SharePages::SendSideBySide);

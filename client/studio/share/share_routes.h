@@ -7,6 +7,7 @@
 
 #include "client/lib/photos/photo_folder.h"
 #include "client/studio/fetched_files.h"
+#include "client/studio/film/film_frames.h"
 #include "client/studio/share/share_calls.h"
 #include "client/studio/studio_routes.h"
 
@@ -16,6 +17,7 @@ struct ShareParts {
   std::filesystem::path folder;  // keeps the credit that the user typed
   std::function<PhotoFolder(const std::string& set)> photos_of;
   FetchedFiles* fetched = nullptr;
+  FilmFrames* frames = nullptr;
   const CancellationToken* cancel = nullptr;
 };
 
