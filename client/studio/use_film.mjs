@@ -139,6 +139,7 @@ const use = async () => {
   await pause(800);
   const [x, y] = await middleOf('#film-painter canvas');
   await drag([x - 60, y], [x + 60, y], 10);
+  await waitFor('!document.querySelector(".paint-busy")');
   await look('painting');
   await click('#paint-done');
   const ends = () => evaluate('[...document.querySelectorAll(".film-edge")].map((edge) => Number(edge.getAttribute("aria-valuenow")))');
