@@ -5,9 +5,7 @@
 #include <signal.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
@@ -15,7 +13,7 @@
 #include "core/image/probe/probe.h"
 #include "core/video/film_reader.h"
 #include "core/video/mp4_writer.h"
-#include "tests/integration/service_fixture.h"
+#include "tests/integration/studio_fixture.h"
 #include "tests/support/formats/sound_film.h"
 #include "tests/support/scenes/wall_pan.h"
 
@@ -33,11 +31,6 @@ constexpr int kWidth = 192, kHeight = 128;
 constexpr int kFramesOfShot = 14;
 constexpr double kFramesPerSecond = 8.0;
 
-bool CanRun(const std::string& program, const ScratchFolder& scratch) {
-  return RunProcess({"env", program, "--version"}, scratch.path() / "log", seconds(30)).exit_code ==
-         0;
-}
-
 // Grey. Two places of a wall, far from each other and of another contrast.
 Image FilmFrame(int frame) {
   const bool second = frame >= kFramesOfShot;
@@ -52,14 +45,8 @@ Image FilmFrame(int frame) {
   return SrgbFromLab(lab);
 }
 
-class StudioFilmTest : public ServiceTest {
+class StudioFilmTest : public StudioTest {
  protected:
-  void SetUp() override {
-    if (!CanRun("chromium", folder_)) GTEST_SKIP() << "skipped, because there is no Chromium";
-    if (!CanRun("node", folder_)) GTEST_SKIP() << "skipped, because there is no Node";
-    ::setenv("XDG_DATA_HOME", Path("home").c_str(), 1);
-    StartServer();
-  }
   std::string WriteFilm() {
     ThreadPool pool(1);
     Mp4Writer writer(Path("silent.mp4"),
@@ -76,21 +63,12 @@ class StudioFilmTest : public ServiceTest {
 
 TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
   Process studio(ClientCommand({"studio", "--no-open"}), Path("studio"));
-  EXPECT_TRUE(WaitUntil([&] { return studio.Out().find('\n') != std::string::npos; }, seconds(30)))
-      << studio.Err();
-  const std::string out = studio.Out();
   const fs::path saved = Path("saved");
-  std::vector<std::string> command = {
-      "node", COLOR3D_USE_FILM, "chromium", out.substr(0, out.find('\n')), WriteFilm(), saved};
-  const char* screenshots = std::getenv("COLOR3D_SCREENSHOTS");
-  if (screenshots != nullptr) command.emplace_back(screenshots);
-  const ProcessResult used = RunProcess(command, Path("browser"), seconds(800));
-  ASSERT_EQ(used.exit_code, 0) << used.err << studio.Err();
-  const auto seen = nlohmann::json::parse(used.out);
-  EXPECT_THAT(seen.at("errors"), IsEmpty()) << seen.at("errors");
-  EXPECT_THAT(seen.at("requests"), IsEmpty()) << seen.at("requests");
-  EXPECT_THAT(seen.at("wide"), IsEmpty()) << seen.at("wide");
-  EXPECT_THAT(seen.at("faint"), IsEmpty()) << seen.at("faint");
+  const auto seen = Use(COLOR3D_USE_FILM, {AddressOf(studio), WriteFilm(), saved}, seconds(800));
+  ASSERT_TRUE(seen.is_object());
+  for (const char* none : {"errors", "requests", "wide", "faint"}) {
+    EXPECT_THAT(seen.at(none), IsEmpty()) << seen.at(none);
+  }
   const auto& facts = seen.at("facts");
   SCOPED_TRACE(facts.dump(1));
   const auto text = [&](const char* page) { return seen.at("texts").at(page).get<std::string>(); };
