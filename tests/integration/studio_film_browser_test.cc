@@ -97,6 +97,8 @@ TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
   EXPECT_THAT(facts.at("part_by_key"), ElementsAre(1, end));
   EXPECT_THAT(facts.at("part_undone"), ElementsAre(0, end));
   EXPECT_THAT(facts.at("part_kept"), ElementsAre(1, end));
+  EXPECT_THAT(text("done"), HasSubstr("automatic colours"));
+  EXPECT_THAT(text("again"), HasSubstr("coloured by you")) << "the part";
   // What was saved before: pictures with the credit, the movie with its sound and its frames.
   const std::string frame = ReadFile(saved / "scene_frame_000005.jpg");
   EXPECT_THAT(ReadPictureTexts(frame, "frame"),
