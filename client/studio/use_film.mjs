@@ -161,6 +161,10 @@ const use = async () => {
   await waitFor('document.querySelector("main").dataset.state === "done"', 240000);
   await look('again');
   facts.part_kept = await ends();
+  await click('#go-sheet');
+  await waitFor('document.querySelector("#print")?.disabled === false', 120000);
+  facts.sheet = await evaluate('[...document.querySelectorAll(".sheet img")].map((image) => image.naturalWidth)');
+  await look('sheet');
   return { facts };
 };
 

@@ -22,7 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::seconds;
 using ::testing::Contains;
+using ::testing::Each;
 using ::testing::ElementsAre;
+using ::testing::Gt;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Pair;
@@ -108,6 +110,10 @@ TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
               Contains(Pair("Description", HasSubstr("Coloured by Erika Müller."))));
   EXPECT_TRUE(FilmReader(saved / "scene.mp4").facts().has_sound);
   EXPECT_EQ(FilmReader(saved / "side_by_side.mp4").times().size(), 2u * kFramesOfShot);
+  // Its coloured frame in grey and colour, and others.
+  EXPECT_GE(facts.at("sheet").size(), 6u);
+  EXPECT_THAT(facts.at("sheet"), Each(Gt(0)));
+  EXPECT_THAT(text("sheet"), HasSubstr("Frame 1\n"));
   const v1::Job job = NewestJob("colorize_scene");
   EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED);
   const auto& part = job.spec().colorize_scene().correct_colors().corrections(0);
