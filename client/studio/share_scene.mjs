@@ -2,27 +2,17 @@
 //   node share_scene.mjs CHROMIUM ADDRESS OUT [SCREENSHOTS]
 // ADDRESS: as `color3d studio FOLDER` printed it; OUT: what was saved, and sheet.pdf. wide: pages that are wider than a
 // screen of 360 px. With a fourth argument pages leave PNGs there: light, dark and narrow.
-import { existsSync, mkdirSync, readdirSync, statSync, writeFileSync } from 'node:fs';
-import { join, resolve } from 'node:path';
+import { readdirSync, statSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
 
-import { pause } from '../../tests/support/browser.mjs';
 import { openPage } from '../../tests/support/page_hand.mjs';
 
 const [chromium, address, out, screenshots] = process.argv.slice(2);
-mkdirSync(out, { recursive: true });
-const { send, evaluate, waitFor, click, type, look, tell } =
+const { send, evaluate, waitFor, click, clickText, type, saveTo, savedAs, look, tell } =
     openPage(chromium, address, screenshots, { flags: ['--window-size=1280,900'] });
 
-const savedAs = async (name, limit = 120000) => {
-  for (const end = Date.now() + limit; Date.now() < end; await pause(100)) {
-    if (existsSync(join(out, name)) && !readdirSync(out).some((file) => file.endsWith('.crdownload'))) return;
-  }
-  throw new Error(`${name} was not saved; there are ${readdirSync(out)}`);
-};
-const clickText = (text) => click(`//main//*[self::a or self::button][normalize-space()="${text}"]`);
-
 const share = async () => {
-  await send('Browser.setDownloadBehavior', { behavior: 'allow', downloadPath: resolve(out) }, null);
+  await saveTo(out);
   await waitFor('!!document.querySelector("#go-on")');
   const name = await evaluate('document.querySelector("h1").textContent');
   await evaluate(`(async () => {

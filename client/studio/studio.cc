@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "client/lib/names.h"
-#include "client/lib/out_folder.h"
 #include "client/lib/photos/photo_folder.h"
 #include "client/studio/correct/correct_routes.h"
+#include "client/studio/fetched_files.h"
 #include "client/studio/film/film_frames.h"
 #include "client/studio/film/film_routes.h"
 #include "client/studio/found_photos.h"
@@ -79,7 +79,7 @@ class Studio::Parts {
   QueueCalls queue_{connection_};
   Corrections corrections_{connection_};
   FilmFrames films_;
-  const ScratchFolder downloads_;
+  FetchedFiles fetched_{calls_};
   std::atomic<int> streams_{0};
   std::atomic<Steady::time_point> last_request_{Steady::now()};
 
@@ -99,9 +99,6 @@ class Studio::Parts {
   void SendArtifact(const Request& request, Response& response);
 
   PhotoFolder FolderOf(const std::string& id) const { return CollectSet(sets_.Get(id)); }
-  // Its file and media type.
-  std::pair<fs::path, std::string> FetchArtifact(const std::string& job,
-                                                 const std::string& name) const;
   // "scenes/..." of the set, uploaded if it is not there yet.
   std::string SceneOf(const std::string& id);
 };
@@ -177,8 +174,7 @@ void Studio::Parts::AddRoutes() {
   const auto scene_of = [this](const std::string& set) { return SceneOf(set); };
   AddSetRoutes({sets_, calls_, films_, cancel_, options_.max_file_bytes, folder_of, scene_of},
                routes);
-  AddShareRoutes(
-      routes, {options_.folder, downloads_.path(), folder_of, &calls_, &cancel_}, share_);
+  AddShareRoutes(routes, {options_.folder, folder_of, &fetched_, &films_, &cancel_}, share_);
   AddQueueRoutes(routes, queue_);
   AddCorrectRoutes(corrections_, routes);
   AddFilmRoutes({sets_,
@@ -187,7 +183,7 @@ void Studio::Parts::AddRoutes() {
                  folder_of,
                  scene_of,
                  [this](const std::string& job, const std::string& name) {
-                   return FetchArtifact(job, name).first;
+                   return fetched_.Of(job, name).file;
                  }},
                 routes);
 }
@@ -296,16 +292,9 @@ void Studio::Parts::Stream(Response& response,
       });
 }
 
-std::pair<fs::path, std::string> Studio::Parts::FetchArtifact(const std::string& job,
-                                                              const std::string& name) const {
-  if (!IsSafeRelativePath(name)) throw InvalidArgument("the name of the file is not possible");
-  const fs::path file = SafePathBelow(downloads_.path() / job, name);
-  return {file, calls_.Fetch(job, name, file)};
-}
-
 void Studio::Parts::SendArtifact(const Request& request, Response& response) {
-  const std::string job = request.matches[1], name = request.get_param_value("name");
-  const auto [file, type] = FetchArtifact(job, name);
+  const std::string name = request.get_param_value("name");
+  const auto [file, type] = fetched_.Of(request.matches[1], name);
   if (request.has_param("download")) {
     SetDownloadName(fs::path(name).filename().string(), response);
   } else if (type == "text/html") {

@@ -1,5 +1,6 @@
 #include "client/studio/studio_requests.h"
 
+#include <charconv>
 #include <cstdlib>
 #include <map>
 
@@ -40,6 +41,16 @@ int SideOf(const Request& request) {
     throw InvalidArgument("side is {}; 16 to {} px are possible", text.substr(0, 20), kMaxSidePx);
   }
   return side;
+}
+
+int FrameNumberOf(const Request& request) {
+  const std::string text = request.get_param_value("frame");
+  int number = -1;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || end != text.data() + text.size() || number < 0) {
+    throw InvalidArgument("frame is not a number of the film's frames");
+  }
+  return number;
 }
 
 Json SetJson(const PhotoSet& set) {

@@ -20,6 +20,9 @@ std::string PresetOf(const nlohmann::json& body);
 // Longer side of a picture, px; 0 if it is not given. Throws Error{kInvalidArgument}.
 int SideOf(const httplib::Request& request);
 
+// `frame`: number of a frame of a film, from 0. Throws Error{kInvalidArgument}.
+int FrameNumberOf(const httplib::Request& request);
+
 nlohmann::ordered_json SetJson(const PhotoSet& set);
 
 // The colours of a photo of the set and strokes above them. Throws Error{kInvalidArgument}.

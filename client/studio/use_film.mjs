@@ -1,14 +1,13 @@
 // Colours a film in the studio in headless Chromium, by mouse and keyboard as a person would, and tells what was seen,
 // as JSON on stdout.
-//   node use_film.mjs CHROMIUM ADDRESS FILM [SCREENSHOTS]
-// ADDRESS: as `color3d studio` printed it; FILM: a file to choose. errors: of the console; requests: beyond the
-// studio; texts: of the pages; wide: pages wider than a screen of 360 px; facts: what was measured. With a fourth
-// argument every page leaves a PNG there, light, dark and narrow.
+//   node use_film.mjs CHROMIUM ADDRESS FILM OUT [SCREENSHOTS]
+// ADDRESS: as `color3d studio` printed it; FILM: a file to choose; OUT: what was saved. facts: what was measured. With a
+// fifth argument every page leaves a PNG there, light, dark and narrow.
 import { pause } from '../../tests/support/browser.mjs';
 import { drawnBySoftware, openPage } from '../../tests/support/page_hand.mjs';
 
-const [chromium, address, film, screenshots] = process.argv.slice(2);
-const { send, evaluate, waitFor, boxOf, drag, click, press, choose, keep, look, tell } =
+const [chromium, address, film, out, screenshots] = process.argv.slice(2);
+const { send, evaluate, waitFor, boxOf, drag, click, clickText, press, type, choose, saveTo, savedAs, keep, look, tell } =
     openPage(chromium, address, screenshots, { flags: [...drawnBySoftware, '--window-size=1280,1000'], whole: true });
 const facts = {};
 
@@ -75,6 +74,19 @@ const play = async () => {
   facts.pause_holds = await moment() === stopped;
 };
 
+// The film, beside grey, and two of its frames, with the credit.
+const share = async () => {
+  await saveTo(out);
+  await type('#credit-colored_by', 'Erika Müller');
+  for (const [button, file] of [
+    ['Save the film', 'scene.mp4'], ['Save it beside grey', 'side_by_side.mp4'], ['Save the report', 'report.html'],
+    ['Save the coloured frame', 'key_view_colored.png'], ['Save the frame that is shown', 'scene_frame_000005.jpg'],
+  ]) {
+    await clickText(button);
+    await savedAs(file);
+  }
+};
+
 const use = async () => {
   await send('Performance.enable');
   await waitFor('!!document.querySelector(".drop-area")');
@@ -110,11 +122,14 @@ const use = async () => {
   await keep('compared');
   await click('#film-compare');
   await play();
+  await evaluate('document.getElementById("film-moment").focus()');
+  await press('Home');
+  for (let i = 0; i < 5; ++i) await press('ArrowRight');
+  await share();
 
   // Other colours for a part: painted, its ends dragged by the mouse and moved by keys.
   await evaluate('document.getElementById("film-moment").focus()');
-  await press('Home');
-  for (let i = 0; i < 6; ++i) await press('ArrowRight');
+  await press('ArrowRight');
   await pause(400);
   await click('#add-part');
   await waitFor('!!document.querySelector("#parts-0-way")');
@@ -124,6 +139,7 @@ const use = async () => {
   await pause(800);
   const [x, y] = await middleOf('#film-painter canvas');
   await drag([x - 60, y], [x + 60, y], 10);
+  await waitFor('!document.querySelector(".paint-busy")');
   await look('painting');
   await click('#paint-done');
   const ends = () => evaluate('[...document.querySelectorAll(".film-edge")].map((edge) => Number(edge.getAttribute("aria-valuenow")))');
@@ -145,6 +161,10 @@ const use = async () => {
   await waitFor('document.querySelector("main").dataset.state === "done"', 240000);
   await look('again');
   facts.part_kept = await ends();
+  await click('#go-sheet');
+  await waitFor('document.querySelector("#print")?.disabled === false', 120000);
+  facts.sheet = await evaluate('[...document.querySelectorAll(".sheet img")].map((image) => image.naturalWidth)');
+  await look('sheet');
   return { facts };
 };
 

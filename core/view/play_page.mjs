@@ -1,8 +1,9 @@
 // Plays a page of core/view that moves in headless Chromium, by its keys, and tells what happened, as
 // JSON on stdout.
-//   node play_page.mjs CHROMIUM PAGE FOLDER WIDTH HEIGHT STOP...
+//   node play_page.mjs CHROMIUM PAGE FOLDER WIDTH HEIGHT [film] STOP...
 // The stage gets WIDTH x HEIGHT px. FOLDER gets the stage at each STOP of the time slider as
-// STOP.png, and once more while the scene plays as playing.png. clocks: the text of the clock at each stop; keys: what keys
+// STOP.png, and once more while the scene plays as playing.png; with `film` as the camera of the film sees it, else from
+// the key view. clocks: the text of the clock at each stop; keys: what keys
 // changed; heard: how the sound runs along; heap: bytes of JavaScript after the second and after the tenth of ten loops; errors,
 // requests: as look_at_page.mjs. A page of a still scene takes no stops: still.png.
 import { mkdirSync, writeFileSync } from 'node:fs';
@@ -10,7 +11,8 @@ import { join, resolve } from 'node:path';
 
 import { openBrowser, pause } from '../../tests/support/browser.mjs';
 
-const [chromium, page, folder, width, height, ...stops] = process.argv.slice(2);
+const [chromium, page, folder, width, height, ...words] = process.argv.slice(2);
+const asFilm = words[0] === 'film', stops = asFilm ? words.slice(1) : words;
 mkdirSync(folder, { recursive: true });
 const flags = [
   '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
@@ -67,24 +69,60 @@ const playLoops = async (count) => {
   return evaluate('window.seenLoops');
 };
 
-// Largest distance of the sound from the picture, as shares of the time, while it plays at speed 1; and whether the
-// button switches it off.
+// How the sound goes along: seconds between it and the slider (largest_apart: while all plays at speed 1; after_scrub: at
+// rest, and played_after_scrub: played on, after the slider was moved); level and hz: root mean square and pitch of what
+// is heard; stops: whether the button switches it off.
 const hear = async () => {
   const sound = 'document.getElementById("heard")';
-  await evaluate('document.getElementById("speed").value = "1"');
-  let apart = 0;
-  for (let i = 0; i < 20; ++i) {
-    await pause(60);
-    const share = await evaluate(`(() => {
-      const moment = document.getElementById('moment'), facts = JSON.parse(document.getElementById('facts').textContent);
-      return Math.abs(moment.value / moment.max - ${sound}.currentTime / facts.motion.seconds);
-    })()`);
-    if (share < 0.5) apart = Math.max(apart, share);  // else it loops just now
-  }
-  const plays = await evaluate(`!${sound}.paused`);
+  await evaluate(`(() => {
+    const facts = JSON.parse(document.getElementById('facts').textContent), moment = document.getElementById('moment');
+    // Within one frame of the browser, after the page has drawn it.
+    window.apart = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() =>
+      done(Math.abs(moment.value / moment.max * facts.motion.seconds - ${sound}.currentTime)))));
+    document.getElementById('speed').value = '1';
+  })()`);
+  const largest = async (times) => {
+    const all = [];
+    for (let i = 0; i < times; ++i) {
+      await pause(60);
+      all.push(await evaluate('window.apart()'));
+    }
+    return Math.max(...all.filter((seconds) => seconds < 1));  // others: it loops just now
+  };
+  await pause(1000);
+  const result = { largest_apart: await largest(20), plays: await evaluate(`!${sound}.paused`) };
+  const listened = await evaluate(`(async () => {
+    const context = new AudioContext(), analyser = context.createAnalyser();
+    context.createMediaStreamSource(${sound}.captureStream()).connect(analyser);
+    await context.resume();
+    const wave = new Float32Array(analyser.fftSize), pitch = new Float32Array(analyser.frequencyBinCount);
+    let level = 0, hz = 0;
+    for (let i = 0; i < 30; ++i) {
+      await new Promise((done) => setTimeout(done, 50));
+      analyser.getFloatTimeDomainData(wave);
+      const now = Math.hypot(...wave) / Math.sqrt(wave.length);
+      if (now <= level) continue;
+      level = now;
+      analyser.getFloatFrequencyData(pitch);
+      hz = pitch.indexOf(Math.max(...pitch)) * context.sampleRate / analyser.fftSize;
+    }
+    await context.close();
+    return { level, hz };
+  })()`);
+  // A person drags the slider while it plays, and plays on.
+  await evaluate('document.getElementById("moment").focus()');
+  await key('Home');
+  for (const name of ['PageUp', 'PageUp', 'ArrowRight', 'ArrowRight']) await key(name);
+  await pause(500);
+  result.after_scrub = await evaluate('window.apart()');
+  result.scrubbed_to = await evaluate(`${sound}.currentTime`);
+  await evaluate('document.activeElement.blur()');
+  await key(' ');
+  await pause(300);
+  result.played_after_scrub = await largest(8);
   await evaluate('document.getElementById("sound").click()');
   await pause(300);
-  return { apart, plays, stops: await evaluate(`${sound}.paused`) };
+  return { ...result, ...listened, stops: await evaluate(`${sound}.paused`) };
 };
 
 const look = async () => {
@@ -104,6 +142,7 @@ const look = async () => {
     return result;
   }
   const seconds = [await clock()];
+  if (asFilm) await evaluate('document.getElementById("film").click()');
   await evaluate('document.getElementById("moment").focus()');
   for (const stop of stops) {
     await key('Home');

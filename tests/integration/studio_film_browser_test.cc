@@ -5,31 +5,33 @@
 #include <signal.h>
 
 #include <cmath>
-#include <cstdlib>
-#include <nlohmann/json.hpp>
+#include <filesystem>
 
 #include "core/base/files.h"
 #include "core/color/lab.h"
+#include "core/image/credit/picture_credit.h"
+#include "core/image/probe/probe.h"
+#include "core/video/film_reader.h"
 #include "core/video/mp4_writer.h"
-#include "tests/integration/service_fixture.h"
+#include "tests/integration/studio_fixture.h"
 #include "tests/support/formats/sound_film.h"
 #include "tests/support/scenes/wall_pan.h"
 
 namespace color3d {
 namespace {
+namespace fs = std::filesystem;
 using std::chrono::seconds;
+using ::testing::Contains;
+using ::testing::Each;
 using ::testing::ElementsAre;
+using ::testing::Gt;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Pair;
 
 constexpr int kWidth = 192, kHeight = 128;
 constexpr int kFramesOfShot = 14;
 constexpr double kFramesPerSecond = 8.0;
-
-bool CanRun(const std::string& program, const ScratchFolder& scratch) {
-  return RunProcess({"env", program, "--version"}, scratch.path() / "log", seconds(30)).exit_code ==
-         0;
-}
 
 // Grey. Two places of a wall, far from each other and of another contrast.
 Image FilmFrame(int frame) {
@@ -45,14 +47,8 @@ Image FilmFrame(int frame) {
   return SrgbFromLab(lab);
 }
 
-class StudioFilmTest : public ServiceTest {
+class StudioFilmTest : public StudioTest {
  protected:
-  void SetUp() override {
-    if (!CanRun("chromium", folder_)) GTEST_SKIP() << "skipped, because there is no Chromium";
-    if (!CanRun("node", folder_)) GTEST_SKIP() << "skipped, because there is no Node";
-    ::setenv("XDG_DATA_HOME", Path("home").c_str(), 1);
-    StartServer();
-  }
   std::string WriteFilm() {
     ThreadPool pool(1);
     Mp4Writer writer(Path("silent.mp4"),
@@ -69,19 +65,12 @@ class StudioFilmTest : public ServiceTest {
 
 TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
   Process studio(ClientCommand({"studio", "--no-open"}), Path("studio"));
-  EXPECT_TRUE(WaitUntil([&] { return studio.Out().find('\n') != std::string::npos; }, seconds(30)))
-      << studio.Err();
-  const std::string out = studio.Out();
-  std::vector<std::string> command = {
-      "node", COLOR3D_USE_FILM, "chromium", out.substr(0, out.find('\n')), WriteFilm()};
-  const char* screenshots = std::getenv("COLOR3D_SCREENSHOTS");
-  if (screenshots != nullptr) command.emplace_back(screenshots);
-  const ProcessResult used = RunProcess(command, Path("browser"), seconds(800));
-  ASSERT_EQ(used.exit_code, 0) << used.err << studio.Err();
-  const auto seen = nlohmann::json::parse(used.out);
-  EXPECT_THAT(seen.at("errors"), IsEmpty()) << seen.at("errors");
-  EXPECT_THAT(seen.at("requests"), IsEmpty()) << seen.at("requests");
-  EXPECT_THAT(seen.at("wide"), IsEmpty()) << seen.at("wide");
+  const fs::path saved = Path("saved");
+  const auto seen = Use(COLOR3D_USE_FILM, {AddressOf(studio), WriteFilm(), saved}, seconds(800));
+  ASSERT_TRUE(seen.is_object());
+  for (const char* none : {"errors", "requests", "wide", "faint"}) {
+    EXPECT_THAT(seen.at(none), IsEmpty()) << seen.at(none);
+  }
   const auto& facts = seen.at("facts");
   SCOPED_TRACE(facts.dump(1));
   const auto text = [&](const char* page) { return seen.at("texts").at(page).get<std::string>(); };
@@ -110,6 +99,21 @@ TEST_F(StudioFilmTest, FilmBecomesColoredAndPlays) {
   EXPECT_THAT(facts.at("part_by_key"), ElementsAre(1, end));
   EXPECT_THAT(facts.at("part_undone"), ElementsAre(0, end));
   EXPECT_THAT(facts.at("part_kept"), ElementsAre(1, end));
+  EXPECT_THAT(text("done"), HasSubstr("automatic colours"));
+  EXPECT_THAT(text("again"), HasSubstr("coloured by you")) << "the part";
+  // What was saved before: pictures with the credit, the movie with its sound and its frames.
+  const std::string frame = ReadFile(saved / "scene_frame_000005.jpg");
+  EXPECT_THAT(ReadPictureTexts(frame, "frame"),
+              Contains(Pair("2:120", HasSubstr("Coloured by Erika Müller."))));
+  EXPECT_EQ(ProbeImage(frame, "frame").width, kWidth);
+  EXPECT_THAT(ReadPictureTexts(ReadFile(saved / "key_view_colored.png"), "key"),
+              Contains(Pair("Description", HasSubstr("Coloured by Erika Müller."))));
+  EXPECT_TRUE(FilmReader(saved / "scene.mp4").facts().has_sound);
+  EXPECT_EQ(FilmReader(saved / "side_by_side.mp4").times().size(), 2u * kFramesOfShot);
+  // Its coloured frame in grey and colour, and others.
+  EXPECT_GE(facts.at("sheet").size(), 6u);
+  EXPECT_THAT(facts.at("sheet"), Each(Gt(0)));
+  EXPECT_THAT(text("sheet"), HasSubstr("Frame 1\n"));
   const v1::Job job = NewestJob("colorize_scene");
   EXPECT_EQ(job.state(), v1::Job::STATE_SUCCEEDED);
   const auto& part = job.spec().colorize_scene().correct_colors().corrections(0);

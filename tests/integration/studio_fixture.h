@@ -34,12 +34,14 @@ class StudioTest : public ServiceTest {
     return out.substr(0, out.find('\n'));
   }
   // Runs a script of client/studio with Chromium, and returns what it saw.
-  nlohmann::json Use(const std::string& script, std::vector<std::string> arguments) {
+  nlohmann::json Use(const std::string& script,
+                     std::vector<std::string> arguments,
+                     std::chrono::seconds limit = std::chrono::seconds(500)) {
     arguments.insert(arguments.begin(), {"node", script, "chromium"});
     if (const char* screenshots = std::getenv("COLOR3D_SCREENSHOTS")) {
       arguments.emplace_back(screenshots);
     }
-    const ProcessResult used = RunProcess(arguments, Path("browser"), std::chrono::seconds(500));
+    const ProcessResult used = RunProcess(arguments, Path("browser"), limit);
     EXPECT_EQ(used.exit_code, 0) << used.err;
     return nlohmann::json::parse(used.out, nullptr, /*allow_exceptions=*/false);
   }

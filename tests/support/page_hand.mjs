@@ -2,7 +2,7 @@
 //   const hand = openPage(CHROMIUM, ADDRESS, SCREENSHOTS, options);
 //   await hand.tell(async () => { await hand.click('#start'); return { ... }; });
 // Selectors are CSS, or XPath if they begin with "//".
-import { mkdirSync, writeFileSync } from 'node:fs';
+import { existsSync, mkdirSync, readdirSync, writeFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
 
 import { openBrowser, pause } from './browser.mjs';
@@ -99,6 +99,22 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
     await send('DOM.setFileInputFiles', { nodeId, files: [resolve(file)] });
   };
 
+  // What the page saves goes to this folder, until another is named.
+  let saved;
+  const saveTo = async (folder) => {
+    saved = resolve(folder);
+    mkdirSync(saved, { recursive: true });
+    await send('Browser.setDownloadBehavior', { behavior: 'allow', downloadPath: saved }, null);
+  };
+  const savedAs = async (name, limit = 120000) => {
+    for (const end = Date.now() + patience * limit; Date.now() < end; await pause(every)) {
+      if (existsSync(join(saved, name)) && !readdirSync(saved).some((file) => file.endsWith('.crdownload'))) return;
+    }
+    throw new Error(`${name} was not saved; there are ${readdirSync(saved)}`);
+  };
+  // A link or button of the page by its text.
+  const clickText = (text) => click(`//main//*[self::a or self::button][normalize-space()="${text}"]`);
+
   // Leaves NAME.png in SCREENSHOTS, if that is given.
   const keep = async (name) => {
     if (!screenshots) return;
@@ -154,5 +170,8 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
     await close();
     process.exit(failed);
   };
-  return { send, evaluate, origin, seen, waitFor, boxOf, mouse, clickAt, click, drag, press, type, drop, choose, keep, look, tell };
+  return {
+    send, evaluate, origin, seen, waitFor, boxOf, mouse, clickAt, click, drag, press, type, drop, choose,
+    saveTo, savedAs, clickText, keep, look, tell,
+  };
 };

@@ -187,7 +187,9 @@ Json FindJson(Connection& connection, const std::vector<v1::Job>& jobs, const ch
 }
 
 Json FrameJson(const v1::FurtherKeyView& entry) {
-  Json json = {{"view", entry.view()}, {"automatic", entry.color().automatic()}};
+  const v1::KeyColorSource& color = entry.color();
+  const bool has_strokes = color.backend_input().has_points();
+  Json json = {{"view", entry.view()}, {"automatic", color.automatic() && !has_strokes}};
   json["begin_s"] = entry.has_begin_s() ? Json(entry.begin_s()) : Json();
   json["end_s"] = entry.has_end_s() ? Json(entry.end_s()) : Json();
   return json;

@@ -1,7 +1,6 @@
 #include "client/studio/film/film_routes.h"
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <memory>
 
@@ -29,16 +28,6 @@ const char* MediaTypeOfFilm(const fs::path& film) {
   if (ending == ".mov") return "video/quicktime";
   if (ending == ".ogv") return "video/ogg";
   return "video/mp4";
-}
-
-int NumberOf(const Request& request, const char* field) {
-  const std::string text = request.get_param_value(field);
-  int number = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || number < 0) {
-    throw InvalidArgument("{} is not a number of the film's frames", field);
-  }
-  return number;
 }
 
 const PhotoFolder& RequireFilm(const PhotoFolder& folder) {
@@ -131,7 +120,7 @@ void AddFilmRoutes(const FilmRouteParts& parts, const StudioRoutes& routes) {
         const fs::path film = parts.fetch(request.matches[1], request.get_param_value("name"));
         const bool gray = request.get_param_value("gray") == "1";
         response.set_content(
-            parts.frames.JpegOfFile(film, NumberOf(request, "frame"), SideOf(request), gray),
+            parts.frames.JpegOfFile(film, FrameNumberOf(request), SideOf(request), gray),
             "image/jpeg");
       });
 }

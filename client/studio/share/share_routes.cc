@@ -1,9 +1,10 @@
 #include "client/studio/share/share_routes.h"
 
+#include <fmt/core.h>
+
 #include <memory>
 #include <utility>
 
-#include "client/lib/out_folder.h"
 #include "client/options/credit_flags.h"
 #include "client/studio/found_photos.h"
 #include "client/studio/run_progress.h"
@@ -98,13 +99,20 @@ class SharePages {
 
   // A picture of a job with the credit.
   void SendPicture(const Request& request, Response& response) const {
-    const std::string job = request.matches[1], name = request.get_param_value("name");
-    if (!IsSafeRelativePath(name)) throw InvalidArgument("the name of the file is not possible");
-    const fs::path file = SafePathBelow(parts_.downloads / job, name);
-    const std::string type = parts_.calls->Fetch(job, name, file);
+    const std::string name = request.get_param_value("name");
+    const auto [file, type] = parts_.fetched->Of(request.matches[1], name);
     const CreditFlags credit = CreditOf(request);
     response.set_content(WithCredit(ReadFile(file), credit, name), type);
     SetDownloadName(fs::path(name).filename().string(), response);
+  }
+
+  // A frame of a movie of a job with the credit.
+  void SendFrame(const Request& request, Response& response) const {
+    const fs::path movie = MovieOf(request);
+    const int frame = FrameNumberOf(request);
+    const std::string jpeg = parts_.frames->JpegOfFile(movie, frame, 0, /*gray=*/false);
+    response.set_content(WithCredit(jpeg, CreditOf(request), "frame.jpg"), "image/jpeg");
+    SetDownloadName(fmt::format("{}_frame_{:06}.jpg", PlainName(movie), frame), response);
   }
 
   // A photo of the user's in the colours of the scene: for the page, or to keep with the credit.
@@ -142,13 +150,8 @@ class SharePages {
   }
 
   void SendSideBySide(const Request& request, Response& response) const {
-    const std::string job = request.matches[1], name = request.get_param_value("name");
-    if (!IsSafeRelativePath(name) || !name.ends_with(".mp4")) {
-      throw InvalidArgument("the name of the movie is not possible");
-    }
-    const fs::path movie = SafePathBelow(parts_.downloads / job, name);
-    parts_.calls->Fetch(job, name, movie);
-    const ScratchFolder scratch(parts_.downloads);
+    const fs::path movie = MovieOf(request);
+    const ScratchFolder scratch(parts_.fetched->folder());
     const fs::path both = scratch.path() / "both.mp4";
     WriteSideBySide(movie, both, *parts_.cancel);
     response.set_content(ReadFile(both), "video/mp4");
@@ -156,6 +159,11 @@ class SharePages {
   }
 
  private:
+  fs::path MovieOf(const Request& request) const {
+    const std::string name = request.get_param_value("name");
+    if (!name.ends_with(".mp4")) throw InvalidArgument("the name of the movie is not possible");
+    return parts_.fetched->Of(request.matches[1], name).file;
+  }
   CreditFlags CreditOf(const Request& request) const {
     return {KeptCredit(parts_.folder), request.get_param_value("caption") == "1"};
   }
@@ -201,6 +209,7 @@ void AddShareRoutes(const StudioRoutes& routes, const ShareParts& parts, const S
                });
   };
   send("/picture", &SharePages::SendPicture);
+  send("/film/picture", &SharePages::SendFrame);
   send("/colored", &SharePages::SendColored);
   send("/colored\\.zip", &SharePages::SendZip);
   send("/side-by-side", &SharePages::SendSideBySide);

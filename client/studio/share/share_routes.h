@@ -6,17 +6,18 @@
 #include <string>
 
 #include "client/lib/photos/photo_folder.h"
+#include "client/studio/fetched_files.h"
+#include "client/studio/film/film_frames.h"
 #include "client/studio/share/share_calls.h"
-#include "client/studio/studio_calls.h"
 #include "client/studio/studio_routes.h"
 
 namespace color3d::client {
 
 struct ShareParts {
-  std::filesystem::path folder;     // keeps the credit that the user typed
-  std::filesystem::path downloads;  // for files of the service; ends with the studio
+  std::filesystem::path folder;  // keeps the credit that the user typed
   std::function<PhotoFolder(const std::string& set)> photos_of;
-  const StudioCalls* calls = nullptr;
+  FetchedFiles* fetched = nullptr;
+  FilmFrames* frames = nullptr;
   const CancellationToken* cancel = nullptr;
 };
 

@@ -43,15 +43,18 @@ const showShare = (value, fromSlider = false) => {
   again = 1;
 };
 
-// The sound of the film runs along: it is set right when it is off by more than kHeard seconds.
-const kHeard = 0.15;
+// The sound of the film runs along, and what moves goes by it while it is heard. It is set right when it is off by more
+// than kApart seconds, or kApartAtRest; one seek after the other, as Chromium never ends a seek to the time of an earlier
+// one that goes on.
+const kApart = 0.3, kApartAtRest = 0.01;
 let sound = null;
 const hear = () => {
   if (!sound) return;
-  const now = share * facts.seconds;
+  const now = Math.min(share * facts.seconds, sound.duration || 0);
   const on = playing && pressed($('sound'));
   sound.playbackRate = Number($('speed').value);
-  if (Math.abs(sound.currentTime - now) > kHeard * Math.max(1, sound.playbackRate)) sound.currentTime = now;
+  const most = on && !sound.paused ? kApart * Math.max(1, sound.playbackRate) : kApartAtRest;
+  if (!sound.seeking && Math.abs(sound.currentTime - now) > most) sound.currentTime = now;
   if (on && sound.paused && !sound.ended) sound.play().catch(() => {});
   else if (!on && !sound.paused) sound.pause();
 };
@@ -73,12 +76,23 @@ const onSorted = () => {
   again = 2;
 };
 
+// The share of the time that is heard, after `seconds` more; NaN: none is, or it stands still.
+let lastHeard = NaN, stuck = 0;
+const heard = (seconds) => {
+  if (!sound || sound.paused || sound.ended || sound.seeking) return NaN;
+  stuck = sound.currentTime === lastHeard ? stuck + seconds : 0;
+  lastHeard = sound.currentTime;
+  return stuck < kApart ? lastHeard / facts.seconds : NaN;
+};
+
 // Once for each frame of the browser.
 const tick = () => {
   const now = performance.now();
   if (playing) {
-    const passed = Math.min(1, (now - last) / 1000) * Number($('speed').value);
-    const next = share + passed / facts.seconds;
+    const passed = Math.min(1, (now - last) / 1000), speed = Number($('speed').value);
+    const byClock = share + passed * speed / facts.seconds, bySound = heard(passed);
+    const isNear = Math.abs(bySound - byClock) * facts.seconds < kApart * Math.max(1, speed);
+    const next = isNear ? Math.max(share, bySound) : byClock;
     if (next < 1) {
       showShare(next);
     } else if (pressed($('loop'))) {
@@ -101,6 +115,7 @@ const tick = () => {
 const step = (steps) => {
   play(false);
   showShare(share + steps / Math.max(1, facts.steps - 1));
+  hear();
 };
 
 // Space plays, comma and full stop go one time step, wherever the focus is not on a control that
@@ -141,6 +156,7 @@ const wire = (soundAddress) => {
   if (soundAddress) {
     sound = $('heard');
     sound.src = soundAddress;
+    sound.onloadedmetadata = sound.onseeked = hear;
     $('sound').onclick = () => {
       press($('sound'), !pressed($('sound')));
       hear();
@@ -149,6 +165,7 @@ const wire = (soundAddress) => {
   slider.oninput = () => {
     play(false);
     showShare(slider.value / slider.max, true);
+    hear();
   };
   $('play').onclick = () => play(!playing);
   $('loop').onclick = () => press($('loop'), !pressed($('loop')));
@@ -161,6 +178,7 @@ const wire = (soundAddress) => {
 const showShown = () => {
   play(false);
   showShare((facts.shown - motion.begin) / span);
+  hear();
 };
 
 // Gives the viewer's Gaussians their motion. Their box grows to where they move, since the viewer

@@ -21,6 +21,7 @@ export interface PanelState {
   readonly proposals: readonly Proposal[];
   readonly allowsParts: boolean; // only a coloured film without poses has parts
   readonly whyNoParts: string;
+  readonly colored: ((frame: number) => string) | null; // address of a frame in colour
 }
 
 const ways: [Way, string][] = [['automatic', 'Automatic'], ['strokes', 'Paint'], ['picture', 'A picture I coloured']];
@@ -62,7 +63,7 @@ export class ColoringPanel {
     const at = clockOf(times[one.frame]!);
     const span = 'begin' in one ? `${clockOf(times[one.begin]!)} to ${clockOf(times[one.end + 1] ?? times[one.end]!)}` : '';
     const head = h('button', { type: 'button', class: 'film-item-head', id: `${list}-${index}`, 'aria-expanded': String(isPicked), onclick: () => this.on.pick(list, index) },
-      h('img', { src: frameUrl(state.set, names[one.frame]!, 120, true), alt: '', loading: 'lazy' }),
+      h('img', { src: one.way === 'kept' && state.colored ? state.colored(one.frame) : frameUrl(state.set, names[one.frame]!, 120, true), alt: '', loading: 'lazy' }),
       h('span', {}, h('span', { class: 'film-item-time' }, span || at), h('span', { class: 'small soft' }, span ? `${howOf(one)}, from ${at}` : howOf(one))));
     return h('li', { class: isPicked ? 'picked' : '' }, head, isPicked && this.detail(list, one, index, state));
   }

@@ -1,9 +1,10 @@
 // The page of a film: what was found, its timeline, and its colours as they come (#film/SET and #film/SET/JOB).
 import {
   artifactUrl, cancelJob, describeSet, follow, getState, keyViews, planRun, previewOfRun, retryJob, selectKey,
-  type Found, type Job, type KeyViews, type Run,
+  type Found, type Job, type KeyViews, type PhotoSet, type Run,
 } from '../api';
 import { bar, button, h, problem, replace, say } from '../dom';
+import { sharePanel } from '../share/panel';
 import { bytes, day, errorInWords, isFinished, seconds, stageName, stateName } from '../words';
 import {
   changeFilm, colorizeFilm, describeFilm, earlyUrl, filmUrl, frameUrl, movieFrameUrl, movieUrl, setAsFrames, timelineOf, type FilmFacts, type JobTimeline,
@@ -17,12 +18,6 @@ import { Workspace } from './workspace';
 
 const mostKeys = 4; // that are proposed before the first run
 const earlySide = 960, pictureSide = 160; // px
-const takeAway: [RegExp, string][] = [
-  [/^(film|scene)\.mp4$/, 'The coloured film'],
-  [/^view\.html$/, 'The scene as one page for any browser'],
-  [/^key_view_colored\.png$/, 'The coloured frame'],
-  [/^report\.html$/, 'The report: seen, inferred and guessed colours'],
-];
 
 // Selections that are known, so that going back and forth asks once.
 const selections = new Map<string, { job: string; views: KeyViews }>();
@@ -57,6 +52,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
   let plan: FilmPlan | undefined;
   let facts: FilmFacts;
   let found: Found;
+  let photoSet: PhotoSet | undefined;
   let proposals: Proposal[] = [];
   let run: Run | undefined;
   let finished: JobTimeline | undefined;
@@ -266,15 +262,11 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
   const showResults = async (jobs: Job[]): Promise<void> => {
     if (!run) return;
     const has = (name: string): boolean => run!.artifacts.some((artifact) => artifact.name === name);
-    const files = takeAway.flatMap(([pattern, text]) => run!.artifacts.filter(({ name }) => pattern.test(name))
-      .filter(({ name }) => name !== 'scene.mp4' || !has('film.mp4'))
-      .map((artifact) => h('li', {}, h('a', { href: artifactUrl(job, artifact.name, true), download: artifact.name }, artifact.name),
-        ` ${bytes(artifact.bytes)} `, h('span', { class: 'soft' }, text))));
     const others = jobs.filter((one) => one.scene === run!.scene && one.id !== job && one.state === 'SUCCEEDED');
     replace(more,
       has('view.html') && h('section', { 'aria-labelledby': 'in-3d' }, h('h2', { id: 'in-3d' }, 'The scene in 3D'),
         h('iframe', { src: artifactUrl(job, 'view.html'), sandbox: 'allow-scripts allow-pointer-lock', title: 'The scene in 3D', class: 'scene', id: 'scene' })),
-      h('section', { 'aria-labelledby': 'take' }, h('h2', { id: 'take' }, 'Take it with you'), h('ul', { class: 'downloads' }, ...files)),
+      sharePanel(run, photoSet, () => workspace?.now ?? 0),
       others.length > 0 && h('section', { 'aria-labelledby': 'versions' }, h('h2', { id: 'versions' }, 'Other versions'),
         h('ul', { class: 'downloads' }, ...others.map((one) => h('li', {}, h('a', { href: `#film/${set}/${one.id}` }, day(one.created_s)))))));
   };
@@ -319,6 +311,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
       if (left) return;
       facts = film;
       found = described.found;
+      photoSet = described;
       title.textContent = described.name;
       summary.textContent = factsOf(facts, null);
       const notFrames = async (): Promise<void> => {

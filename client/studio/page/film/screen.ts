@@ -36,6 +36,7 @@ export class Screen {
   private position = 0; // seconds, of frames that play one by one
   private last = 0;
   private wanted = -1;
+  private wantedTime: number | null = null; // of the movie, once its present seek has ended
   private loading = false;
   private ticking = 0;
   private ended = false;
@@ -60,6 +61,9 @@ export class Screen {
       this.seek(this.frame);
       if (this.playing) this.play(true);
     });
+    this.video.addEventListener('seeked', () => {
+      if (this.wantedTime !== null && this.playsMovie) this.seekMovie(this.wantedTime);
+    });
     this.video.addEventListener('ended', () => this.play(false));
   }
 
@@ -70,6 +74,7 @@ export class Screen {
     this.source = source;
     this.playsMovie = false;
     this.wanted = -1;
+    this.wantedTime = null;
     this.video.hidden = true;
     this.canvas.hidden = false;
     if (source.video) {
@@ -94,7 +99,7 @@ export class Screen {
     this.frame = Math.min(Math.max(0, frame), this.times.length - 1);
     this.position = this.times[this.frame]!;
     this.showEarly(null);
-    if (this.playsMovie) this.video.currentTime = insideOf(this.times, this.frame) - this.times[0]!;
+    if (this.playsMovie) this.seekMovie(insideOf(this.times, this.frame) - this.times[0]!);
     else this.draw();
     this.on.frame(this.frame);
   }
@@ -143,6 +148,12 @@ export class Screen {
     this.video.load();
   }
 
+  // One seek after the other: Chromium never ends a seek to the time of an earlier one that goes on.
+  private seekMovie(seconds: number): void {
+    this.wantedTime = this.video.seeking ? seconds : null;
+    if (this.wantedTime === null) this.video.currentTime = seconds;
+  }
+
   private startMovie(): void {
     this.video.play().catch((error: Error) => {
       if (error.name === 'AbortError' || !this.playing) return;
@@ -167,7 +178,7 @@ export class Screen {
     const now = performance.now();
     let frame: number;
     if (this.playsMovie) {
-      frame = frameAt(this.times, this.video.currentTime + this.times[0]!);
+      frame = this.wantedTime !== null ? this.frame : frameAt(this.times, this.video.currentTime + this.times[0]!);
     } else {
       this.position += this.speed * Math.min(1, (now - this.last) / 1000);
       const end = this.times[0]! + secondsOf(this.times);

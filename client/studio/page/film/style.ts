@@ -45,7 +45,7 @@ color:var(--soft);padding:.1rem .4rem;overflow:hidden;white-space:nowrap;text-ov
 .film-keys button::before{content:"";width:15px;height:15px;transform:rotate(45deg);border:2px solid var(--accent);background:var(--card);border-radius:2px}
 .film-key.used::before,.film-key[aria-pressed=true]::before{background:var(--accent)!important}
 .film-key[aria-pressed=true]::before{box-shadow:0 0 0 3px var(--card),0 0 0 5px var(--accent)}
-.film-key.proposed::before{border-style:dashed;border-color:var(--strong-line)}
+.film-keys .proposed::before{border:2px dotted var(--soft);border-radius:3px}
 .film-parts{height:3rem}
 .film-part{position:absolute;top:2px;height:44px;min-width:4px}
 .film-part-body{position:absolute;inset:0;width:100%;min-width:0;padding:0 .5rem;overflow:hidden;background:var(--wash);border-color:var(--accent);
@@ -60,6 +60,7 @@ border-radius:0;font-size:.82rem;justify-content:flex-start;white-space:nowrap}
 .film-head{position:absolute;inset-block:0;width:2px;margin-left:-1px;background:var(--ink);pointer-events:none;z-index:2}
 .film-head::before{content:"";position:absolute;top:0;left:-5px;border:6px solid transparent;border-top-color:var(--ink);border-bottom:0}
 .film-side>*{margin-bottom:1rem}
+.page-film .share{margin-top:2rem}
 .film-items{list-style:none;margin:0 0 .4rem;padding:0}
 .film-items li{border:1px solid var(--line);border-radius:8px;margin-bottom:.4rem;overflow:hidden}
 .film-items li.picked{border-color:var(--accent);box-shadow:0 0 0 1px var(--accent)}

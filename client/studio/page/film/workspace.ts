@@ -9,6 +9,8 @@ import { playerBar, Screen, type FilmSource } from './screen';
 import { Timeline, type Proposal } from './timeline';
 import { clockOf, secondsOf } from './timeline_model';
 
+const panelPictureSide = 160; // px
+
 export interface WorkspaceOptions {
   readonly set: string;
   readonly facts: FilmFacts;
@@ -86,12 +88,14 @@ export class Workspace {
 
   update(): void {
     const state = { picked: this.picked, proposals: this.options.proposals };
+    const { source } = this.options;
     const { list, index } = this.picked ?? { list: 'keys' as const, index: -1 };
     if (this.picked && !this.options.plan()[list][index]) this.picked = null;
     this.timeline.update(this.picked, state.proposals, this.now);
     this.panel.update({
       set: this.options.set, now: this.now, picked: this.picked, proposals: state.proposals,
       allowsParts: this.options.allowsParts, whyNoParts: this.options.whyNoParts,
+      colored: source.isColored ? (frame) => source.frame(frame, panelPictureSide) : null,
     });
   }
 

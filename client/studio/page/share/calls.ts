@@ -16,4 +16,6 @@ export const coloredUrl = (job: string, set: string, name: string, side: number)
   `/api/jobs/${job}/colored?${query({ set, name, side })}`;
 export const zipUrl = (job: string, set: string, side: number, withCaption: boolean): string =>
   `/api/jobs/${job}/colored.zip?${query({ set, ...(side ? { side } : {}), ...caption(withCaption) })}`;
+export const framePictureUrl = (job: string, name: string, frame: number, withCaption: boolean): string =>
+  `/api/jobs/${job}/film/picture?${query({ name, frame, ...caption(withCaption) })}`;
 export const sideBySideUrl = (job: string, name: string): string => `/api/jobs/${job}/side-by-side?${query({ name })}`;

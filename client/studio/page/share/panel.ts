@@ -2,7 +2,7 @@
 import { artifactUrl, type Artifact, type PhotoSet, type Run } from '../api';
 import { button, h, problem, replace } from '../dom';
 import { bytes } from '../words';
-import { makeFile, makeMovie, pictureUrl, sideBySideUrl, zipUrl, type Movie } from './calls';
+import { framePictureUrl, makeFile, makeMovie, pictureUrl, sideBySideUrl, zipUrl, type Movie } from './calls';
 import { creditForm, type CreditForm } from './credit';
 import { adoptShareStyle } from './style';
 import { waitFor } from './wait';
@@ -62,19 +62,27 @@ const movies = (run: Run): HTMLElement => {
     h('p', { class: 'row' }, make), place);
 };
 
-const film = (run: Run): HTMLElement => group('Film', 'The whole film in colour, with its sound; or beside itself in grey.',
-  file(run, 'film.mp4', 'Save the film'), h('p', { class: 'row' }, save(sideBySideUrl(run.id, 'film.mp4'), 'Save it beside grey')));
+// The movie of a film in colour; scenes have a turntable as scene.mp4.
+const filmOf = (run: Run): string | undefined =>
+  ['film.mp4', ...(find(run, 'view.html') ? [] : ['scene.mp4'])].find((name) => find(run, name));
+
+const film = (run: Run, name: string): HTMLElement => group('Film', 'The whole film in colour, with its sound; or beside itself in grey.',
+  file(run, name, 'Save the film'), h('p', { class: 'row' }, save(sideBySideUrl(run.id, name), 'Save it beside grey')));
 
 // Addresses follow the credit, which the studio must have kept before a picture is saved.
-const pictures = (run: Run, set: PhotoSet | undefined, form: CreditForm): { element: HTMLElement; refresh: () => void } => {
+const pictures = (
+  run: Run, set: PhotoSet | undefined, form: CreditForm, shownFrame: (() => number) | undefined,
+): { element: HTMLElement; refresh: () => void } => {
+  const movie = filmOf(run);
   const row = h('div', {});
   const size = h('select', { id: 'zip-size', onchange: () => refresh() }, ...sizes.map(([value, text]) => h('option', { value }, text)));
-  const link = (href: string, text: string, name = ''): HTMLElement => {
-    const anchor = save(href, text, name);
+  const link = (href: () => string, text: string, name = ''): HTMLElement => {
+    const anchor = save(href(), text, name) as HTMLAnchorElement;
     anchor.addEventListener('click', (event) => {
       if (anchor.dataset.kept) return delete anchor.dataset.kept;
       event.preventDefault();
       return void form.kept().then(() => {
+        anchor.href = href();
         anchor.dataset.kept = '1';
         anchor.click();
       });
@@ -85,11 +93,13 @@ const pictures = (run: Run, set: PhotoSet | undefined, form: CreditForm): { elem
     const caption = form.wantsCaption();
     const key = find(run, 'key_view_colored.png');
     replace(row,
-      key && h('p', { class: 'row' }, link(pictureUrl(run.id, key.name, caption), 'Save the key photo', key.name)),
-      !!set && !find(run, 'film.mp4') && h('p', { class: 'row' },
-        link(zipUrl(run.id, set.id, Number(size.value), caption), 'Save all photos in colour'),
+      key && h('p', { class: 'row' }, link(() => pictureUrl(run.id, key.name, caption), movie ? 'Save the coloured frame' : 'Save the key photo', key.name)),
+      !!movie && !!shownFrame && h('p', { class: 'row' },
+        link(() => framePictureUrl(run.id, movie, shownFrame(), caption), 'Save the frame that is shown')),
+      !!set && !movie && h('p', { class: 'row' },
+        link(() => zipUrl(run.id, set.id, Number(size.value), caption), 'Save all photos in colour'),
         h('label', { for: 'zip-size', class: 'said' }, 'Size of the photos'), size),
-      !!set && !find(run, 'film.mp4') && h('p', { class: 'soft small' }, 'A ZIP of JPEGs. It comes when all are ready: about a second each.'));
+      !!set && !movie && h('p', { class: 'soft small' }, 'A ZIP of JPEGs. It comes when all are ready: about a second each.'));
   };
   refresh();
   return {
@@ -117,11 +127,12 @@ const others = (run: Run): HTMLElement => {
   return group('For other programs', 'The scene in the formats of viewers and editors.', ...rows);
 };
 
-export const sharePanel = (run: Run, set: PhotoSet | undefined): HTMLElement => {
+// `shownFrame`: of a film, the number of the frame that the page shows.
+export const sharePanel = (run: Run, set: PhotoSet | undefined, shownFrame?: () => number): HTMLElement => {
   adoptShareStyle();
   let refresh = (): void => undefined;
   const form = creditForm(() => refresh());
-  const shown = pictures(run, set, form);
+  const shown = pictures(run, set, form, shownFrame), movie = filmOf(run);
   refresh = shown.refresh;
   const has = (name: string): boolean => !!find(run, name);
   return h('section', { class: 'share', 'aria-labelledby': 'share-title' },
@@ -130,7 +141,9 @@ export const sharePanel = (run: Run, set: PhotoSet | undefined): HTMLElement => 
     h('div', { class: 'share-groups' },
       has('view.html') && group('One page for any browser', 'Send this one file: it needs no program and no network.',
         file(run, 'view.html', 'Save the page'), file(run, 'report.html', 'Save the report')),
-      has('film.mp4') && film(run),
+      !!movie && film(run, movie),
+      !has('view.html') && has('report.html') && group('The report', 'Where colours are seen, inferred and guessed, as one page.',
+        file(run, 'report.html', 'Save the report')),
       has('view.html') && movies(run),
       shown.element,
       (has('scene.ply') || has('scene.sog')) && others(run)));

@@ -4,7 +4,7 @@ import { button, h, problem, replace, say } from '../dom';
 import { setStepsOf } from '../main';
 import { coloredUrl, getCredit } from './calls';
 import { adoptShareStyle } from './style';
-import { creditText, pagesOf, spread, stem } from './texts';
+import { creditText, frameText, pagesOf, spread, stem } from './texts';
 
 const onFirstPage = 9, onOthers = 12, mostPhotos = 57;
 const sideOfThumb = 640; // px
@@ -26,8 +26,9 @@ const picturesOf = async (run: Run, set: PhotoSet | undefined): Promise<{ key: P
   if (original) key.unshift({ src: artifactUrl(run.id, original.name), text: `Key photo, original${run.key_view ? `: ${stem(run.key_view)}` : ''}` });
   const found = set && (await describeSet(set.id)).found;
   if (!set || !found || found.kind !== 'photos') {
+    const isScene = run.artifacts.some(({ name }) => name === 'view.html');
     const drawn = run.artifacts.filter(({ name }) => /^renders\/.*\.png$/.test(name));
-    return { key, others: spread(drawn, mostPhotos).map(({ name }) => ({ src: artifactUrl(run.id, name), text: `${stem(name)}, drawn from the scene` })) };
+    return { key, others: spread(drawn, mostPhotos).map(({ name }) => ({ src: artifactUrl(run.id, name), text: isScene ? `${stem(name)}, drawn from the scene` : frameText(stem(name)) })) };
   }
   const rest = found.photos.filter(({ name }) => !run.key_view || stem(name) !== stem(run.key_view));
   return { key, others: spread(rest, mostPhotos).map(({ name }) => ({ src: coloredUrl(run.id, set.id, name, sideOfThumb), text: stem(name) })) };

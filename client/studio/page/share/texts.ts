@@ -18,5 +18,11 @@ export const pagesOf = <T>(items: readonly T[], first: number, others: number): 
 export const spread = <T>(items: readonly T[], count: number): T[] =>
   items.length <= count ? [...items] : Array.from({ length: count }, (_, i) => items[Math.floor(i * items.length / count)]!);
 
+// What people call a frame of a film: "f000012" is the 13th.
+export const frameText = (name: string): string => {
+  const number = /^f(\d+)$/.exec(name)?.[1];
+  return number ? `Frame ${Number(number) + 1}` : name;
+};
+
 // The name of a file without folders and ending.
 export const stem = (name: string): string => name.replace(/^.*\//, '').replace(/\.[^.]*$/, '');

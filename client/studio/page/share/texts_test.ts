@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { creditText, pagesOf, spread, stem } from './texts';
+import { creditText, frameText, pagesOf, spread, stem } from './texts';
 
 const none = { colored_by: '', key_view_by: '', source: '', licence: '' };
 
@@ -27,4 +27,9 @@ test('a spread keeps order and ends', () => {
 test('a stem has neither folder nor ending', () => {
   assert.equal(stem('a/b.c.jpg'), 'b.c');
   assert.equal(stem('a'), 'a');
+});
+
+test('frames are counted from one', () => {
+  assert.equal(frameText('f000012'), 'Frame 13');
+  assert.equal(frameText('001'), '001');
 });
