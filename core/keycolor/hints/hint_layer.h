@@ -48,11 +48,11 @@ HintLayer LayerOfHints(const Image& luminance,
                        const LayerOptions& options,
                        const RunControl& control,
                        const HintPictures& pictures = {},
-                       GridHierarchy* prepared = nullptr);
+                       QuickGrid* prepared = nullptr);
 
-// What LayerOfHints needs of the picture alone, for quick answers to changing hints, with the same
-// result. The pool must outlive it.
-std::shared_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
+// What LayerOfHints needs of the picture alone, for quick answers to changing hints, near the layer
+// (quick_grid.h), whatever the tolerance. The pool must outlive it.
+std::shared_ptr<QuickGrid> PrepareLayer(const Image& luminance,
                                             const LayerOptions& options,
                                             ThreadPool& pool);
 

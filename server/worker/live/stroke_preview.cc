@@ -101,7 +101,7 @@ StrokePreview::Shared StrokePreview::Below(const Request& request,
 }
 
 StrokePreview::Shared StrokePreview::Grid(
-    const std::string& key, const std::function<std::shared_ptr<GridHierarchy>()>& prepare) {
+    const std::string& key, const std::function<std::shared_ptr<QuickGrid>()>& prepare) {
   return cache_.Get(key, [&] {
     Prepared prepared;
     prepared.grid = prepare();

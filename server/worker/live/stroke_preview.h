@@ -36,7 +36,7 @@ class StrokePreview {
     Image planes = {};  // L; or a, b; or none
     int own_width = 0;
     int own_height = 0;
-    std::shared_ptr<GridHierarchy> grid = {};  // of the strokes alone, or above other colours
+    std::shared_ptr<QuickGrid> grid = {};  // of the strokes alone, or above other colours
     int64_t bytes = 0;
   };
   using Shared = std::shared_ptr<const Prepared>;
@@ -57,7 +57,7 @@ class StrokePreview {
   Image SrgbOf(const Image& luminance, const Image& ab);
   // What `prepare` makes of a photo for quick solutions, or what is kept of it.
   Shared Grid(const std::string& key,
-              const std::function<std::shared_ptr<GridHierarchy>()>& prepare);
+              const std::function<std::shared_ptr<QuickGrid>()>& prepare);
   // Of solutions that nobody watches or ends.
   RunControl Control() { return {pool_, checkpoints_, progress_, never_}; }
 
