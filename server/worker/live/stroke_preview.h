@@ -26,10 +26,10 @@ class StrokePreview {
     return !request.points().empty() || request.automatic();
   }
 
-  // Returns the coloured picture, sRGB: at the picture's own size as colorize_key_view makes it, at
-  // a smaller one with strokes that are reduced like the picture. Throws Error{kInvalidArgument}
-  // for malformed strokes and pictures of other shapes.
-  Image Colorize(const Request& request, const ReadBlob& read_blob);
+  // Returns the coloured picture as a PNG: at the picture's own size as colorize_key_view makes it,
+  // at a smaller one with strokes that are reduced like the picture, and with colours near those.
+  // Throws Error{kInvalidArgument} for malformed strokes and pictures of other shapes.
+  std::string Colorize(const Request& request, const ReadBlob& read_blob);
 
  private:
   struct Prepared {
@@ -54,7 +54,7 @@ class StrokePreview {
                        const std::vector<ColorHint>& hints,
                        bool is_preview,
                        const std::string& key);
-  Image SrgbOf(const Image& luminance, const Image& ab);
+  std::string PngOf(const Image& luminance, const Image& ab, bool is_preview);
   // What `prepare` makes of a photo for quick solutions, or what is kept of it.
   Shared Grid(const std::string& key,
               const std::function<std::shared_ptr<QuickGrid>()>& prepare);
