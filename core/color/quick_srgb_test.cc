@@ -24,11 +24,8 @@ TEST(QuickSrgbTest, IsTheExactColorToOneLevel) {
   }
   const Image exact = SrgbFromLab(lab);
   std::vector<uint8_t> rgb(lab.data.size());
-  QuickSrgbFromLab(lab.Plane(0),
-                   lab.Plane(1),
-                   lab.Plane(2),
-                   static_cast<int64_t>(lab.PlaneSize()),
-                   rgb.data());
+  QuickSrgbFromLab(
+      lab.Plane(0), lab.Plane(1), lab.Plane(2), static_cast<int64_t>(lab.PlaneSize()), rgb.data());
   int64_t other = 0;
   for (size_t i = 0; i < lab.PlaneSize(); ++i) {
     for (int c = 0; c < 3; ++c) {

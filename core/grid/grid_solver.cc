@@ -62,7 +62,8 @@ class Solver {
     cycle_ = own_cycle_.get();
     MakeVectors();
   }
-  // The system is that of `work`; with clusters and a cycle of the same edges without pins and data.
+  // The system is that of `work`; with clusters and a cycle of the same edges without pins and
+  // data.
   Solver(SolverWork& work,
          const std::vector<float>& target,
          const Clusters& clusters,

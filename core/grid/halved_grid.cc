@@ -63,14 +63,14 @@ GridSystem HalvedGrid(const GridSystem& fine) {
       const int x = 2 * cx, y = 2 * cy;
       const int64_t i = static_cast<int64_t>(cy) * half.width + cx;
       const bool is_last = cx + 1 == half.width;
-      half.data[i] = e.At(fine.data, x, y) + e.At(fine.data, x + 1, y) +
-                     e.At(fine.data, x, y + 1) + e.At(fine.data, x + 1, y + 1);
+      half.data[i] = e.At(fine.data, x, y) + e.At(fine.data, x + 1, y) + e.At(fine.data, x, y + 1) +
+                     e.At(fine.data, x + 1, y + 1);
       if (!is_last) half.right[i] = RightOfCell(e, x, y);
       if (cy + 1 == half.height) continue;
       half.down[i] = DownOfCell(e, x, y);
       if (!is_last) {
-        half.down_right[i] = InSeries(
-            e.DownRight(x, y), e.DownRight(x + 1, y + 1), e.DownRight(x + 2, y + 2));
+        half.down_right[i] =
+            InSeries(e.DownRight(x, y), e.DownRight(x + 1, y + 1), e.DownRight(x + 2, y + 2));
       }
       if (cx > 0) {
         half.down_left[i] =

@@ -52,7 +52,8 @@ std::vector<float> QuickGrid::Beginning(const std::vector<uint8_t>& pinned,
     const size_t cell_row = static_cast<size_t>(y / factor_) * width;
     for (int x = 0; x < fine_.width(); ++x) {
       const size_t i = row + x, cell = cell_row + x / factor_;
-      if (data != nullptr) cell_data[static_cast<int64_t>(cell)] += (*data)[static_cast<int64_t>(i)];
+      if (data != nullptr)
+        cell_data[static_cast<int64_t>(cell)] += (*data)[static_cast<int64_t>(i)];
       if (!pinned[i]) continue;
       cell_pinned[cell] = 1;
       count[cell] += 1.0f;
@@ -68,12 +69,13 @@ std::vector<float> QuickGrid::Beginning(const std::vector<uint8_t>& pinned,
     cell_target[i + cells] /= count[i];
   }
   std::vector<float> begin = Enlarged(coarse_
-                                          .Solve(std::move(cell_pinned),
-                                                 data != nullptr ? &cell_data : nullptr,
-                                                 cell_target,
-                                                 kCoarse,
-                                                 [](int, double) {},
-                                                 cancel)
+                                          .Solve(
+                                              std::move(cell_pinned),
+                                              data != nullptr ? &cell_data : nullptr,
+                                              cell_target,
+                                              kCoarse,
+                                              [](int, double) {},
+                                              cancel)
                                           .u);
   if (is_change) {
     for (size_t i = 0; i < begin.size(); ++i) begin[i] += solved_before_[i];
@@ -124,12 +126,13 @@ GridSolution QuickGrid::Solve(std::vector<uint8_t> pinned,
   const bool is_first = data != nullptr || !KeepsPinsOf(pinned);
   const std::vector<float> start = Beginning(pinned, data, target, cancel);
   if (data == nullptr) pinned_before_ = pinned;
-  GridSolution solved = fine_.Solve(std::move(pinned),
-                                    data,
-                                    target,
-                                    {kEnough, is_first ? kFirstIterations : kIterations, &start},
-                                    [](int, double) {},
-                                    cancel);
+  GridSolution solved = fine_.Solve(
+      std::move(pinned),
+      data,
+      target,
+      {kEnough, is_first ? kFirstIterations : kIterations, &start},
+      [](int, double) {},
+      cancel);
   if (data == nullptr) solved_before_ = solved.u;
   return solved;
 }

@@ -1,6 +1,6 @@
-// About the solutions of one grid for pins that change a little from call to call, as while somebody
-// paints. A coarser grid gives a beginning; where pins were only added, of the change since the call
-// before. A few iterations on the grid itself follow.
+// About the solutions of one grid for pins that change a little from call to call, as while
+// somebody paints. A coarser grid gives a beginning; where pins were only added, of the change
+// since the call before. A few iterations on the grid itself follow.
 #pragma once
 
 #include <cstdint>

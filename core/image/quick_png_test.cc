@@ -32,7 +32,8 @@ TEST(QuickPngTest, IsReadAsItWas) {
     ASSERT_EQ(read.height, height);
     for (size_t i = 0; i < read.PlaneSize(); ++i) {
       for (int c = 0; c < 3; ++c) {
-        const int level = static_cast<int>(std::lround(255.0f * read.Plane(read.channels == 3 ? c : 0)[i]));
+        const int level =
+            static_cast<int>(std::lround(255.0f * read.Plane(read.channels == 3 ? c : 0)[i]));
         ASSERT_EQ(level, rgb[3 * i + static_cast<size_t>(c)]) << i;
       }
     }

@@ -53,8 +53,8 @@ HintLayer LayerOfHints(const Image& luminance,
 // What LayerOfHints needs of the picture alone, for quick answers to changing hints, near the layer
 // (quick_grid.h), whatever the tolerance. The pool must outlive it.
 std::shared_ptr<QuickGrid> PrepareLayer(const Image& luminance,
-                                            const LayerOptions& options,
-                                            ThreadPool& pool);
+                                        const LayerOptions& options,
+                                        ThreadPool& pool);
 
 // Replaces `below` by the colours of the layer, by its share.
 void LayAbove(const HintLayer& layer, Image* below);

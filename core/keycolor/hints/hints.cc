@@ -137,12 +137,14 @@ HintSolution KeyColorFromHints(const Image& luminance,
 }
 
 std::shared_ptr<QuickGrid> PrepareHints(const Image& luminance,
-                                            const HintOptions& options,
-                                            ThreadPool& pool) {
+                                        const HintOptions& options,
+                                        ThreadPool& pool) {
   options.Validate();
   RequireFiniteLuminance(luminance, "the colouring of the key view");
-  return std::make_shared<QuickGrid>(
-      SystemOfLuminance(luminance, options.sigma, pool), kSpreadHalvings, pool, CancellationToken());
+  return std::make_shared<QuickGrid>(SystemOfLuminance(luminance, options.sigma, pool),
+                                     kSpreadHalvings,
+                                     pool,
+                                     CancellationToken());
 }
 
 int64_t BytesOf(const QuickGrid& prepared) { return prepared.bytes(); }

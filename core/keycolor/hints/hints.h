@@ -94,11 +94,11 @@ HintSolution KeyColorFromHints(const Image& luminance,
                                QuickGrid* prepared = nullptr);
 
 // What KeyColorFromHints needs of the picture alone, for quick answers while hints are added: near
-// the colours (quick_grid.h), whatever the tolerance. The pool must outlive it. Requires: sides of at
-// most options.max_side_px.
+// the colours (quick_grid.h), whatever the tolerance. The pool must outlive it. Requires: sides of
+// at most options.max_side_px.
 std::shared_ptr<QuickGrid> PrepareHints(const Image& luminance,
-                                            const HintOptions& options,
-                                            ThreadPool& pool);
+                                        const HintOptions& options,
+                                        ThreadPool& pool);
 
 int64_t BytesOf(const QuickGrid& prepared);
 
