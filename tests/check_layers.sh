@@ -161,8 +161,8 @@ public core/colorizer colorizer corrector scene_batch personal/scene_colorizers 
 public core/encoder encoder image_tensors tap_encoder torch_errors torch_threads weight_digest \
   weight_tensors clip/clip convnext/convnext convnext/convnext_config convnext/convnext_weights \
   embedded/embedded_weights
-public core/grid edge_weights grid_solver
-public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling reduced weighted_resize \
+public core/grid edge_weights grid_solver quick_grid
+public core/image box_mean codec crop decode_budget draw fill_holes feature_matches flow_agreement guided_upsample image_checks local_features optical_flow plane_sampling quick_png reduced weighted_resize \
   credit/caption credit/picture_credit probe/focal_length probe/orientation probe/probe
 public core/keycolor edit_model from_image picture_checks recolor automatic/automatic external/remote \
   external/script hints/hint_layer hints/hint_map hints/hints references/reference words/prompt

@@ -15,6 +15,7 @@
 #include "core/color/lab.h"
 #include "core/image/codec.h"
 #include "core/image/decode_budget.h"
+#include "core/image/reduced.h"
 
 namespace color3d::client {
 namespace fs = std::filesystem;
@@ -202,7 +203,10 @@ const LocalFile& PhotoOfView(const PhotoFolder& folder, const std::string& name)
 }
 
 std::string PhotoJpeg(const LocalFile& photo, int max_side_px, bool gray) {
-  return PictureJpeg(ReadPhoto(photo), max_side_px, gray, kJpegQuality);
+  if (max_side_px <= 0) return PictureJpeg(ReadPhoto(photo), 0, gray, kJpegQuality);
+  // Of a large scan only the small picture is held as floats.
+  const Image small = DecodeImageWithin(ReadFile(photo.file), ViewName(photo), max_side_px);
+  return PictureJpeg(small, 0, gray, kJpegQuality);
 }
 
 std::string PictureJpeg(const Image& picture, int max_side_px, bool gray, int quality) {

@@ -9,6 +9,7 @@
 #include "client/studio/studio_fixture.h"
 #include "core/image/codec.h"
 #include "core/image/credit/picture_credit.h"
+#include "tests/support/formats/flat_png.h"
 
 namespace color3d::client {
 namespace {
@@ -66,6 +67,45 @@ TEST_F(StudioInputTest, NamesPhotosThatCannotBeRead) {
   const auto photos = nlohmann::json::parse(said).at("found").at("photos");
   EXPECT_FALSE(photos.at(0).contains("problem"));
   EXPECT_THAT(photos.at(1).at("problem").get<std::string>(), HasSubstr("b.jpg"));
+}
+
+TEST_F(StudioInputTest, ThreeThousandPhotosAreTakenWithAWord) {
+  const std::string set = NewSet(), photo = Photo();
+  httplib::Client client = Client();
+  client.set_keep_alive(true);
+  const httplib::Headers own = Own();
+  for (int i = 0; i < 3000; ++i) {
+    const auto answer = client.Post(
+        "/api/sets/" + set + "/files?name=" + std::to_string(i) + ".jpg", own, photo, "image/jpeg");
+    ASSERT_TRUE(answer && answer->status == 200) << i;
+  }
+  const auto begun = std::chrono::steady_clock::now();
+  const auto found = nlohmann::json::parse(Found(set)).at("found");
+  EXPECT_LT(std::chrono::steady_clock::now() - begun, seconds(10));
+  EXPECT_EQ(found.at("photos").size(), 3000u);
+  EXPECT_THAT(found.at("notes").dump(), HasSubstr("3000 photos take long; 10 to 50 of one place"));
+}
+
+TEST_F(StudioInputTest, ScanOf200MegapixelsIsNamedAndShown) {
+  const std::string set = NewSet();
+  EXPECT_EQ(Drop(set, "scan.png", FlatPng(20'000, 10'000, 1, '\x80')), 200);
+  EXPECT_EQ(Drop(set, "larger.png", FlatPng(20'000, 10'001, 1, '\x80')), 200);
+  EXPECT_EQ(Drop(set, "a.jpg", Photo()), 200);
+  const auto found = nlohmann::json::parse(Found(set)).at("found");
+  EXPECT_THAT(found.at("notes").dump(),
+              HasSubstr("scan.png: 20000 x 10000 px, which takes much memory and time; 6000 px"));
+  for (const auto& photo : found.at("photos")) {
+    EXPECT_EQ(photo.contains("problem"), photo.at("name") == "larger.png") << photo;
+  }
+  const std::string path = "/api/sets/" + set + "/photo?side=400&name=";
+  httplib::Client client = Client();
+  client.set_read_timeout(120, 0);
+  const auto small = client.Get(path + "scan.png", Own());
+  ASSERT_EQ(small->status, 200) << small->body;
+  EXPECT_EQ(DecodeImage(small->body, "small").width, 400);
+  const auto refused = client.Get(path + "larger.png", Own());
+  EXPECT_GE(refused->status, 400);
+  EXPECT_THAT(refused->body, AllOf(HasSubstr("larger.png"), HasSubstr("20000 x 10001")));
 }
 
 TEST_F(StudioInputTest, FullDiskIsSaidAndLeavesNoPart) {

@@ -32,14 +32,26 @@ GridVector MakeVector(const GridSystem& s) {
   return {GridPlane(s.width, s.height), GridPlane(s.width, s.height)};
 }
 
+// What a solution needs besides the clusters. May be used again for a grid of the same size: new
+// memory of this size takes about as long as an iteration.
+struct SolverWork {
+  GridSystem system;
+  GridPlane scale;
+  GridVector b, u, r, z, p, ap, t;
+};
+
 class Solver {
  public:
   Solver(GridSystem&& system,
          const std::vector<float>& target,
          ThreadPool& pool,
          const CancellationToken& cancel)
-      : system_(std::move(system)), target_(target), pool_(pool), cancel_(cancel) {
-    b_ = MakeVector(system_);
+      : own_work_(std::make_unique<SolverWork>()),
+        work_(*own_work_),
+        target_(target),
+        pool_(pool),
+        cancel_(cancel) {
+    work_.system = std::move(system);
     SetRightSide();
     ComputeScale();
     own_clusters_ = ClusterGrid(system_, pool_);
@@ -50,20 +62,20 @@ class Solver {
     cycle_ = own_cycle_.get();
     MakeVectors();
   }
-  // With clusters and a cycle of the same edges without pins and data.
-  Solver(GridSystem&& system,
+  // The system is that of `work`; with clusters and a cycle of the same edges without pins and
+  // data.
+  Solver(SolverWork& work,
          const std::vector<float>& target,
          const Clusters& clusters,
          AggregateCycle& cycle,
          ThreadPool& pool,
          const CancellationToken& cancel)
-      : system_(std::move(system)),
+      : work_(work),
         target_(target),
         pool_(pool),
         cancel_(cancel),
         clusters_(&clusters),
         cycle_(&cycle) {
-    b_ = MakeVector(system_);
     SetRightSide();
     ComputeScale();
     cycle_->SetData(DataOfClusters());
@@ -72,6 +84,7 @@ class Solver {
 
   GridSolution Run(const GridSolveOptions& options,
                    const std::function<void(int, double)>& report) {
+    if (options.start != nullptr) BeginWith(*options.start);
     const GridPair b_norm = Dot(b_, b_);
     GridSolution solution;
     solution.converged = RelativeNorm(b_norm, b_norm) == 0.0;
@@ -94,17 +107,31 @@ class Solver {
   }
 
  private:
+  // The margins of vectors that were used before are zero still.
   void MakeVectors() {
-    for (auto* vector : {&u_, &r_, &z_, &p_, &ap_, &t_}) *vector = MakeVector(system_);
+    for (auto* vector : {&r_, &z_, &ap_, &t_}) {
+      if (vector->a.empty()) *vector = MakeVector(system_);
+    }
+    for (auto* vector : {&u_, &p_}) {
+      if (vector->a.empty()) {
+        *vector = MakeVector(system_);
+      } else {
+        pool_.ForEach(2, [&](int64_t c, int) { (c == 0 ? vector->a : vector->b).Fill(0.0f); });
+      }
+    }
   }
 
   // Clusters still have the edges to pinned pixels. Holding these at 0 there as well takes more
   // iterations (measured).
   std::vector<float> DataOfClusters() const {
     std::vector<float> data(clusters_->count, 0.0f);
-    for (int64_t i = 0; i < system_.PixelCount(); ++i) {
-      data[clusters_->of_node[i]] += system_.data[i];
-    }
+    const int64_t n = system_.PixelCount();
+    pool_.ForEach(static_cast<int64_t>(clusters_->first.size()) - 1, [&](int64_t range, int) {
+      const int64_t begin = range * clusters_->range_nodes;
+      for (int64_t i = begin; i < std::min(n, begin + clusters_->range_nodes); ++i) {
+        data[clusters_->of_node[i]] += system_.data[i];
+      }
+    });
     return data;
   }
 
@@ -133,18 +160,21 @@ class Solver {
   // b, and pinned pixels moved to it: they leave the system.
   void SetRightSide() {
     const int64_t n = system_.PixelCount(), w = system_.width;
-    for (int64_t i = 0; i < n; ++i) {
-      b_.a[i] = system_.data[i] > 0.0f ? system_.data[i] * target_[i] : 0.0f;
-      b_.b[i] = system_.data[i] > 0.0f ? system_.data[i] * target_[i + n] : 0.0f;
-    }
+    if (b_.a.empty()) b_ = MakeVector(system_);
+    ForChunks([&](int64_t begin, int64_t end, int64_t) {
+      for (int64_t i = begin; i < end; ++i) {
+        b_.a[i] = system_.data[i] > 0.0f ? system_.data[i] * target_[i] : 0.0f;
+        b_.b[i] = system_.data[i] > 0.0f ? system_.data[i] * target_[i + n] : 0.0f;
+      }
+    });
     if (system_.pinned.empty()) return;
+    const std::vector<uint8_t>& pinned = system_.pinned;
     const auto cut = [&](GridPlane& weights, int64_t offset) {
-      for (int64_t i = 0; i < n; ++i) {
-        if (weights[i] == 0.0f) continue;
+      for (int64_t i = 0; i + offset < n; ++i) {  // edges beyond the last pixel are 0
+        if ((pinned[i] | pinned[i + offset]) == 0 || weights[i] == 0.0f) continue;
         const int64_t j = i + offset;
-        if (!system_.pinned[i] && !system_.pinned[j]) continue;
-        if (!system_.pinned[j]) MoveToRightSide(weights[i], i, j);
-        if (!system_.pinned[i]) MoveToRightSide(weights[i], j, i);
+        if (!pinned[j]) MoveToRightSide(weights[i], i, j);
+        if (!pinned[i]) MoveToRightSide(weights[i], j, i);
         weights[i] = 0.0f;
       }
     };
@@ -153,7 +183,7 @@ class Solver {
     cut(system_.down_right, w + 1);
     cut(system_.down_left, w - 1);
     for (int64_t i = 0; i < n; ++i) {
-      if (system_.pinned[i]) system_.data[i] = b_.a[i] = b_.b[i] = 0.0f;
+      if (pinned[i]) system_.data[i] = b_.a[i] = b_.b[i] = 0.0f;
     }
   }
 
@@ -164,7 +194,7 @@ class Solver {
   }
 
   void ComputeScale() {
-    scale_ = GridPlane(system_.width, system_.height);
+    if (scale_.empty()) scale_ = GridPlane(system_.width, system_.height);
     const GridSystem& s = system_;
     const int64_t w = s.width;
     ForChunks([&](int64_t begin, int64_t end, int64_t) {
@@ -244,30 +274,47 @@ class Solver {
       ForChunks([&](int64_t begin, int64_t end, int64_t) {
         GridCombine(beta, p_, {1.0, 1.0}, z_, begin, end);
       });
-      if (residual <= options.tolerance && RelativeNorm(rz, rz_start_) <= options.tolerance) return;
+      if (residual > options.tolerance) continue;
+      if (options.start != nullptr || RelativeNorm(rz, rz_start_) <= options.tolerance) return;
     }
+  }
+
+  void BeginWith(const std::vector<float>& start) {
+    const int64_t n = system_.PixelCount();
+    ForChunks([&](int64_t begin, int64_t end, int64_t) {
+      for (int64_t i = begin; i < end; ++i) {
+        const bool pinned = !system_.pinned.empty() && system_.pinned[i];
+        u_.a[i] = pinned ? 0.0f : start[i];
+        u_.b[i] = pinned ? 0.0f : start[i + n];
+      }
+    });
   }
 
   void Finish(GridSolution& solution) {
     const int64_t n = system_.PixelCount();
     solution.u.resize(2 * n);
-    for (int64_t i = 0; i < n; ++i) {
-      const bool pinned = !system_.pinned.empty() && system_.pinned[i];
-      solution.u[i] = pinned ? target_[i] : u_.a[i];
-      solution.u[i + n] = pinned ? target_[i + n] : u_.b[i];
-    }
+    ForChunks([&](int64_t begin, int64_t end, int64_t) {
+      for (int64_t i = begin; i < end; ++i) {
+        const bool pinned = !system_.pinned.empty() && system_.pinned[i];
+        solution.u[i] = pinned ? target_[i] : u_.a[i];
+        solution.u[i + n] = pinned ? target_[i + n] : u_.b[i];
+      }
+    });
   }
 
-  GridSystem system_;
+  std::unique_ptr<SolverWork> own_work_;
+  SolverWork& work_;
+  GridSystem& system_ = work_.system;
   const std::vector<float>& target_;
   ThreadPool& pool_;
   const CancellationToken& cancel_;
-  GridPlane scale_;
+  GridPlane& scale_ = work_.scale;
   Clusters own_clusters_;
   std::unique_ptr<AggregateCycle> own_cycle_;
   const Clusters* clusters_;
   AggregateCycle* cycle_;
-  GridVector b_, u_, r_, z_, p_, ap_, t_;
+  GridVector &b_ = work_.b, &u_ = work_.u, &r_ = work_.r, &z_ = work_.z, &p_ = work_.p,
+             &ap_ = work_.ap, &t_ = work_.t;
   GridPair rz_start_{};
 };
 
@@ -278,10 +325,11 @@ struct GridHierarchy::Parts {
   ThreadPool& pool;
   Clusters clusters;
   std::unique_ptr<AggregateCycle> cycle;
+  SolverWork work;
 };
 
 GridHierarchy::GridHierarchy(GridSystem edges, ThreadPool& pool, const CancellationToken& cancel)
-    : parts_(new Parts{std::move(edges), pool, {}, nullptr}) {
+    : parts_(new Parts{std::move(edges), pool, {}, nullptr, {}}) {
   Parts& p = *parts_;
   p.edges.data.Fill(0.0f);
   p.edges.pinned.clear();
@@ -298,10 +346,19 @@ GridSolution GridHierarchy::Solve(std::vector<uint8_t> pinned,
                                   const std::function<void(int, double)>& report,
                                   const CancellationToken& cancel) {
   cancel.ThrowIfCancelled();
-  GridSystem system = parts_->edges;
+  const GridSystem& edges = parts_->edges;
+  GridSystem& system = parts_->work.system;
+  system.width = edges.width;
+  system.height = edges.height;
   system.pinned = std::move(pinned);
-  if (data != nullptr) system.data = *data;
-  return Solver(std::move(system), target, parts_->clusters, *parts_->cycle, parts_->pool, cancel)
+  const std::pair<GridPlane*, const GridPlane*> copies[] = {
+      {&system.right, &edges.right},
+      {&system.down, &edges.down},
+      {&system.down_right, &edges.down_right},
+      {&system.down_left, &edges.down_left},
+      {&system.data, data != nullptr ? data : &edges.data}};
+  parts_->pool.ForEach(5, [&](int64_t k, int) { *copies[k].first = *copies[k].second; });
+  return Solver(parts_->work, target, parts_->clusters, *parts_->cycle, parts_->pool, cancel)
       .Run(options, report);
 }
 
@@ -309,7 +366,9 @@ int GridHierarchy::width() const { return parts_->edges.width; }
 int GridHierarchy::height() const { return parts_->edges.height; }
 
 int64_t GridHierarchy::bytes() const {
-  return parts_->edges.PixelCount() * static_cast<int64_t>(6 * sizeof(float)) +
+  // Edges, their copy, clusters and the vectors of a solution.
+  constexpr int64_t kPlanes = 5 + 5 + 1 + 1 + 2 * 7;
+  return parts_->edges.PixelCount() * (kPlanes * static_cast<int64_t>(sizeof(float)) + 1) +
          parts_->cycle->bytes();
 }
 

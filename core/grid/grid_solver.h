@@ -25,6 +25,7 @@ class GridPlane {
   float operator[](int64_t i) const { return storage_[i + margin_]; }
   float* data() { return storage_.data() + margin_; }
   const float* data() const { return storage_.data() + margin_; }
+  bool empty() const { return storage_.empty(); }
   void Fill(float value);  // the pixels; the margins stay zero
 
  private:
@@ -53,6 +54,9 @@ struct GridSystem {
 struct GridSolveOptions {
   double tolerance = 1e-4;
   int max_iterations = 200;
+  // Values to begin with, laid out as GridSolution::u, e.g. of a solution for about the same
+  // targets; null: 0. The iterations then end at the 2-norm of the residual alone.
+  const std::vector<float>* start = nullptr;
 };
 
 struct GridSolution {

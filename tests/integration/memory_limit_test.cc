@@ -1,11 +1,12 @@
 // Memory limit of workers: a job that needs more fails with the figures, other jobs continue.
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include <fstream>
 #include <string>
 
+#include "core/base/files.h"
 #include "tests/integration/service_fixture.h"
+#include "tests/support/formats/flat_png.h"
 
 namespace color3d {
 namespace {
@@ -13,47 +14,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int64_t kLimitBytes = int64_t{2} << 30;
-
-std::string BigEndian(uint32_t value) {
-  std::string bytes;
-  for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift);
-  return bytes;
-}
-
-std::string Chunk(const std::string& type, const std::string& data) {
-  const std::string body = type + data;
-  const auto crc = crc32_z(0, reinterpret_cast<const Bytef*>(body.data()), body.size());
-  return BigEndian(static_cast<uint32_t>(data.size())) + body +
-         BigEndian(static_cast<uint32_t>(crc));
-}
-
-// A PNG of constant value, grey or RGB (3 channels): some hundred kilobytes at any size.
-void WriteFlatPng(const fs::path& file, int width, int height, int channels, char value) {
-  std::string row(static_cast<size_t>(width) * channels + 1, value);
-  row[0] = 0;  // no filter
-  z_stream stream = {};
-  deflateInit(&stream, 1);
-  std::string packed(1 << 16, '\0'), data;
-  for (int y = 0; y < height; ++y) {
-    stream.next_in = reinterpret_cast<Bytef*>(row.data());
-    stream.avail_in = static_cast<uInt>(row.size());
-    const int flush = y + 1 == height ? Z_FINISH : Z_NO_FLUSH;
-    do {
-      stream.next_out = reinterpret_cast<Bytef*>(packed.data());
-      stream.avail_out = static_cast<uInt>(packed.size());
-      deflate(&stream, flush);
-      data.append(packed, 0, packed.size() - stream.avail_out);
-    } while (stream.avail_out == 0);
-  }
-  deflateEnd(&stream);
-  const std::string color(1, channels == 3 ? '\2' : '\0');
-  const std::string header = BigEndian(static_cast<uint32_t>(width)) +
-                             BigEndian(static_cast<uint32_t>(height)) + '\x08' + color +
-                             std::string(3, '\0');
-  std::ofstream(file, std::ios::binary)
-      << "\x89PNG\r\n\x1a\n"
-      << Chunk("IHDR", header) << Chunk("IDAT", data) << Chunk("IEND", "");
-}
 
 class MemoryLimitTest : public ServiceTest {
  protected:
@@ -102,11 +62,8 @@ TEST_F(MemoryLimitTest, HugePhotosFailWithFiguresAndSpareOtherJobs) {
   EXPECT_EQ(score, 500);
   fs::create_directory(Path("huge"));
   for (int i = 0; i < 4; ++i) {
-    WriteFlatPng(Path("huge") / ("wall" + std::to_string(i) + ".png"),
-                 14'000,
-                 14'000,
-                 1,
-                 static_cast<char>(100 + i));
+    WriteFileAtomic(Path("huge") / ("wall" + std::to_string(i) + ".png"),
+                    FlatPng(14'000, 14'000, 1, static_cast<char>(100 + i)));
   }
   const ProcessResult result =
       Client(std::vector<std::string>{
@@ -130,7 +87,7 @@ TEST_F(MemoryLimitTest, HugePhotosFailWithFiguresAndSpareOtherJobs) {
 TEST_F(MemoryLimitTest, HugeKeyPictureFailsWithFigures) {
   ExpectOtherJobsGoOn();
   const int pid = WorkerPid();
-  WriteFlatPng(Path("view001.png"), 16'000, 12'000, 3, 100);
+  WriteFileAtomic(Path("view001.png"), FlatPng(16'000, 12'000, 3, 100));
   const ProcessResult result = Client(std::vector<std::string>{"colorize",
                                                                Path("room").string(),
                                                                "-o",

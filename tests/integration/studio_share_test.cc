@@ -41,7 +41,7 @@ TEST_F(StudioShareTest, SceneIsSavedWithItsCredit) {
   const fs::path out = Path("saved");
   const auto seen = Use(COLOR3D_SHARE_SCENE, {AddressOf(studio), out});
   ASSERT_TRUE(seen.is_object());
-  for (const char* list : {"errors", "requests", "wide"}) {
+  for (const char* list : {"errors", "requests", "wide", "faint"}) {
     EXPECT_THAT(seen.at(list), IsEmpty()) << seen.at(list);
   }
   // A key photo in colour and in grey, and all photos.
@@ -76,7 +76,7 @@ TEST_F(StudioShareTest, QueueKeepsItsOrderAndItsRuns) {
   Process studio(ClientCommand({"studio", "--no-open"}), Path("studio"));
   const auto seen = Use(COLOR3D_ORDER_QUEUE, {AddressOf(studio), Path("room")});
   ASSERT_TRUE(seen.is_object());
-  for (const char* list : {"errors", "requests", "wide"}) {
+  for (const char* list : {"errors", "requests", "wide", "faint"}) {
     EXPECT_THAT(seen.at(list), IsEmpty()) << seen.at(list);
   }
   EXPECT_THAT(seen.at("before"), ElementsAre("one", "two", "three", "four"));

@@ -2,22 +2,17 @@
 // real server.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
 
-#include <cstdlib>
 #include <nlohmann/json.hpp>
-#include <optional>
 
-#include "client/studio/http_library.h"
 #include "core/base/files.h"
 #include "core/image/codec.h"
-#include "tests/integration/service_fixture.h"
+#include "tests/integration/studio_http_fixture.h"
 
 namespace color3d {
 namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
-using std::chrono::seconds;
 using ::testing::HasSubstr;
 
 // As the painter writes it.
@@ -29,40 +24,11 @@ constexpr char kStrokes[] =
     "]\n";
 constexpr char kView[] = "view003.png";
 
-class StudioStrokesTest : public ServiceTest {
+class StudioStrokesTest : public StudioHttpTest {
  protected:
   void SetUp() override {
-    ::setenv("XDG_DATA_HOME", Path("home").c_str(), 1);
-    StartServer();
-    WriteProceduralScene(Path("room"), SmallRoom(6, /*gray=*/true));
+    StudioHttpTest::SetUp();
     WriteFileAtomic(Path("strokes.json"), kStrokes);
-    studio_.emplace(ClientCommand({"studio", "--no-open", Path("room").string()}), Path("studio"));
-    const auto line = [&] { return studio_->Out().find('\n'); };
-    ASSERT_TRUE(WaitUntil([&] { return line() != std::string::npos; }, seconds(60)))
-        << studio_->Err();
-    const std::string address = studio_->Out().substr(0, line());
-    const size_t path = address.find("/open"), set = address.find("set/");
-    ASSERT_NE(set, std::string::npos) << address;
-    set_ = address.substr(set + 4);
-    here_ = address.substr(0, path);
-    http_.emplace(here_);
-    http_->set_read_timeout(120, 0);
-    const auto opened = http_->Get(address.substr(path));
-    ASSERT_TRUE(opened);
-    std::string cookie = opened->get_header_value("Set-Cookie");
-    http_->set_default_headers({{"Cookie", cookie.substr(0, cookie.find(';'))}, {"Origin", here_}});
-  }
-  void TearDown() override {
-    if (studio_) studio_->Signal(SIGINT);
-    ServiceTest::TearDown();
-  }
-
-  std::string Post(const std::string& call, const std::string& body, int status = 200) {
-    const auto answer = http_->Post("/api/sets/" + set_ + call, body, "application/octet-stream");
-    EXPECT_TRUE(answer);
-    if (!answer) return "";
-    EXPECT_EQ(answer->status, status) << answer->body.substr(0, 500);
-    return answer->body;
   }
   // The picture in full size that the page offers to save.
   std::string FromStudio(json colors) {
@@ -82,9 +48,6 @@ class StudioStrokesTest : public ServiceTest {
   }
   std::string StrokesFile() const { return Path("strokes.json").string(); }
 
-  std::optional<Process> studio_;
-  std::optional<httplib::Client> http_;
-  std::string set_, here_;
   int runs_ = 0;
 };
 

@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/base/error.h"
 #include "core/base/range_check.h"
 #include "core/grid/edge_weights.h"
 #include "core/grid/grid_solver.h"
+#include "core/grid/quick_grid.h"
 #include "core/image/box_mean.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
@@ -28,6 +30,8 @@ constexpr int kLikenessRadiusPx = 2;
 constexpr float kLeastWeight = 1e-6f;
 // Hinted share of a cell from which on its own mean counts alone, so that far hints do not.
 constexpr float kFullWeight = 200.0f;
+// For quick answers.
+constexpr int kLayerHalvings = 1;
 
 // The smallest coupling difference of each pixel (1 channel, L units).
 Image SigmaOfTexture(const Image& luminance, const LayerOptions& options) {
@@ -120,6 +124,11 @@ float ShareOfPull(float pull) {
   return t * t * (3.0f - 2.0f * t);
 }
 
+// The grid of a picture.
+GridSystem LayerGrid(const Image& luminance, const LayerOptions& options, ThreadPool& pool) {
+  return SystemOfLuminance(luminance, SigmaOfTexture(luminance, options), pool);
+}
+
 // The layer at the size of the map. The solution is linear in the pinned colours, so the pulled
 // colours over the pull are their weighted mean.
 HintLayer LayerAtSize(const Image& luminance,
@@ -127,7 +136,7 @@ HintLayer LayerAtSize(const Image& luminance,
                       const HintMap& hints,
                       const LayerOptions& options,
                       const RunControl& control,
-                      GridHierarchy& prepared) {
+                      QuickGrid* prepared) {
   const GridPlane screening = Screening(luminance, below, hints, options);
   const size_t n = luminance.PlaneSize();
   std::vector<float> colors(2 * n, 0.0f), pulls(2 * n, 0.0f);
@@ -137,9 +146,14 @@ HintLayer LayerAtSize(const Image& luminance,
     colors[i + n] = hints.ab.Plane(1)[i];
     pulls[i] = 1.0f;
   }
+  std::optional<GridHierarchy> own;
+  if (prepared == nullptr) {
+    own.emplace(LayerGrid(luminance, options, control.pool), control.pool, CancellationToken());
+  }
   // The data term holds all pixels but the pinned ones at 0.
   const auto solve = [&](const std::vector<float>& target) {
-    return prepared.Solve(
+    if (!own) return prepared->Solve(hints.hinted, &screening, target, control.cancel);
+    return own->Solve(
         hints.hinted,
         &screening,
         target,
@@ -214,19 +228,16 @@ HintLayer LayerOfHints(const Image& luminance,
                        const LayerOptions& options,
                        const RunControl& control,
                        const HintPictures& pictures,
-                       GridHierarchy* prepared) {
+                       QuickGrid* prepared) {
   options.Validate();
   RequireFiniteLuminance(luminance, "the strokes above other colours");
   HintPictures above = pictures;
   above.automatic_ab = &below;
   HintMap map =
       DrawHints(hints, above, luminance.width, luminance.height, control.progress, control.cancel);
-  std::shared_ptr<GridHierarchy> own;
-  if (prepared == nullptr) own = PrepareLayer(luminance, options, control.pool);
-  GridHierarchy& hierarchy = prepared != nullptr ? *prepared : *own;
   HintLayer layer;
   if (std::max(luminance.width, luminance.height) <= options.max_side_px) {
-    layer = LayerAtSize(luminance, below, map, options, control, hierarchy);
+    layer = LayerAtSize(luminance, below, map, options, control, prepared);
   } else {
     const Image small = FitWithin(luminance, options.max_side_px);
     layer = Enlarge(LayerAtSize(small,
@@ -234,19 +245,21 @@ HintLayer LayerOfHints(const Image& luminance,
                                 ReduceHints(map, small.width, small.height),
                                 options,
                                 control,
-                                hierarchy),
+                                prepared),
                     luminance);
   }
   SetHintedPixels(map, &layer);
   return layer;
 }
 
-std::shared_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
-                                            const LayerOptions& options,
-                                            ThreadPool& pool) {
-  const Image small = FitWithin(luminance, options.max_side_px);
-  return std::make_shared<GridHierarchy>(
-      SystemOfLuminance(small, SigmaOfTexture(small, options), pool), pool, CancellationToken());
+std::shared_ptr<QuickGrid> PrepareLayer(const Image& luminance,
+                                        const LayerOptions& options,
+                                        ThreadPool& pool) {
+  return std::make_shared<QuickGrid>(
+      LayerGrid(FitWithin(luminance, options.max_side_px), options, pool),
+      kLayerHalvings,
+      pool,
+      CancellationToken());
 }
 
 void LayAbove(const HintLayer& layer, Image* below) {

@@ -48,13 +48,13 @@ HintLayer LayerOfHints(const Image& luminance,
                        const LayerOptions& options,
                        const RunControl& control,
                        const HintPictures& pictures = {},
-                       GridHierarchy* prepared = nullptr);
+                       QuickGrid* prepared = nullptr);
 
-// What LayerOfHints needs of the picture alone, for quick answers to changing hints, with the same
-// result. The pool must outlive it.
-std::shared_ptr<GridHierarchy> PrepareLayer(const Image& luminance,
-                                            const LayerOptions& options,
-                                            ThreadPool& pool);
+// What LayerOfHints needs of the picture alone, for quick answers to changing hints, near the layer
+// (quick_grid.h), whatever the tolerance. The pool must outlive it.
+std::shared_ptr<QuickGrid> PrepareLayer(const Image& luminance,
+                                        const LayerOptions& options,
+                                        ThreadPool& pool);
 
 // Replaces `below` by the colours of the layer, by its share.
 void LayAbove(const HintLayer& layer, Image* below);

@@ -11,6 +11,7 @@
 #include "core/base/range_check.h"
 #include "core/grid/edge_weights.h"
 #include "core/grid/grid_solver.h"
+#include "core/grid/quick_grid.h"
 #include "core/image/codec.h"
 #include "core/image/guided_upsample.h"
 #include "core/image/image_checks.h"
@@ -19,12 +20,15 @@
 namespace color3d {
 namespace {
 
+// For quick answers.
+constexpr int kSpreadHalvings = 2;
+
 // Propagates hints over a picture of the same size. Sets all of the solution but hinted_pixels.
 HintSolution SolveAtSize(const Image& luminance,
                          HintMap hints,
                          const HintOptions& options,
                          const RunControl& control,
-                         GridHierarchy* prepared = nullptr) {
+                         QuickGrid* prepared = nullptr) {
   const GridSolveOptions until{options.tolerance, options.max_iterations};
   const auto report = [&](int iteration, double residual) {
     control.progress.OnError(iteration, "relative_residual", residual);
@@ -32,15 +36,14 @@ HintSolution SolveAtSize(const Image& luminance,
   };
   GridSolution solved;
   if (prepared != nullptr) {
-    solved = prepared->Solve(
-        std::move(hints.hinted), nullptr, hints.ab.data, until, report, control.cancel);
+    solved = prepared->Solve(std::move(hints.hinted), nullptr, hints.ab.data, control.cancel);
   } else {
     GridSystem system = SystemOfLuminance(luminance, options.sigma, control.pool);
     system.pinned = std::move(hints.hinted);
     solved = SolveGridSystem(
         std::move(system), hints.ab.data, until, control.pool, report, control.cancel);
   }
-  if (!solved.converged) {
+  if (!solved.converged && prepared == nullptr) {
     control.progress.OnWarning(fmt::format(
         "colour hints: the solver stopped after {} iterations at a relative residual of {:.3g}",
         solved.iterations,
@@ -60,7 +63,7 @@ HintSolution Solve(const Image& luminance,
                    HintMap hints,
                    const HintOptions& options,
                    const RunControl& control,
-                   GridHierarchy* prepared = nullptr) {
+                   QuickGrid* prepared = nullptr) {
   const int64_t hinted = std::count(hints.hinted.begin(), hints.hinted.end(), 1);
   HintSolution solution;
   if (std::max(luminance.width, luminance.height) <= options.max_side_px) {
@@ -121,7 +124,7 @@ HintSolution KeyColorFromHints(const Image& luminance,
                                const HintOptions& options,
                                const RunControl& control,
                                const HintPictures& pictures,
-                               GridHierarchy* prepared) {
+                               QuickGrid* prepared) {
   options.Validate();
   RequireFiniteLuminance(luminance, "the colouring of the key view");
   return Solve(
@@ -133,16 +136,18 @@ HintSolution KeyColorFromHints(const Image& luminance,
       prepared);
 }
 
-std::shared_ptr<GridHierarchy> PrepareHints(const Image& luminance,
-                                            const HintOptions& options,
-                                            ThreadPool& pool) {
+std::shared_ptr<QuickGrid> PrepareHints(const Image& luminance,
+                                        const HintOptions& options,
+                                        ThreadPool& pool) {
   options.Validate();
   RequireFiniteLuminance(luminance, "the colouring of the key view");
-  return std::make_shared<GridHierarchy>(
-      SystemOfLuminance(luminance, options.sigma, pool), pool, CancellationToken());
+  return std::make_shared<QuickGrid>(SystemOfLuminance(luminance, options.sigma, pool),
+                                     kSpreadHalvings,
+                                     pool,
+                                     CancellationToken());
 }
 
-int64_t BytesOf(const GridHierarchy& prepared) { return prepared.bytes(); }
+int64_t BytesOf(const QuickGrid& prepared) { return prepared.bytes(); }
 
 std::vector<ColorHint> ScaleHints(std::vector<ColorHint> hints, double x, double y) {
   // Thinner ones would cover a pixel here and there.

@@ -14,7 +14,7 @@
 
 namespace color3d {
 
-class GridHierarchy;
+class QuickGrid;
 inline constexpr double kMinReach = 0.1, kMaxReach = 2.0;
 
 // Pixels of given colour: a disc, a line, a polygon, or a label of a label picture.
@@ -91,14 +91,15 @@ HintSolution KeyColorFromHints(const Image& luminance,
                                const HintOptions& options,
                                const RunControl& control,
                                const HintPictures& pictures = {},
-                               GridHierarchy* prepared = nullptr);
+                               QuickGrid* prepared = nullptr);
 
-// What KeyColorFromHints needs of the picture alone, for quick solutions with changing hints, equal
-// within the tolerance. The pool must outlive it. Requires: sides of at most options.max_side_px.
-std::shared_ptr<GridHierarchy> PrepareHints(const Image& luminance,
-                                            const HintOptions& options,
-                                            ThreadPool& pool);
+// What KeyColorFromHints needs of the picture alone, for quick answers while hints are added: near
+// the colours (quick_grid.h), whatever the tolerance. The pool must outlive it. Requires: sides of
+// at most options.max_side_px.
+std::shared_ptr<QuickGrid> PrepareHints(const Image& luminance,
+                                        const HintOptions& options,
+                                        ThreadPool& pool);
 
-int64_t BytesOf(const GridHierarchy& prepared);
+int64_t BytesOf(const QuickGrid& prepared);
 
 }  // namespace color3d

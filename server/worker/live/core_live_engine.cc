@@ -53,7 +53,7 @@ class CoreLiveEngine : public LiveEngine {
   static std::vector<Image> ColorizeBatch(const std::vector<Picture>& group);
   // Colours and answers the group, then empties it.
   void Finish(std::vector<Picture>& group);
-  void Answer(const Image& srgb, internal::v1::ColorizeImageResponse* answer);
+  void Answer(std::string png, internal::v1::ColorizeImageResponse* answer);
   Image ReadLuminance(const Request& request);
   std::string KeyOf(const Request& request);
   std::shared_ptr<const Encoder> FindEncoder(const std::string& name);
@@ -159,8 +159,7 @@ CoreLiveEngine::Picture CoreLiveEngine::Prepare(const Request& request) {
   return picture;
 }
 
-void CoreLiveEngine::Answer(const Image& srgb, internal::v1::ColorizeImageResponse* answer) {
-  std::string png = EncodePng8(srgb);
+void CoreLiveEngine::Answer(std::string png, internal::v1::ColorizeImageResponse* answer) {
   if (png.size() <= kMaxMessageImageBytes) {
     answer->mutable_image()->swap(png);
     return;
@@ -191,7 +190,7 @@ void CoreLiveEngine::Finish(std::vector<Picture>& group) {
     Picture& picture = group[i];
     try {
       if (ab[i].Empty()) ab[i] = picture.loaded->colorizer->Colorize(picture.luminance);
-      Answer(SrgbFromLab(JoinLab(picture.luminance, ab[i])), picture.task->response);
+      Answer(EncodePng8(SrgbFromLab(JoinLab(picture.luminance, ab[i]))), picture.task->response);
       picture.task->response->set_encoder_digest(picture.loaded->encoder->digest());
     } catch (const std::exception&) {
       picture.task->error = std::current_exception();

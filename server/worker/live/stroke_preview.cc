@@ -13,9 +13,11 @@
 #include "core/base/run_control.h"
 #include "core/color/lab.h"
 #include "core/color/lab_planes.h"
+#include "core/color/quick_srgb.h"
 #include "core/encoder/torch_threads.h"
 #include "core/image/codec.h"
 #include "core/image/probe/orientation.h"
+#include "core/image/quick_png.h"
 #include "core/image/reduced.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/keycolor/hints/hint_layer.h"
@@ -26,8 +28,6 @@ namespace {
 // Colouring at a picture's own size takes about 60 bytes per pixel.
 constexpr ImageLimits kWholeLimits{.max_pixels = 25'000'000, .max_side_px = 30'000};
 constexpr double kSameShape = 0.02;  // relative difference of aspect ratios
-// Residual of previews: 0.3 Lab units from the exact colours on average.
-constexpr double kPreviewTolerance = 3e-3;
 // Size at which previews of strokes above other colours are solved.
 constexpr int kPreviewLayerSidePx = 500;
 
@@ -101,7 +101,7 @@ StrokePreview::Shared StrokePreview::Below(const Request& request,
 }
 
 StrokePreview::Shared StrokePreview::Grid(
-    const std::string& key, const std::function<std::shared_ptr<GridHierarchy>()>& prepare) {
+    const std::string& key, const std::function<std::shared_ptr<QuickGrid>()>& prepare) {
   return cache_.Get(key, [&] {
     Prepared prepared;
     prepared.grid = prepare();
@@ -124,7 +124,6 @@ Image StrokePreview::Spread(const Prepared& luminance,
   HintOptions options;
   Shared grid;
   if (is_preview) {
-    options.tolerance = kPreviewTolerance;
     grid = Grid("spread " + key, [&] { return PrepareHints(l, options, pool_); });
   }
   return KeyColorFromHints(
@@ -143,7 +142,6 @@ Image StrokePreview::LayAboveColors(const Prepared& luminance,
   LayerOptions options;
   Shared grid;
   if (is_preview) {
-    options.tolerance = kPreviewTolerance;
     options.max_side_px = kPreviewLayerSidePx;
     grid = Grid("layer " + key, [&] { return PrepareLayer(l, options, pool_); });
   }
@@ -154,22 +152,24 @@ Image StrokePreview::LayAboveColors(const Prepared& luminance,
   return ab;
 }
 
-// As SrgbFromLab, by all threads.
-Image StrokePreview::SrgbOf(const Image& luminance, const Image& ab) {
-  Image srgb(luminance.width, luminance.height, 3);
-  pool_.ForRanges(luminance.height, [&](int64_t begin, int64_t end, int) {
-    if (begin == end) return;
-    const size_t w = luminance.width, from = begin * w, count = (end - begin) * w;
-    Image band(luminance.width, static_cast<int>(end - begin), 3);
-    std::copy_n(luminance.Plane(0) + from, count, band.Plane(0));
-    for (int c = 0; c < 2; ++c) std::copy_n(ab.Plane(c) + from, count, band.Plane(c + 1));
-    band = SrgbFromLab(band);
-    for (int c = 0; c < 3; ++c) std::copy_n(band.Plane(c), count, srgb.Plane(c) + from);
+std::string StrokePreview::PngOf(const Image& luminance, const Image& ab, bool is_preview) {
+  if (!is_preview) return EncodePng8(SrgbFromLab(JoinLab(luminance, ab)));
+  std::vector<uint8_t> rgb(3 * luminance.PlaneSize());
+  // In short ranges, as colours outside of the gamut take longer and lie together.
+  constexpr int64_t kRangePixels = 1 << 14;
+  const auto pixels = static_cast<int64_t>(luminance.PlaneSize());
+  pool_.ForEach((pixels + kRangePixels - 1) / kRangePixels, [&](int64_t k, int) {
+    const int64_t i = k * kRangePixels;
+    QuickSrgbFromLab(luminance.Plane(0) + i,
+                     ab.Plane(0) + i,
+                     ab.Plane(1) + i,
+                     std::min(kRangePixels, pixels - i),
+                     rgb.data() + 3 * i);
   });
-  return srgb;
+  return EncodeQuickPng(rgb, luminance.width, luminance.height, pool_);
 }
 
-Image StrokePreview::Colorize(const Request& request, const ReadBlob& read_blob) {
+std::string StrokePreview::Colorize(const Request& request, const ReadBlob& read_blob) {
   std::vector<ColorHint> hints;
   if (!request.points().empty()) hints = ParseHintsJson(request.points());
   std::string key;
@@ -178,14 +178,15 @@ Image StrokePreview::Colorize(const Request& request, const ReadBlob& read_blob)
   Shared below;
   if (request.automatic()) below = Automatic(*luminance, key);
   if (!request.below_sha256().empty()) below = Below(request, *luminance, read_blob);
-  if (hints.empty()) return SrgbOf(l, below->planes);
   const bool is_preview = request.max_side_px() > 0;
+  if (hints.empty()) return PngOf(l, below->planes, is_preview);
   hints = ScaleHints(std::move(hints),
                      static_cast<double>(l.width) / luminance->own_width,
                      static_cast<double>(l.height) / luminance->own_height);
-  return SrgbOf(l,
-                below ? LayAboveColors(*luminance, *below, hints, is_preview, key)
-                      : Spread(*luminance, hints, is_preview, key));
+  return PngOf(l,
+               below ? LayAboveColors(*luminance, *below, hints, is_preview, key)
+                     : Spread(*luminance, hints, is_preview, key),
+               is_preview);
 }
 
 }  // namespace color3d

@@ -26,17 +26,17 @@ class StrokePreview {
     return !request.points().empty() || request.automatic();
   }
 
-  // Returns the coloured picture, sRGB: at the picture's own size as colorize_key_view makes it, at
-  // a smaller one with strokes that are reduced like the picture. Throws Error{kInvalidArgument}
-  // for malformed strokes and pictures of other shapes.
-  Image Colorize(const Request& request, const ReadBlob& read_blob);
+  // Returns the coloured picture as a PNG: at the picture's own size as colorize_key_view makes it,
+  // at a smaller one with strokes that are reduced like the picture, and with colours near those.
+  // Throws Error{kInvalidArgument} for malformed strokes and pictures of other shapes.
+  std::string Colorize(const Request& request, const ReadBlob& read_blob);
 
  private:
   struct Prepared {
     Image planes = {};  // L; or a, b; or none
     int own_width = 0;
     int own_height = 0;
-    std::shared_ptr<GridHierarchy> grid = {};  // of the strokes alone, or above other colours
+    std::shared_ptr<QuickGrid> grid = {};  // of the strokes alone, or above other colours
     int64_t bytes = 0;
   };
   using Shared = std::shared_ptr<const Prepared>;
@@ -54,10 +54,10 @@ class StrokePreview {
                        const std::vector<ColorHint>& hints,
                        bool is_preview,
                        const std::string& key);
-  Image SrgbOf(const Image& luminance, const Image& ab);
+  std::string PngOf(const Image& luminance, const Image& ab, bool is_preview);
   // What `prepare` makes of a photo for quick solutions, or what is kept of it.
   Shared Grid(const std::string& key,
-              const std::function<std::shared_ptr<GridHierarchy>()>& prepare);
+              const std::function<std::shared_ptr<QuickGrid>()>& prepare);
   // Of solutions that nobody watches or ends.
   RunControl Control() { return {pool_, checkpoints_, progress_, never_}; }
 

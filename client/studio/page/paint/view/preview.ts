@@ -17,7 +17,7 @@ export class PreviewLoop {
   constructor(
     private readonly source: PreviewSource | undefined,
     private readonly events: PreviewEvents,
-    private readonly delay = 15, // ms
+    private readonly delay = 0, // ms; changes of one moment are one question
   ) {}
 
   // The strokes have changed, or what lies below them. An empty list has no preview.
