@@ -4,16 +4,14 @@
 //   node walk_scene.mjs CHROMIUM ADDRESS FOLDER OUT mouse|touch [SCREENSHOTS]
 // ADDRESS: as `color3d studio` printed it; OUT: receives what is saved. Prints as JSON: seconds: since the drop, at the
 // end of each step; saved: bytes of the page; errors, requests, wide, faint as in page_hand.mjs.
-import { existsSync, mkdirSync, readdirSync, statSync } from 'node:fs';
-import { join, resolve } from 'node:path';
+import { readdirSync, statSync } from 'node:fs';
+import { join } from 'node:path';
 
-import { pause } from '../../tests/support/browser.mjs';
 import { drawnBySoftware, openPage } from '../../tests/support/page_hand.mjs';
 
 const [chromium, address, folder, out, how, screenshots] = process.argv.slice(2);
 const byTouch = how === 'touch';
-mkdirSync(out, { recursive: true });
-const { send, evaluate, waitFor, boxOf, click, drag, press, drop, choose, keep, tell } =
+const { send, evaluate, waitFor, boxOf, click, drag, press, drop, choose, saveTo, savedAs, clickText, keep, tell } =
     openPage(chromium, address, screenshots, { byTouch, flags: [...drawnBySoftware, '--window-size=1440,1000'], limit: 240000 });
 
 const corrector = (name) => `(document.querySelector('#corrector')?.dataset.${name} ?? '')`;
@@ -33,7 +31,7 @@ const setCode = async (hex) => {
 };
 
 await tell(async () => {
-  await send('Browser.setDownloadBehavior', { behavior: 'allow', downloadPath: resolve(out) }, null);
+  await saveTo(out);
   await waitFor('!!document.querySelector(".drop-area")');
   const seconds = {};
   const begun = Date.now();
@@ -64,6 +62,8 @@ await tell(async () => {
   await done('painted');
 
   await click('#start');
+  await waitFor('document.querySelectorAll(".gallery img").length > 1'); // the key photo and another one
+  await done('first_colors');
   await waitFor('document.querySelector("main").dataset.state === "done"');
   await waitFor(corrector('scene'));
   await waitFor(corrector('shown'));
@@ -88,8 +88,8 @@ await tell(async () => {
   await done('undone');
 
   await waitFor(`!${corrector('working')}`);
-  await click('//main//*[self::a or self::button][normalize-space()="Save the page"]');
-  for (const end = Date.now() + 60000; Date.now() < end && !existsSync(join(out, 'view.html')); await pause(100)) ;
+  await clickText('Save the page');
+  await savedAs('view.html');
   await done('saved');
   return { seconds, saved: Object.fromEntries(readdirSync(out).map((name) => [name, statSync(join(out, name)).size])) };
 });
