@@ -76,21 +76,24 @@ const hear = async () => {
   const sound = 'document.getElementById("heard")';
   await evaluate(`(() => {
     const facts = JSON.parse(document.getElementById('facts').textContent), moment = document.getElementById('moment');
-    // Within one frame of the browser, after the page has drawn it.
-    window.apart = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() =>
-      done(Math.abs(moment.value / moment.max * facts.motion.seconds - ${sound}.currentTime)))));
+    const value = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, 'value');
+    window.apart = () => Math.abs(moment.value / moment.max * facts.motion.seconds - ${sound}.currentTime);
+    window.seenApart = [];  // each time that the page moves the slider
+    Object.defineProperty(moment, 'value', { get: () => value.get.call(moment), set: (next) => {
+      value.set.call(moment, next);
+      window.seenApart.push(window.apart());
+    } });
     document.getElementById('speed').value = '1';
   })()`);
-  const largest = async (times) => {
-    const all = [];
-    for (let i = 0; i < times; ++i) {
-      await pause(60);
-      all.push(await evaluate('window.apart()'));
-    }
-    return Math.max(...all.filter((seconds) => seconds < 1));  // others: it loops just now
+  const largest = async (ms) => {
+    await evaluate('window.seenApart = []; 1');
+    await pause(ms);
+    // Others: it loops just now.
+    const all = (await evaluate('window.seenApart')).filter((seconds) => seconds < 1);
+    return all.length ? Math.max(...all) : Infinity;
   };
   await pause(1000);
-  const result = { largest_apart: await largest(20), plays: await evaluate(`!${sound}.paused`) };
+  const result = { largest_apart: await largest(3000), plays: await evaluate(`!${sound}.paused`) };
   const listened = await evaluate(`(async () => {
     const context = new AudioContext(), analyser = context.createAnalyser();
     context.createMediaStreamSource(${sound}.captureStream()).connect(analyser);
@@ -119,7 +122,7 @@ const hear = async () => {
   await evaluate('document.activeElement.blur()');
   await key(' ');
   await pause(300);
-  result.played_after_scrub = await largest(8);
+  result.played_after_scrub = await largest(1000);
   await evaluate('document.getElementById("sound").click()');
   await pause(300);
   return { ...result, ...listened, stops: await evaluate(`${sound}.paused`) };

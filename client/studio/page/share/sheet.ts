@@ -1,5 +1,5 @@
 // A contact sheet for print: A4 pages as they will come out of the printer.
-import { artifactUrl, describeSet, follow, getState, type PhotoSet, type Run } from '../api';
+import { artifactUrl, describeSet, follow, getState, type Found, type PhotoSet, type Run } from '../api';
 import { button, h, problem, replace, say } from '../dom';
 import { setStepsOf } from '../main';
 import { coloredUrl, getCredit } from './calls';
@@ -19,16 +19,17 @@ const lastState = (id: string): Promise<Run> => new Promise((done, failed) => {
   });
 });
 
-const picturesOf = async (run: Run, set: PhotoSet | undefined): Promise<{ key: Picture[]; others: Picture[] }> => {
+const picturesOf = async (run: Run, set: PhotoSet | undefined, found: Found | undefined): Promise<{ key: Picture[]; others: Picture[] }> => {
+  const isFilm = found?.kind === 'film';
+  const keyText = isFilm && run.key_view ? frameText(stem(run.key_view)) : 'Key photo';
   const key: Picture[] = run.artifacts.some(({ name }) => name === 'key_view_colored.png')
-    ? [{ src: artifactUrl(run.id, 'key_view_colored.png'), text: 'Key photo, coloured' }] : [];
+    ? [{ src: artifactUrl(run.id, 'key_view_colored.png'), text: `${keyText}, coloured` }] : [];
   const original = run.artifacts.find(({ name }) => name === 'key_view.png');
-  if (original) key.unshift({ src: artifactUrl(run.id, original.name), text: `Key photo, original${run.key_view ? `: ${stem(run.key_view)}` : ''}` });
-  const found = set && (await describeSet(set.id)).found;
+  if (original) key.unshift({ src: artifactUrl(run.id, original.name), text: `${keyText}, original${run.key_view && !isFilm ? `: ${stem(run.key_view)}` : ''}` });
   if (!set || !found || found.kind !== 'photos') {
-    const isScene = run.artifacts.some(({ name }) => name === 'view.html');
     const drawn = run.artifacts.filter(({ name }) => /^renders\/.*\.png$/.test(name));
-    return { key, others: spread(drawn, mostPhotos).map(({ name }) => ({ src: artifactUrl(run.id, name), text: isScene ? `${stem(name)}, drawn from the scene` : frameText(stem(name)) })) };
+    return { key, others: spread(drawn, isFilm ? onFirstPage : mostPhotos).map(({ name }) =>
+      ({ src: artifactUrl(run.id, name), text: isFilm ? frameText(stem(name)) : `${stem(name)}, drawn from the scene` })) };
   }
   const rest = found.photos.filter(({ name }) => !run.key_view || stem(name) !== stem(run.key_view));
   return { key, others: spread(rest, mostPhotos).map(({ name }) => ({ src: coloredUrl(run.id, set.id, name, sideOfThumb), text: stem(name) })) };
@@ -56,8 +57,9 @@ export const showSheet = (main: HTMLElement, id: string): (() => void) => {
   const load = async (): Promise<void> => {
     const [run, { sets }, credit] = await Promise.all([lastState(id), getState(), getCredit()]);
     const set = sets.find((one) => one.scene === run.scene);
-    if (set) setStepsOf(set.id, 3);
-    const { key, others } = await picturesOf(run, set);
+    const found = set && (await describeSet(set.id)).found;
+    if (set) setStepsOf(set.id, found?.kind === 'photos' ? 3 : 0); // films go without steps
+    const { key, others } = await picturesOf(run, set, found);
     if (left) return;
     const loads: Promise<void>[] = [];
     const pages = pagesOf(others, onFirstPage, onOthers);
