@@ -69,8 +69,9 @@ const playLoops = async (count) => {
   return evaluate('window.seenLoops');
 };
 
-// How the sound goes along: seconds between it and the slider (largest_apart: while all plays at speed 1; after_scrub: at
-// rest, and played_after_scrub: played on, after the slider was moved); level and hz: root mean square and pitch of what
+// How the sound goes along: seconds between it and the slider (largest_apart: while all plays at speed 1, beginnings of
+// loops with it, where the picture waits for the sound; after_scrub: at rest, and played_after_scrub: played on, after the
+// slider was moved); level and hz: root mean square and pitch of what
 // is heard; stops: whether the button switches it off.
 const hear = async () => {
   const sound = 'document.getElementById("heard")';
@@ -121,8 +122,8 @@ const hear = async () => {
   result.scrubbed_to = await evaluate(`${sound}.currentTime`);
   await evaluate('document.activeElement.blur()');
   await key(' ');
-  await pause(300);
-  result.played_after_scrub = await largest(1000);
+  await pause(700);
+  result.played_after_scrub = await largest(400);
   await evaluate('document.getElementById("sound").click()');
   await pause(300);
   return { ...result, ...listened, stops: await evaluate(`${sound}.paused`) };
