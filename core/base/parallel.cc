@@ -82,6 +82,7 @@ void ThreadPool::Run(const std::function<void(int)>& task) {
 void ThreadPool::ForEach(int64_t count,
                          const std::function<void(int64_t index, int thread)>& body) {
   if (count <= 0) return;
+  if (count == 1) return body(0, 0);  // waking the others would take longer than many a body
   std::atomic<int64_t> next{0};
   std::atomic<bool> failed{false};
   Run([&](int thread) {

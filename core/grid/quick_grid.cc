@@ -123,7 +123,7 @@ GridSolution QuickGrid::Solve(std::vector<uint8_t> pinned,
                               const GridPlane* data,
                               const std::vector<float>& target,
                               const CancellationToken& cancel) {
-  const bool is_first = data != nullptr || !KeepsPinsOf(pinned);
+  const bool is_first = data == nullptr && !KeepsPinsOf(pinned);
   const std::vector<float> start = Beginning(pinned, data, target, cancel);
   if (data == nullptr) pinned_before_ = pinned;
   GridSolution solved = fine_.Solve(

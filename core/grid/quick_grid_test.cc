@@ -80,7 +80,9 @@ TEST(QuickGridTest, FollowsPinsThatAreAddedAndTakenAway) {
     const GridSolution solved =
         exact.Solve(painted.pinned, data, painted.target, {1e-6, 300}, [](int, double) {}, {});
     for (size_t i = 0; i < painted.pinned.size(); ++i) {
-      if (painted.pinned[i]) EXPECT_EQ(near.u[i], painted.target[i]);
+      if (painted.pinned[i]) {
+        EXPECT_EQ(near.u[i], painted.target[i]);
+      }
     }
     return MeanDifference(near.u, solved.u);
   };

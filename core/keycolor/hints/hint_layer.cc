@@ -31,7 +31,7 @@ constexpr float kLeastWeight = 1e-6f;
 // Hinted share of a cell from which on its own mean counts alone, so that far hints do not.
 constexpr float kFullWeight = 200.0f;
 // For quick answers.
-constexpr int kLayerHalvings = 1;
+constexpr int kLayerHalvings = 2;
 
 // The smallest coupling difference of each pixel (1 channel, L units).
 Image SigmaOfTexture(const Image& luminance, const LayerOptions& options) {

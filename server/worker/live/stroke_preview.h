@@ -56,8 +56,7 @@ class StrokePreview {
                        const std::string& key);
   std::string PngOf(const Image& luminance, const Image& ab, bool is_preview);
   // What `prepare` makes of a photo for quick solutions, or what is kept of it.
-  Shared Grid(const std::string& key,
-              const std::function<std::shared_ptr<QuickGrid>()>& prepare);
+  Shared Grid(const std::string& key, const std::function<std::shared_ptr<QuickGrid>()>& prepare);
   // Of solutions that nobody watches or ends.
   RunControl Control() { return {pool_, checkpoints_, progress_, never_}; }
 
