@@ -1,6 +1,7 @@
 // Shows a page of core/view in a frame, in headless Chromium, and has it drawn in tones (page/framed.js). Prints as JSON:
 // errors: of the console; seen: mean colours (0..255) of the scene's left and right part, for each tone as soon as it is
-// said to be drawn (at_once) and when the scene itself was drawn in it (at_rest), and after the camera has moved.
+// said to be drawn (at_once) and when the scene itself was drawn in it (at_rest), and after the camera has moved; rows:
+// then, green of 8 rows of the picture, at_once and at_rest.
 //   node show_tones.mjs CHROMIUM PAGE [SCREENSHOTS]
 import { mkdirSync, writeFileSync } from 'node:fs';
 import { dirname, join, resolve } from 'node:path';
@@ -43,7 +44,14 @@ const colors = async (name) => {
       for (let i = 0; i < part.length; ++i) if (i % 4 < 3) sum[i % 4] += part[i] / 900;
       return sum.map(Math.round);
     };
-    return { left: mean(200), right: mean(370) };
+    const rows = [];
+    for (let row = 0; row < 8; ++row) {
+      const part = context.getImageData(100, 50 * row, 400, 50).data;
+      let sum = 0;
+      for (let i = 1; i < part.length; i += 4) sum += part[i];
+      rows.push(Math.round((4 * sum) / part.length));
+    }
+    return { left: mean(200), right: mean(370), rows };
   })()`);
 };
 
@@ -67,10 +75,16 @@ const use = async () => {
   await evaluate('window.show([0, 0, 0, 0])');
   const mouse = (type, x, y) => send('Input.dispatchMouseEvent', { type, x, y, button: 'left', buttons: type === 'mouseReleased' ? 0 : 1, clickCount: 1 });
   await mouse('mousePressed', 300, 200);
-  for (let i = 1; i <= 8; ++i) await mouse('mouseMoved', 300 + 4 * i, 200);
-  await mouse('mouseReleased', 332, 200);
+  for (let i = 1; i <= 8; ++i) await mouse('mouseMoved', 300 + 4 * i, 200 + 12 * i);
+  await mouse('mouseReleased', 332, 296);
   await pause(2500);
   seen.moved = await colors('moved');
+  for (const tone of [[0.8, 0, 0.8, 0], [1.2, 0, 1.2, 0]]) await evaluate(`window.show(${JSON.stringify(tone)})`);
+  await pause(300);
+  const rows = { at_once: (await colors('rows_at_once')).rows };
+  await pause(2500);
+  rows.at_rest = (await colors('rows_at_rest')).rows;
+  seen.rows = rows;
   return { seen, errors };
 };
 

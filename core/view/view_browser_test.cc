@@ -1,8 +1,10 @@
 // The page in a real browser: headless Chromium without a graphics card, driven by Node.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "core/base/files.h"
@@ -218,6 +220,15 @@ TEST_F(BrowserTest, FramedSceneIsDrawnInTones) {
     const auto moved = shown.at("seen").at("moved").at(half).get<std::array<int, 3>>();
     EXPECT_NEAR(moved[0], moved[2], 4) << "grey after the camera has moved";
   }
+  const auto rows = [&](const char* when) {
+    return shown.at("seen").at("rows").at(when).get<std::array<int, 8>>();
+  };
+  int upside_down = 0;
+  for (int row = 0; row < 8; ++row) {
+    EXPECT_NEAR(rows("at_once")[row], rows("at_rest")[row], 4) << row;
+    upside_down = std::max(upside_down, std::abs(rows("at_rest")[row] - rows("at_rest")[7 - row]));
+  }
+  EXPECT_GT(upside_down, 8) << "the picture tells top from bottom";
 }
 
 }  // namespace

@@ -4,21 +4,27 @@ const color3dShading = (() => {
 // Tone and changes of colours in Lab, with the constants of core/color/lab.cc.
 const toned = `
 uniform vec4 uTone;
-vec3 toned(vec3 srgb, vec2 change) {
+// a, b and L + 16.
+vec3 labOf(vec3 srgb) {
   vec3 encoded = clamp(srgb, 0.0, 1.0);
   vec3 linear = mix(encoded / 12.92, pow((encoded + 0.055) / 1.055, vec3(2.4)), step(0.04045, encoded));
   vec3 xyz = vec3(dot(linear, vec3(0.433950, 0.376210, 0.189840)),
                   dot(linear, vec3(0.212673, 0.715152, 0.072175)),
                   dot(linear, vec3(0.017757, 0.109468, 0.872775)));
   vec3 f = mix((903.2963 * xyz + 16.0) / 116.0, pow(max(xyz, 1e-6), vec3(1.0 / 3.0)), step(0.008856452, xyz));
-  float a = 500.0 * (f.x - f.y) + change.x, b = 200.0 * (f.y - f.z) + change.y, bright = 116.0 * f.y;
-  f.x = f.y + (uTone.x * a + uTone.y * bright) / 500.0;
-  f.z = f.y - (uTone.z * b + uTone.w * bright) / 200.0;
-  xyz = mix((116.0 * f - 16.0) / 903.2963, f * f * f, step(6.0 / 29.0, f));
-  linear = clamp(vec3(dot(xyz, vec3(3.079955, -1.537139, -0.542816)),
-                      dot(xyz, vec3(-0.921259, 1.876011, 0.045248)),
-                      dot(xyz, vec3(0.052887, -0.204026, 1.151138))), 0.0, 1.0);
+  return vec3(500.0 * (f.x - f.y), 200.0 * (f.y - f.z), 116.0 * f.y);
+}
+vec3 inTone(vec3 lab) {
+  float y = lab.z / 116.0;
+  vec3 f = vec3(y + (uTone.x * lab.x + uTone.y * lab.z) / 500.0, y, y - (uTone.z * lab.y + uTone.w * lab.z) / 200.0);
+  vec3 xyz = mix((116.0 * f - 16.0) / 903.2963, f * f * f, step(6.0 / 29.0, f));
+  vec3 linear = clamp(vec3(dot(xyz, vec3(3.079955, -1.537139, -0.542816)),
+                           dot(xyz, vec3(-0.921259, 1.876011, 0.045248)),
+                           dot(xyz, vec3(0.052887, -0.204026, 1.151138))), 0.0, 1.0);
   return mix(12.92 * linear, 1.055 * pow(max(linear, 1e-6), vec3(1.0 / 2.4)) - 0.055, step(0.0031308, linear));
+}
+vec3 toned(vec3 srgb, vec2 change) {
+  return inTone(labOf(srgb) + vec3(change, 0.0));
 }
 `;
 // Lightness that people see, as sRGB; shades for where a colour comes from, over the grey picture.

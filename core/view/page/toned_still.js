@@ -9,53 +9,79 @@ const kPlain = [1, 0, 1, 0];
 const vertex = `#version 300 es
 out vec2 at;
 void main() {
-  vec2 corner = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1));
-  at = vec2(corner.x, 1.0 - corner.y);
-  gl_Position = vec4(2.0 * corner - 1.0, 0.0, 1.0);
+  at = vec2(float(gl_VertexID & 1), float(gl_VertexID >> 1));
+  gl_Position = vec4(2.0 * at - 1.0, 0.0, 1.0);
 }`;
-const fragment = `#version 300 es
+const fragment = (statement) => `#version 300 es
 precision highp float;
-uniform sampler2D uScene;
+uniform sampler2D uPicture;
 in vec2 at;
 out vec4 drawn;
 ${color3dShading.toned}
 void main() {
-  drawn = vec4(toned(texture(uScene, at).rgb, vec2(0.0)), 1.0);
+  vec3 picture = texture(uPicture, at).rgb;
+  drawn = vec4(${statement}, 1.0);
 }`;
+// Lab in 10 bits each: the picture is converted once, and every tone goes on from there.
+const toStored = fragment('labOf(picture) / vec3(256.0, 256.0, 128.0) + vec3(0.5, 0.5, 0.0)');
+const fromStored = fragment('inTone((picture - vec3(0.5, 0.5, 0.0)) * vec3(256.0, 256.0, 128.0))');
+
+const makeProgram = (gl, text) => {
+  const program = gl.createProgram();
+  for (const [kind, source] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, text]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source);
+    gl.compileShader(shader);
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  return gl.getProgramParameter(program, gl.LINK_STATUS) ? program : null;
+};
+const makeTexture = (gl) => {
+  const texture = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_2D, texture);
+  for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST],
+                               [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]]) {
+    gl.texParameteri(gl.TEXTURE_2D, name, value);
+  }
+  return texture;
+};
 
 // Draws pictures in tones to its canvas; null without WebGL 2.
 const makePainter = () => {
   const canvas = document.createElement('canvas');
   const gl = canvas.getContext('webgl2', { alpha: false, antialias: false, depth: false });
-  const program = gl && gl.createProgram();
-  if (!program) return null;
-  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-    const shader = gl.createShader(kind);
-    gl.shaderSource(shader, text);
-    gl.compileShader(shader);
-    gl.attachShader(program, shader);
-  }
-  gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) return null;
-  gl.useProgram(program);
-  gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-  for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST],
-                               [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]]) {
-    gl.texParameteri(gl.TEXTURE_2D, name, value);
-  }
-  const tone = gl.getUniformLocation(program, 'uTone');
+  const [convert, paint] = gl ? [toStored, fromStored].map((text) => makeProgram(gl, text)) : [];
+  if (!convert || !paint) return null;
+  gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, true);
+  const picture = makeTexture(gl), stored = makeTexture(gl);
+  const target = gl.createFramebuffer();
+  const tone = gl.getUniformLocation(paint, 'uTone');
+  const draw = (program, texture) => {
+    gl.useProgram(program);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+  };
   return {
     canvas,
-    take: (picture) => {
-      canvas.width = picture.width;
-      canvas.height = picture.height;
-      gl.viewport(0, 0, canvas.width, canvas.height);
-      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, picture);
+    take: (source) => {
+      const { width, height } = source;
+      Object.assign(canvas, { width, height });
+      gl.viewport(0, 0, width, height);
+      gl.bindTexture(gl.TEXTURE_2D, stored);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB10_A2, width, height, 0, gl.RGBA, gl.UNSIGNED_INT_2_10_10_10_REV, null);
+      gl.bindTexture(gl.TEXTURE_2D, picture);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, source);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, target);
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, stored, 0);
+      draw(convert, picture);
+      gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     },
     draw: (values) => {
       if (gl.isContextLost()) return false;
+      gl.useProgram(paint);
       gl.uniform4f(tone, ...values);
-      gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+      draw(paint, stored);
       return true;
     },
   };

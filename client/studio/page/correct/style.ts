@@ -10,11 +10,11 @@ main:has(.co){max-width:112rem}
 .co-group button[aria-pressed=true]+button[aria-pressed=true]{border-left-color:var(--on-accent)}
 .co-panes{display:grid;grid-auto-flow:column;grid-auto-columns:minmax(0,1fr);gap:.6rem}
 .co-picture{margin:0;min-width:0}
-.co-canvases{position:relative;aspect-ratio:var(--aspect,3/2);background:#0d0e10;border-radius:6px;overflow:hidden}
+.co-canvases{position:relative;aspect-ratio:var(--aspect,3/2);background:#0d0e10}
 .co-canvases canvas{position:absolute;inset:0;width:100%;height:100%}
 .co-canvases canvas:last-child{touch-action:none;cursor:crosshair;outline-offset:-3px}
 .co-picture figcaption{font-size:.87rem;color:var(--soft);padding:.25rem 0 0}
-.co-scene{position:relative;min-height:20rem;background:#000;border-radius:6px;overflow:hidden}
+.co-scene{position:relative;min-height:20rem;background:#000;overflow:hidden}
 .co-scene .scene{position:absolute;inset:0;width:100%;height:100%;border:0;border-radius:0}
 .co-scene .co-coming{visibility:hidden}
 .co-pane-scene{min-width:0;display:flex;flex-direction:column}.co-pane-scene .co-scene{flex:1}
