@@ -54,6 +54,7 @@ export class Corrector {
   private readonly scenes = new Map<string, { run: string; tone: Tone }>(); // by address
   private sceneColors = ''; // what the scene was told
   private applied = ''; // a trial that is being applied
+  private readonly removed = new Set<string>(); // corrections that are being removed
   private without: Colors | null = null;
   private asked = 0; // number of the newest request for pictures
   private frame = 0;
@@ -99,7 +100,7 @@ export class Corrector {
       askGray: (on) => this.brush.setTool(on ? 'gray' : 'brush'),
     });
     this.history = new HistoryPanel({
-      remove: (id) => void this.change({ remove: [id] }, 'Removing the correction …'),
+      remove: (id) => void this.remove(id),
       without: (id) => void this.showWithout(id),
       draw: (correction, before, after) => void this.drawPlace(correction, before, after),
     });
@@ -174,9 +175,7 @@ export class Corrector {
     try {
       const maps = await changesBetween(this.store, this.version.views, own, this.colors, gainOf(scene.tone));
       if (!this.isOver && wanted === this.sceneColors) this.scene.recolor(maps);
-    } catch {
-      // The scene itself follows.
-    }
+    } catch { /* The scene itself follows. */ }
   }
   private async fillMain(): Promise<void> {
     const number = ++this.asked;
@@ -279,9 +278,9 @@ export class Corrector {
   private undoByKey(event: KeyboardEvent): void {
     if (event.key !== 'z' || !(event.ctrlKey || event.metaKey) || event.shiftKey) return;
     event.preventDefault();
-    const last = this.version.corrections.at(-1);
+    const last = this.version.corrections.filter(({ id }) => !this.removed.has(id)).at(-1);
     if (!this.draft.isEmpty) this.draft.undo(this.run);
-    else if (last && !this.work.job) void this.change({ remove: [last.id] }, 'Removing the correction …');
+    else if (last && !this.applied) void this.remove(last.id);
   }
   private showStrokes(): void {
     const strokes = this.draft.view === this.view.name ? this.draft.strokes : [];
@@ -329,6 +328,10 @@ export class Corrector {
     this.draft.clear();
     if (!await this.change({ add: asNew }, 'All photos have the new colours. The scene follows …')) this.draft.restore(asNew, trial);
   }
+  private async remove(id: string): Promise<void> {
+    this.removed.add(id);
+    if (!await this.change({ remove: [id] }, 'Removing the correction …')) this.removed.delete(id);
+  }
   private askTone(tone: Tone): void {
     if (sameTone(tone, this.ownTone ?? this.version.tone)) return;
     this.ownTone = tone;
@@ -350,11 +353,8 @@ export class Corrector {
   }
   private onVersions({ newest, working }: VersionState): void {
     if (this.isOver) return;
-    if (working) {
-      this.follow(working, 'The scene is being changed …');
-    } else if (!working && newest && newest !== this.run) {
-      void this.switchTo(newest);
-    }
+    if (working) this.follow(working, 'The scene is being changed …');
+    else if (newest && newest !== this.run) void this.switchTo(newest);
   }
   private follow(job: string, text: string): void {
     this.work.follow(job, text);
@@ -437,9 +437,7 @@ export class Corrector {
         if (this.isOver) return;
         this.shader.draw(canvas.getContext('2d')!, parts, look, crop);
       }
-    } catch {
-      // A small picture is not worth a message; the photo itself tells what is wrong.
-    }
+    } catch { /* A small picture is not worth a message; the photo itself tells what is wrong. */ }
   }
 
   private complain(text: string, error?: unknown): void {
