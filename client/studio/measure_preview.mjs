@@ -1,27 +1,14 @@
 // Measures how long the preview of a stroke takes in the studio, with a real mouse in headless Chromium:
 //   node measure_preview.mjs CHROMIUM ADDRESS [STROKES] [SCREENSHOTS]
-// ADDRESS: as `color3d studio PHOTOS --no-open` printed it. Prints a line for each choice of colours below the strokes: the
+// ADDRESS: as `color3d studio PHOTOS --no-open` printed it. Prints as JSON, for each choice of colours below the strokes, the
 // median, 90th percentile and maximum of the times, ms, from the end of the stroke to the picture in the page.
-import { mkdirSync, writeFileSync } from 'node:fs';
-import { join } from 'node:path';
-
-import { openBrowser, pause } from '../../tests/support/browser.mjs';
+import { pause } from '../../tests/support/browser.mjs';
+import { openPage } from '../../tests/support/page_hand.mjs';
 
 const [chromium, address, count = '20', screenshots] = process.argv.slice(2);
-if (screenshots) mkdirSync(screenshots, { recursive: true });
-const { send, open, evaluate, close } = openBrowser(chromium, ['--window-size=1400,1000', '--force-color-profile=srgb']);
-
-const waitFor = async (expression, limit = 120000) => {
-  for (const end = Date.now() + limit; Date.now() < end; await pause(10)) {
-    const value = await evaluate(expression);
-    if (value) return value;
-    const problem = await evaluate('document.querySelector(".problem p")?.textContent');
-    if (problem) throw new Error('the page says: ' + problem);
-  }
-  throw new Error(`waited in vain for ${expression}`);
-};
-const click = (selector) => evaluate(`document.querySelector(${JSON.stringify(selector)}).click()`);
-const mouse = (type, [x, y], more = {}) => send('Input.dispatchMouseEvent', { type, x, y, ...more });
+const { evaluate, waitFor, click, drag, keep, tell } = openPage(chromium, address, screenshots, {
+  flags: ['--window-size=1400,1000', '--force-color-profile=srgb'], limit: 120000, every: 10,
+});
 
 // A stroke between two places, shares of the canvas that shows the photo.
 const stroke = async (from, to) => {
@@ -30,11 +17,7 @@ const stroke = async (from, to) => {
     const b = c.getBoundingClientRect(), d = document.querySelector('.paint').dataset;
     return { left: b.x + Number(d.x), top: b.y + Number(d.y), width: b.width - 2 * d.x, height: b.height - 2 * d.y }; })()`);
   const at = ([x, y]) => [Math.round(box.left + x * box.width), Math.round(box.top + y * box.height)];
-  await mouse('mousePressed', at(from), { button: 'left', buttons: 1, clickCount: 1 });
-  for (let i = 1; i <= 6; ++i) {
-    await mouse('mouseMoved', at([0, 1].map((k) => from[k] + ((to[k] - from[k]) * i) / 6)), { button: 'left', buttons: 1 });
-  }
-  await mouse('mouseReleased', at(to), { button: 'left', clickCount: 1 });
+  await drag(at(from), at(to), 6);
 };
 
 const measure = async (below) => {
@@ -50,20 +33,14 @@ const measure = async (below) => {
     const ms = Number(await evaluate('document.querySelector(".paint").dataset.previewMs'));
     if (i > 0) times.push(ms);
     await pause(60);
-    if (screenshots && [0, 3, Number(count)].includes(i)) {
-      const { data } = await send('Page.captureScreenshot', { format: 'png' });
-      writeFileSync(join(screenshots, `${below}_${i}.png`), Buffer.from(data, 'base64'));
-    }
+    if ([0, 3, Number(count)].includes(i)) await keep(`${below}_${i}`);
   }
   times.sort((a, b) => a - b);
   const at = (share) => times[Math.min(times.length - 1, Math.floor(share * times.length))];
-  console.log(`${below}: median of ${times.length} ${at(0.5)} ms, 90 % ${at(0.9)} ms, longest ${times.at(-1)} ms`);
+  return { median: at(0.5), ninety_percent: at(0.9), longest: times.at(-1), count: times.length };
 };
 
-let failed = 0;
-try {
-  await open();
-  await send('Page.navigate', { url: address });
+await tell(async () => {
   const set = /page=set\/([0-9a-f-]+)/.exec(address)[1];
   await waitFor('location.hash.startsWith("#set/")');
   await evaluate(`location.hash = 'key/${set}'`);
@@ -71,10 +48,5 @@ try {
   await waitFor('document.querySelector("#told").textContent === ""');
   await click('#paint');
   await waitFor('!!document.querySelector(".paint-stage canvas")');
-  for (const below of ['nothing', 'automatic']) await measure(below);
-} catch (error) {
-  console.error(error.stack);
-  failed = 1;
-}
-await close();
-process.exit(failed);
+  return { nothing: await measure('nothing'), automatic: await measure('automatic') };
+});

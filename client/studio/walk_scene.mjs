@@ -8,18 +8,19 @@ import { readdirSync, statSync } from 'node:fs';
 import { join } from 'node:path';
 
 import { drawnBySoftware, openPage } from '../../tests/support/page_hand.mjs';
+import { data, draw, main } from './page/correct/check/corrector_hand.mjs';
 
 const [chromium, address, folder, out, how, screenshots] = process.argv.slice(2);
 const byTouch = how === 'touch';
-const { send, evaluate, waitFor, boxOf, click, drag, press, drop, choose, saveTo, savedAs, clickText, keep, tell } =
-    openPage(chromium, address, screenshots, { byTouch, flags: [...drawnBySoftware, '--window-size=1440,1000'], limit: 240000 });
+const hand = openPage(chromium, address, screenshots, {
+  byTouch, flags: [...drawnBySoftware, '--window-size=1440,1000'], limit: 240000,
+});
+const { send, evaluate, waitFor, boxOf, click, drag, press, drop, choose, saveTo, savedAs, clickText, keep, tell } = hand;
 
-const corrector = (name) => `(document.querySelector('#corrector')?.dataset.${name} ?? '')`;
-const photo = '.co-panes figure:nth-of-type(2) canvas:last-child';
-// A stroke between two places, shares of the picture that the canvas shows.
-const stroke = async (canvas, from, to) => {
-  const { x, y, width, height } = await boxOf(canvas);
-  const edge = await evaluate('(({ x = 0, y = 0 } = {}) => ({ x: Number(x), y: Number(y) }))(document.querySelector(".paint")?.dataset)');
+// A stroke on the key photo between two places, shares of it; the canvas has edges around it.
+const paint = async (from, to) => {
+  const { x, y, width, height } = await boxOf('.paint-stage canvas');
+  const edge = await evaluate('(({ x, y }) => ({ x: Number(x), y: Number(y) }))(document.querySelector(".paint").dataset)');
   const at = ([u, v]) => [x + edge.x + u * (width - 2 * edge.x), y + edge.y + v * (height - 2 * edge.y)];
   await drag(at(from), at(to));
 };
@@ -56,7 +57,7 @@ await tell(async () => {
   const strokes = [['#d8b020', [0.40, 0.51], [0.55, 0.60]], ['#b8a890', [0.10, 0.12], [0.26, 0.16]], ['#b8a890', [0.70, 0.86], [0.88, 0.88]]];
   for (const [i, [color, from, to]] of strokes.entries()) {
     await setCode(color);
-    await stroke('.paint-stage canvas', from, to);
+    await paint(from, to);
     await waitFor(`document.querySelector(".paint").dataset.count === "${i + 1}" && document.querySelector(".paint").dataset.preview === "shown"`);
   }
   await done('painted');
@@ -65,29 +66,29 @@ await tell(async () => {
   await waitFor('document.querySelectorAll(".gallery img").length > 1'); // the key photo and another one
   await done('first_colors');
   await waitFor('document.querySelector("main").dataset.state === "done"');
-  await waitFor(corrector('scene'));
-  await waitFor(corrector('shown'));
+  await waitFor(data('scene'));
+  await waitFor(data('shown'));
   await done('scene');
 
-  await stroke(photo, [0.45, 0.70], [0.55, 0.72]);
-  await waitFor(corrector('trial'));
+  await draw(hand, [0.45, 0.70], [0.55, 0.72]);
+  await waitFor(data('trial'));
   await done('touches');
-  const run = await evaluate(corrector('run'));
+  const run = await evaluate(data('run'));
   await click('#co-apply');
-  await waitFor(`${corrector('run')} !== ${JSON.stringify(run)} && ${corrector('corrections')} === '1'`);
+  await waitFor(`${data('run')} !== ${JSON.stringify(run)} && ${data('corrections')} === '1'`);
   await done('corrected');
 
-  const corrected = await evaluate(corrector('run'));
+  const corrected = await evaluate(data('run'));
   if (byTouch) {
     await click('.co-history li:first-child .co-remove');
   } else {
-    await evaluate(`document.querySelector(${JSON.stringify(photo)}).focus()`);
+    await evaluate(`document.querySelector(${JSON.stringify(main)}).focus()`);
     await press('z', 2);
   }
-  await waitFor(`${corrector('run')} !== ${JSON.stringify(corrected)} && ${corrector('corrections')} === '0'`);
+  await waitFor(`${data('run')} !== ${JSON.stringify(corrected)} && ${data('corrections')} === '0'`);
   await done('undone');
 
-  await waitFor(`!${corrector('working')}`);
+  await waitFor(`!${data('working')}`);
   await clickText('Save the page');
   await savedAs('view.html');
   await done('saved');

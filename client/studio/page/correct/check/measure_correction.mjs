@@ -5,30 +5,24 @@
 // frames while the saturation is moved.
 import { pause } from '../../../../../tests/support/browser.mjs';
 import { drawnBySoftware, openPage } from '../../../../../tests/support/page_hand.mjs';
+import { data, draw, setColor, slide } from './corrector_hand.mjs';
 
 const [chromium, address, count = '5', screenshots] = process.argv.slice(2);
 const hand = openPage(chromium, address, screenshots, {
   flags: [...drawnBySoftware, '--window-size=1440,1000'], limit: 120000, every: 10,
 });
-const { evaluate, waitFor, boxOf, mouse, click, drag, keep, tell } = hand;
-const data = (name) => `(document.querySelector('#corrector').dataset[${JSON.stringify(name)}] ?? '')`;
-const main = '.co-panes figure:nth-of-type(2) canvas:last-child';
+const { evaluate, waitFor, click, keep, tell } = hand;
 const median = (values) => [...values].sort((a, b) => a - b)[values.length >> 1];
 
 const strokes = async () => {
   const times = { tried: [], scene: [], all: [] };
   for (let i = 0; i < Number(count); ++i) {
-    const { x, y, width, height } = await boxOf(main);
     const at = [0.15 + 0.7 * ((i * 0.618) % 1), 0.2 + (0.6 * (i % 5)) / 5];
     // A new colour each time: what was tried before comes from the cache.
     const color = '#' + Math.floor(Math.random() * 0x1000000).toString(16).padStart(6, '0');
-    await evaluate(`(() => {
-      const input = document.querySelector('#co-color');
-      input.value = ${JSON.stringify(color)};
-      input.dispatchEvent(new Event('input'));
-    })()`);
+    await setColor(hand, color);
     const before = await evaluate(data('recolored'));
-    await drag([x + at[0] * width, y + at[1] * height], [x + (at[0] + 0.08) * width, y + at[1] * height]);
+    await draw(hand, at, [at[0] + 0.08, at[1]]);
     const begun = Date.now();
     await waitFor(data('trial'));
     const tried = Date.now();
@@ -48,22 +42,6 @@ const strokes = async () => {
   return { tried: median(times.tried), scene: median(times.scene), all: median(times.all), times };
 };
 
-// ms between frames while a slider is moved by the mouse.
-const slide = async (selector, from, to) => {
-  const { x, y, width, height } = await boxOf(selector);
-  await evaluate(`(() => {
-    window.color3dFrames = [];
-    const tick = (now) => { window.color3dFrames.push(now); window.color3dTick = requestAnimationFrame(tick); };
-    requestAnimationFrame(tick);
-  })()`);
-  await mouse('mousePressed', x + from * width, y + height / 2);
-  for (let i = 1; i <= 30; ++i) await mouse('mouseMoved', x + (from + ((to - from) * i) / 30) * width, y + height / 2);
-  const frames = await evaluate('cancelAnimationFrame(window.color3dTick), window.color3dFrames.slice(1).map((t, i) => t - window.color3dFrames[i])');
-  await keep('saturation');
-  await mouse('mouseReleased', x + to * width, y + height / 2);
-  return { median: median(frames), longest: Math.max(...frames), count: frames.length };
-};
-
 await tell(async () => {
   await waitFor('!!document.querySelector("#corrector")');
   await waitFor(data('scene'), 180000);
@@ -71,6 +49,6 @@ await tell(async () => {
   await pause(2000);
   const seen = await strokes();
   await pause(1000);
-  seen.frames = await slide('#co-saturation', 0.5, 0.95);
+  seen.frames = await slide(hand, '#co-saturation', 0.5, 0.95);
   return seen;
 });

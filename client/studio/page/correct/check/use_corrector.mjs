@@ -6,20 +6,18 @@
 // the saturation moves. With a third argument every state leaves PNGs there: light, dark and narrow.
 import { pause } from '../../../../../tests/support/browser.mjs';
 import { drawnBySoftware, openPage } from '../../../../../tests/support/page_hand.mjs';
+import { data, draw, main, setColor, slide } from './corrector_hand.mjs';
 
 const [chromium, address, screenshots] = process.argv.slice(2);
 const hand = openPage(chromium, address, screenshots, {
   flags: [...drawnBySoftware, '--window-size=1440,1000'], limit: 120000, every: 25, narrowHeight: 1600,
 });
-const { send, evaluate, waitFor, boxOf, mouse, clickAt, click, press, tell } = hand;
+const { send, evaluate, waitFor, boxOf, clickAt, click, press, tell } = hand;
 const seen = { seconds: {}, frames: {}, colors: {} };
 const look = async (name) => {
   await evaluate('scrollTo(0, 0)');
   await hand.look(name);
 };
-
-const data = (name) => `(document.querySelector('#corrector').dataset.${name} ?? '')`;
-const main = '.co-panes figure:nth-of-type(2) canvas:last-child';
 
 // Mean colour of a part of the coloured photo, in shares of it.
 const colorAt = (x, y) => evaluate(`(() => {
@@ -51,16 +49,6 @@ const nearlyGray = `(() => {
   }
   return place;
 })()`;
-const setColor = (hex) => evaluate(`(() => {
-  const input = document.querySelector('#co-color');
-  input.value = ${JSON.stringify(hex)};
-  input.dispatchEvent(new Event('input'));
-})()`);
-const draw = async (from, to) => {
-  const { x, y, width, height } = await boxOf(main);
-  const at = ([u, v]) => [x + u * width, y + v * height];
-  await hand.drag(at(from), at(to));
-};
 const seconds = (since) => (Date.now() - since) / 1000;
 const tried = async () => {
   const begun = Date.now();
@@ -80,22 +68,6 @@ const apply = async () => {
   await waitFor(`${data('scene')} !== ${JSON.stringify(scene)}`);
   return { photos, solved, scene: seconds(begun) };
 };
-// Moves a slider by the mouse. Returns the times between frames, ms.
-const slide = async (selector, from, to) => {
-  const { x, y, width, height } = await boxOf(selector);
-  await evaluate(`(() => {
-    window.color3dFrames = [];
-    const tick = (now) => { window.color3dFrames.push(now); window.color3dTick = requestAnimationFrame(tick); };
-    requestAnimationFrame(tick);
-  })()`);
-  await mouse('mousePressed', x + from * width, y + height / 2);
-  for (let i = 1; i <= 30; ++i) await mouse('mouseMoved', x + (from + (to - from) * i / 30) * width, y + height / 2);
-  const frames = await evaluate('cancelAnimationFrame(window.color3dTick), window.color3dFrames.slice(1).map((t, i) => t - window.color3dFrames[i])');
-  await mouse('mouseReleased', x + to * width, y + height / 2);
-  frames.sort((a, b) => a - b);
-  return { median: frames[frames.length >> 1], worst: frames.at(-1), count: frames.length };
-};
-
 const use = async () => {
   await waitFor('!!document.querySelector("#corrector")');
   await waitFor(data('scene'), 180000);
@@ -107,9 +79,9 @@ const use = async () => {
   await click('[data-name=color]');
 
   // A stroke by mouse.
-  await setColor('#c81e1e');
+  await setColor(hand, '#c81e1e');
   seen.colors.before = await colorAt(0.5, 0.7);
-  await draw([0.45, 0.7], [0.55, 0.7]);
+  await draw(hand, [0.45, 0.7], [0.55, 0.7]);
   seen.seconds.tried = await tried();
   await pause(800);
   await look('touches');
@@ -144,7 +116,7 @@ const use = async () => {
   await click('.co-strip li:nth-child(2) button');
   await waitFor(`document.querySelector('.co-strip li:nth-child(2) button').getAttribute('aria-pressed') === 'true'`);
   await pause(500);
-  await setColor('#2b5fc4');
+  await setColor(hand, '#2b5fc4');
   await evaluate(`document.querySelector(${JSON.stringify(main)}).focus()`);
   for (let i = 0; i < 3; ++i) await press('ArrowUp');
   await press('Enter');
@@ -169,7 +141,7 @@ const use = async () => {
   // Saturation by mouse; the scene follows when it is let go of.
   const run = await evaluate(data('run'));
   seen.colors.tone_before = await colorAt(0.3, 0.3);
-  seen.frames = await slide('#co-saturation', 0.5, 0.95);
+  seen.frames = await slide(hand, '#co-saturation', 0.5, 0.95);
   seen.colors.tone_after = await colorAt(0.3, 0.3);
   const begun = Date.now();
   await waitFor(`${data('run')} !== ${JSON.stringify(run)}`);
