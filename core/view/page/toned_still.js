@@ -90,12 +90,7 @@ const makePainter = () => {
 // app: of the viewer; canvas: what it draws on; above: the element after which the still is laid;
 // camera(): text that changes with the view; setTone(tone): has the scene drawn in the tone, at the next frame.
 const attach = ({ app, canvas, above, camera, setTone }) => {
-  const painter = makePainter();
-  if (!painter) return { show: setTone, forget: () => {} };
-  const still = painter.canvas;
-  still.id = 'still';
-  still.hidden = true;
-  above.after(still);
+  let painter;           // undefined: not asked for yet
   let tone = kPlain;     // wanted
   let taken = null;      // camera() of the picture that the painter has
   let state = 'resting'; // or 'taking': the next frame becomes the picture; 'showing' it; 'leaving': the next frame replaces it
@@ -109,28 +104,37 @@ const attach = ({ app, canvas, above, camera, setTone }) => {
   };
   const paint = () => {
     if (!painter.draw(tone)) return rest();
-    still.hidden = false;
+    painter.canvas.hidden = false;
     state = 'showing';
     clearTimeout(timer);
     timer = setTimeout(rest, kRest);
   };
-  app.on('frameend', () => {
+  const onFrame = () => {
     if (state === 'taking') {
       taken = camera();
       painter.take(canvas);
       paint();
     } else if (state === 'leaving') {
-      still.hidden = true;
+      painter.canvas.hidden = true;
       taken = null;
       state = 'resting';
     } else if (state === 'showing' && camera() !== taken) {
       rest();
     }
-  });
+  };
+  const begin = () => {
+    painter = makePainter();
+    if (!painter) return;
+    Object.assign(painter.canvas, { id: 'still', hidden: true });
+    above.after(painter.canvas);
+    app.on('frameend', onFrame);
+  };
   return {
     show: (wanted) => {
       if (state === 'resting' && wanted.join() === tone.join()) return;
       tone = wanted;
+      if (painter === undefined) begin();
+      if (!painter) return setTone(wanted);
       if (state === 'showing' || state === 'leaving') {
         paint();
       } else if (state !== 'taking') {
