@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
@@ -62,9 +63,11 @@ class ColoredViews {
   const Scene& scene() const { return scene_; }
   const ViewImages& images() const { return images_; }
 
-  // Maps but the position.
-
-  PlacedPicture Picture(int view) const {
+  struct Masked {
+    PlacedPicture picture;              // without its position
+    std::shared_ptr<const Image> mask;  // null: none
+  };
+  Masked Picture(int view) const {
     PlacedPicture picture{*images_.Luminance(view), {}, {}, {}};
     picture.ab = ReadTargetAb(context_,
                               scene_.views[view],
@@ -78,11 +81,10 @@ class ColoredViews {
       std::copy_n(provenance.Plane(1), picture.seen.data.size(), picture.seen.data.begin());
     }
     if (mask) MarkMaskedAsSeen(*mask, &picture);
-    return picture;
+    return {std::move(picture), mask};
   }
-  Image Position(int view, const Image& luminance) const {
-    const auto mask = images_.Mask(view);
-    return positions_.Of(view, images_.WorkingCamera(view), luminance, mask.get());
+  Image Position(int view, const Masked& of) const {
+    return positions_.Of(view, images_.WorkingCamera(view), of.picture.luminance, of.mask.get());
   }
   Image Provenance(int view, const Image& size) const {
     return ReadProvenance(context_, scene_.views[view], size.width, size.height);
@@ -109,24 +111,24 @@ class KeptCells {
   KeptCells(const KeptCells&) = delete;
   KeptCells& operator=(const KeptCells&) = delete;
 
-  PictureCells Of(int view, const Image& luminance, const Corrector& corrector) const {
-    const std::string key = Key(view, luminance);
+  PictureCells Of(int view, const ColoredViews::Masked& of, const Corrector& corrector) const {
+    const std::string key = Key(view, of);
     if (const auto bytes = cache_.Get(key)) {
       if (auto cells = ParsePictureCells(*bytes)) return *std::move(cells);
     }
-    PictureCells cells = corrector.Describe(luminance, views_.Position(view, luminance));
+    PictureCells cells = corrector.Describe(of.picture.luminance, views_.Position(view, of));
     cache_.Put(key, SerializePictureCells(cells));
     return cells;
   }
 
  private:
-  std::string Key(int view, const Image& luminance) const {
+  std::string Key(int view, const ColoredViews::Masked& of) const {
     Sha256 key;
     key.Update(kCellsRecipe);
     key.Update(inputs_);
     key.Update(views_.scene().views[view].name);
-    UpdateDigest(luminance, &key);
-    if (const auto mask = views_.images().Mask(view)) UpdateDigest(*mask, &key);
+    UpdateDigest(of.picture.luminance, &key);
+    if (of.mask) UpdateDigest(*of.mask, &key);
     return key.FinishHex();
   }
   static void UpdateDigest(const Image& image, Sha256* digest) {
@@ -174,9 +176,10 @@ Painted ReadCorrection(const ColorCorrection& wanted,
   if (view.held_out) {
     throw InvalidArgument("it is held out for evaluation; correct another view");
   }
-  Painted painted{index, {views.Picture(index), {}, {}, 1.0}};
+  ColoredViews::Masked masked = views.Picture(index);
+  masked.picture.position = views.Position(index, masked);
+  Painted painted{index, {std::move(masked.picture), {}, {}, 1.0}};
   Correction& correction = painted.correction;
-  correction.picture.position = views.Position(index, correction.picture.luminance);
   const GivenColors given =
       ReadGivenColors(wanted.colors,
                       ReadKeyPhoto(context.scene_folder() / view.image_file, context.MemoryBytes()),
@@ -186,8 +189,8 @@ Painted ReadCorrection(const ColorCorrection& wanted,
   correction.ab = std::move(undistorted.ab);
   correction.painted = std::move(undistorted.confidence);
   correction.reach = given.reach;
-  if (const auto mask = views.images().Mask(index)) {
-    ClearMasked(mask.get(), &correction.painted);
+  if (masked.mask) {
+    ClearMasked(masked.mask.get(), &correction.painted);
     if (Mean(correction.painted) == 0.0) {
       throw InvalidArgument("all that it paints is masked out; paint other pixels");
     }
@@ -231,14 +234,14 @@ struct CorrectedView {
 };
 
 CorrectedView CorrectView(int number,
-                          const PlacedPicture& picture,
+                          const ColoredViews::Masked& masked,
                           const std::vector<Painted>& painted,
                           const Corrector& corrector,
                           const KeptCells& cells,
                           int samples) {
-  CorrectedView corrected{
-      corrector.Predict(picture, cells.Of(number, picture.luminance, corrector), samples),
-      picture.ab};
+  const PlacedPicture& picture = masked.picture;
+  CorrectedView corrected{corrector.Predict(picture, cells.Of(number, masked, corrector), samples),
+                          picture.ab};
   auto& [answer, ab] = corrected;
   for (size_t i = 0; i < ab.data.size(); ++i) ab.data[i] += answer.change.data[i];
   for (const Painted& one : painted) {
@@ -327,10 +330,10 @@ void RunCorrectColors(const CorrectColorsOptions& options,
     context.ThrowIfCancelled();
     const auto number = static_cast<int>(index);
     const View& view = scene.views[index];
-    const PlacedPicture picture = views.Picture(number);
+    const ColoredViews::Masked masked = views.Picture(number);
     auto [answer, ab] =
-        CorrectView(number, picture, painted, *corrector, cells, view.held_out ? 0 : samples);
-    Image provenance = views.Provenance(number, picture.luminance);
+        CorrectView(number, masked, painted, *corrector, cells, view.held_out ? 0 : samples);
+    Image provenance = views.Provenance(number, masked.picture.luminance);
     if (!provenance.Empty()) CountAsSeen(answer.share, &provenance);
     const std::string ab_png = EncodeAbPng(ab);
     const std::string pull_png = painted.empty() ? "" : EncodePng8(FitWithin(answer.pull, kPullPx));
@@ -357,9 +360,8 @@ void RunCorrectColors(const CorrectColorsOptions& options,
   nlohmann::ordered_json facts;
   facts["corrections"] = painted.size();
   facts["share_changed"] = changed / static_cast<double>(total);
-  const std::vector<ProposedPlace> proposed =
-      samples == 0 ? std::vector<ProposedPlace>() : corrector->Propose(places, options.proposals);
-  facts["proposals"] = WriteProposals(proposed, training, colors, views, context);
+  facts["proposals"] = WriteProposals(
+      corrector->Propose(places, options.proposals), training, colors, views, context);
   context.WriteOutput(artifact::kCorrections, facts.dump(2));
 }
 
