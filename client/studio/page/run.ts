@@ -13,7 +13,6 @@ import { errorInWords, isFinished, seconds, stageName, stateName } from './words
 const previews = 6;
 const previewSide = 480;
 const tryAgainMs = 5000;
-const betweenLooksMs = 1000;
 
 const stageRow = (stage: Stage): HTMLElement => {
   const note = stage.error ?? stage.left_out ?? (stage.state === 'SUCCEEDED'
@@ -47,18 +46,10 @@ const scene = (run: Run, stops: (() => void)[], onNewest: (run: Run) => void): H
   const frame = (): HTMLElement =>
     h('iframe', { src: artifactUrl(run.id, 'view.html'), sandbox: 'allow-scripts allow-pointer-lock', title: 'The coloured scene', class: 'scene', id: 'scene' });
   const host = h('div', { class: 'corrector' });
-  let newest = '';
-  stops.push(() => { newest = ''; });
   const onVersion = async (id: string): Promise<void> => {
-    newest = id;
     history.replaceState(null, '', `#job/${id}`);
-    // The scene is there before the other files are.
-    let version = await getRun(id);
-    while (newest === id && !isFinished(version.state)) {
-      await new Promise((done) => setTimeout(done, betweenLooksMs));
-      version = await getRun(id);
-    }
-    if (newest === id) onNewest(version);
+    const version = await getRun(id);
+    if (isFinished(version.state)) onNewest(version);
   };
   stops.push(mountCorrector(host, run.id, (id) => void onVersion(id), () => replace(host, frame())));
   return host;

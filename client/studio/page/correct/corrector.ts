@@ -362,7 +362,8 @@ export class Corrector {
   }
   private onRest(succeeded: boolean): void {
     delete this.root.dataset.working;
-    if (succeeded) return;
+    this.removed.clear();
+    if (succeeded) return this.onVersion(this.run);
     this.applied = '';
     this.ownTone = null;
     this.refresh();

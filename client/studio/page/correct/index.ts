@@ -6,7 +6,7 @@ import { Corrector } from './corrector';
 import { useStyle } from './style';
 
 // Shows the scene of a finished run in `host`, and lets the user correct it. `onVersion` is told when a newer version
-// of it is shown. Returns how to stop. `fail`: why corrections are not possible.
+// of it is shown, and again when its run has ended, which has all its files then. Returns how to stop. `fail`: why corrections are not possible.
 export const mountCorrector = (
   host: HTMLElement, run: string, onVersion: (run: string) => void, fail: (reason: string) => void,
 ): (() => void) => {
