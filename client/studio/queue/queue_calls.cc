@@ -1,6 +1,7 @@
 #include "client/studio/queue/queue_calls.h"
 
 #include <algorithm>
+#include <functional>
 
 #include "client/commands/follow.h"
 #include "client/lib/job_watch.h"
@@ -51,7 +52,7 @@ std::vector<QueueCalls::Run> QueueCalls::Unfinished(Connection& connection) cons
     const std::vector<v1::Job> stages = ListChildren(connection, run.job.name());
     run.has_begun = std::ranges::any_of(stages, HasBegun);
   }
-  std::ranges::stable_partition(runs, &Run::has_begun);
+  std::stable_partition(runs.begin(), runs.end(), std::mem_fn(&Run::has_begun));
   return runs;
 }
 
