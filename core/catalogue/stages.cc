@@ -49,7 +49,7 @@ const std::vector<Stage>& StageCatalogue() {
        .step = "carried_color",
        .purpose = "colours are carried to every view that sees the same surface",
        .needs = {kScene, kKeyView, kKeyColor, kGeometry},
-       .reads = {kKeyViews},
+       .reads = {kKeyViews, kKeyColorFacts},
        .resumes = true},
       {.kind = kGenerateAugmentations,
        .step = "augmentations",

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/color/lab.h"
+#include "core/keycolor/automatic/automatic.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/run_stages.h"
 #include "tests/support/scenes/noise_place.h"
@@ -185,6 +186,27 @@ TEST_F(ReturningShotTest, TakesColorsOfTheFirstShot) {
   std::filesystem::remove_all(scratch_.path() / "out");
   EXPECT_EQ(Run(), facts);
   for (int i = 8; i < kFrames; ++i) EXPECT_EQ(ReadFile(Carried(i)), files[i - 8]) << i;
+}
+
+TEST_F(ReturningShotTest, OtherShotsGetAutomaticColorsWhereTheKeyViewHasThem) {
+  const auto embedded = AutomaticColorizer::Embedded();
+  AddInput(artifact::kKeyColorFacts,
+           nlohmann::json{{"description", embedded->description()}}.dump());
+  Run();
+  const AbMap middle = DecodeAbPng(ReadFile(Carried(6)), "carried");
+  const Image luminance = LuminanceFromSrgb(NoisePlace(2, kSideX, kSideY, 2 * 6));
+  const AutomaticColor guess = embedded->Colorize(luminance);
+  for (const int x : {20, 88, 150}) {
+    EXPECT_NEAR(middle.ab.At(0, 66, x), guess.ab.At(0, 66, x), 2.0f);
+    EXPECT_NEAR(middle.ab.At(1, 66, x), guess.ab.At(1, 66, x), 2.0f);
+  }
+  // A shot that returns has the key frame's colours.
+  EXPECT_NEAR(DecodeAbPng(ReadFile(Carried(9)), "carried").ab.At(0, 66, 88), 30.0f, 0.1f);
+  // Colours that somebody chose count for shots that return only.
+  AddInput(artifact::kKeyColorFacts, R"({"source": "image"})");
+  std::filesystem::remove_all(scratch_.path() / "out");
+  Run();
+  EXPECT_FALSE(std::filesystem::exists(Carried(6)));
 }
 
 }  // namespace

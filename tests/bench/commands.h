@@ -19,6 +19,7 @@ void AddMakeWeightsCommand(CLI::App& app);
 void AddNetworksCommand(CLI::App& app);
 void AddHintsCommand(CLI::App& app);
 void AddCorrectCommand(CLI::App& app);
+void AddKeyChoiceCommand(CLI::App& app);
 void AddNextKeyCommand(CLI::App& app);
 void AddPipelineCommand(CLI::App& app);
 void AddQueueCommand(CLI::App& app);

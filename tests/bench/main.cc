@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
   color3d::AddMakeWeightsCommand(app);
   color3d::AddNetworksCommand(app);
   color3d::AddCorrectCommand(app);
+  color3d::AddKeyChoiceCommand(app);
   color3d::AddNextKeyCommand(app);
   color3d::AddPipelineCommand(app);
   color3d::AddQueueCommand(app);

@@ -7,6 +7,7 @@ import { mountCorrector } from './correct/index';
 import { bar, button, h, problem, replace, say } from './dom';
 import { setStepsOf } from './main';
 import { movedTo } from './queue/calls';
+import { creditForm, type CreditForm } from './share/credit';
 import { sharePanel } from './share/panel';
 import { errorInWords, isFinished, seconds, stageName, stateName } from './words';
 
@@ -110,6 +111,8 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
   };
 
   let shared: HTMLElement | undefined;
+  let sharedFiles = '';
+  let credit: CreditForm | undefined;
   const showShare = async (run: Run): Promise<void> => {
     try {
       const { sets } = await getState();
@@ -119,10 +122,16 @@ export const showRun = (main: HTMLElement, id: string): (() => void) => {
       // Without the photos there is still the scene to share.
     }
     if (left) return;
-    const panel = sharePanel(run, set);
+    const files = [run.id, set?.id, ...run.artifacts.map(({ name }) => name)].join('\n');
+    if (shared?.isConnected && files === sharedFiles) return;
+    sharedFiles = files;
+    credit ??= creditForm();
+    const focused = document.activeElement;
+    const panel = sharePanel(run, set, credit);
     if (shared?.isConnected) shared.replaceWith(panel);
     else result.append(panel);
     shared = panel;
+    if (focused instanceof HTMLElement && credit.element.contains(focused)) focused.focus();
   };
 
   // A run that waited was put elsewhere in the queue, as another one.

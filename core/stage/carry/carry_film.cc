@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -8,6 +9,7 @@
 #include "core/film/film_carry.h"
 #include "core/film/returning_shots.h"
 #include "core/image/codec.h"
+#include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
 #include "core/stage/carry/carry_by_kind.h"
 #include "core/stage/carry/carry_results.h"
@@ -76,6 +78,42 @@ std::vector<FilmKey> ReadFilmKeys(const CarryInputs& inputs,
   return keys;
 }
 
+// The colourizer that coloured the key view by itself; null where somebody else chose its colours.
+std::shared_ptr<const AutomaticColorizer> ColorizerOfKeyView(const StageContext& context) {
+  if (!context.HasInput(artifact::kKeyColorFacts)) return nullptr;
+  const auto embedded = AutomaticColorizer::Embedded();
+  const std::string description =
+      ReadJson(context, artifact::kKeyColorFacts).value("description", "");
+  return description == embedded->description() ? embedded : nullptr;
+}
+
+// Key frames of shots in which nobody has chosen one.
+class UnkeyedShots {
+ public:
+  // The references must outlive the object.
+  UnkeyedShots(const FilmFrames& frames,
+               const std::vector<FilmKey>& keys,
+               const FilmCarryOptions& options,
+               StageContext& context)
+      : frames_(frames),
+        returning_(frames, keys, options, context.pool(), context.cancel()),
+        colorizer_(ColorizerOfKeyView(context)) {}
+
+  // The frame in the colours of a key frame whose place it shows again, else in automatic ones if those of the key view
+  // are automatic; nullopt: in none.
+  std::optional<FilmKey> KeyAt(int frame) const {
+    std::optional<FilmKey> key = returning_.KeyAt(frame);
+    if (key || !colorizer_) return key;
+    AutomaticColor color = colorizer_->Colorize(*frames_.luminance(frame));
+    return FilmKey{frame, {std::move(color.ab), std::move(color.confidence)}};
+  }
+
+ private:
+  const FilmFrames& frames_;
+  ReturningShots returning_;
+  std::shared_ptr<const AutomaticColorizer> colorizer_;
+};
+
 }  // namespace
 
 void CarryFilm(const CarryInputs& inputs, StageContext& context) {
@@ -103,14 +141,12 @@ void CarryFilm(const CarryInputs& inputs, StageContext& context) {
   };
   carry(keys);
   const std::vector<int> middles = UnkeyedShotMiddles(frames.shot, inputs.key_views);
-  std::optional<ReturningShots> returning;
+  std::optional<UnkeyedShots> unkeyed;
   for (size_t i = 0; i < middles.size(); ++i) {
     done.ReportProgress(fmt::format(
-        "looking for places of key frames in shot {} of {} without one", i + 1, middles.size()));
-    if (!returning) {
-      returning.emplace(frames, keys, options.film, context.pool(), context.cancel());
-    }
-    const auto key = returning->KeyAt(middles[i]);
+        "colouring a key frame of shot {} of {} without one", i + 1, middles.size()));
+    if (!unkeyed) unkeyed.emplace(frames, keys, options.film, context);
+    const auto key = unkeyed->KeyAt(middles[i]);
     if (key) carry({*key});
   }
   WarnOfSmallCoverage(WriteCoverage(inputs, done.coverage(), context), context);

@@ -394,6 +394,7 @@ const start = async () => {
   }
   const confidence = facts.confidence &&
     new Uint8Array(await (await unpacked(facts.confidence)).arrayBuffer());
+  color3dShading.likeOurs(viewer.app.scene.gsplat);
   // Sureness comes in the file's order, so the viewer has to keep it.
   for (const asset of viewer.app.assets.list()) {
     asset.data.reorder = false;

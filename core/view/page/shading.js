@@ -109,5 +109,39 @@ fn modifySplatColor(center: vec3f, color: ptr<function, vec4f>) {${moved.color}
 }
 `;
 
-return { glsl, wgsl, toned };
+// The engine's falloff from the centre of a Gaussian is normalised to zero at 2.83 sigma. These chunks of its fragment
+// shader turn it back into exp(-sigma^2 / 2), with the bounds of our rasterizer (core/splat/raster/raster_constants.h),
+// up to that radius. `uv` is (0, 0) at the centre and 1 long at 2.83 sigma.
+const falloff = {
+  glsl: `
+void modifySplatColor(vec2 uv, inout vec4 color) {
+  float fall = exp(-4.0 * dot(uv, uv)), edge = exp(-4.0);
+  float alpha = min(color.a * fall * (1.0 - edge) / max(fall - edge, 1e-5), 0.99);
+  color.a = alpha < 1.0 / 255.0 ? 0.0 : alpha;
+}
+`,
+  wgsl: `
+fn modifySplatColor(uv: vec2f, color: ptr<function, vec4f>) {
+  let fall = exp(-4.0 * dot(uv, uv));
+  let edge = exp(-4.0);
+  let alpha = min((*color).a * fall * (1.0 - edge) / max(fall - edge, 1e-5), 0.99);
+  (*color).a = select(alpha, 0.0, alpha < 1.0 / 255.0);
+}
+`,
+};
+
+// Lets the engine draw what our rasterizer draws: its falloff, also of the smallest Gaussians, in the order of their
+// depth. `gsplat` is the scene's, of the engine.
+const likeOurs = (gsplat) => {
+  for (const language of ['glsl', 'wgsl']) {
+    gsplat.material.getShaderChunks(language).set('gsplatModifyPS', falloff[language]);
+  }
+  gsplat.material.update();
+  gsplat.alphaClipForward = 1e-3;
+  gsplat.minPixelSize = 0;
+  gsplat.minContribution = 0;
+  gsplat.radialSorting = false;
+};
+
+return { glsl, wgsl, toned, likeOurs };
 })();

@@ -4,6 +4,7 @@ import {
   type Found, type Job, type KeyViews, type PhotoSet, type Run,
 } from '../api';
 import { bar, button, h, problem, replace, say } from '../dom';
+import { creditForm } from '../share/credit';
 import { sharePanel } from '../share/panel';
 import { bytes, day, errorInWords, isFinished, seconds, stageName, stateName } from '../words';
 import {
@@ -266,7 +267,7 @@ export const showFilm = (main: HTMLElement, set: string): (() => void) => {
     replace(more,
       has('view.html') && h('section', { 'aria-labelledby': 'in-3d' }, h('h2', { id: 'in-3d' }, 'The scene in 3D'),
         h('iframe', { src: artifactUrl(job, 'view.html'), sandbox: 'allow-scripts allow-pointer-lock', title: 'The scene in 3D', class: 'scene', id: 'scene' })),
-      sharePanel(run, photoSet, () => workspace?.now ?? 0),
+      sharePanel(run, photoSet, creditForm(), () => workspace?.now ?? 0),
       others.length > 0 && h('section', { 'aria-labelledby': 'versions' }, h('h2', { id: 'versions' }, 'Other versions'),
         h('ul', { class: 'downloads' }, ...others.map((one) => h('li', {}, h('a', { href: `#film/${set}/${one.id}` }, day(one.created_s)))))));
   };

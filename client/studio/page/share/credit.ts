@@ -13,10 +13,15 @@ const fields: [Field, string, string][] = [
 const licences = ['CC BY 4.0', 'CC BY-SA 4.0', 'CC BY-NC 4.0', 'CC0 1.0', 'Public domain', 'All rights reserved'];
 const pauseMs = 400;
 
-export interface CreditForm { element: HTMLElement; wantsCaption: () => boolean; kept: () => Promise<void> }
+export interface CreditForm {
+  element: HTMLElement;
+  wantsCaption: () => boolean;
+  kept: () => Promise<void>;
+  changed: () => void; // set by the user of the form; called after each change of the text or the caption
+}
 
-// `onChange`: after each change of the text or the caption.
-export const creditForm = (onChange: () => void): CreditForm => {
+// One for each page: what was typed stays when the panels around it are made again.
+export const creditForm = (): CreditForm => {
   const credit: Credit = { colored_by: '', key_view_by: '', source: '', licence: '' };
   const shown = h('p', { class: 'share-credit', role: 'status' });
   const trouble = h('div', {});
@@ -35,29 +40,19 @@ export const creditForm = (onChange: () => void): CreditForm => {
         show();
         clearTimeout(waiting);
         waiting = window.setTimeout(save, pauseMs);
-        onChange();
+        form.changed();
       },
     });
     return { name, input, row: h('p', {}, h('label', { for: input.id }, label), input) };
   });
-  const caption = h('input', { type: 'checkbox', id: 'caption', onchange: onChange });
+  const caption = h('input', { type: 'checkbox', id: 'caption', onchange: () => form.changed() });
   const element = h('fieldset', { class: 'share-form' },
     h('legend', {}, 'Who made the colours'),
     h('p', { class: 'soft small' }, 'Written into every picture that you save here, where archives and picture programs look for it.'),
     h('div', { class: 'share-fields' }, ...inputs.map(({ row }) => row)),
     h('datalist', { id: 'licences' }, ...licences.map((value) => h('option', { value }))),
     shown, h('label', { class: 'share-check' }, caption, ' Also as a caption below each picture'), trouble);
-  show();
-  void getCredit().then((known) => {
-    for (const { name, input } of inputs) {
-      if (input.value) continue; // typed meanwhile
-      credit[name] = known[name] ?? '';
-      input.value = credit[name];
-    }
-    show();
-    onChange();
-  }).catch((error: Error) => replace(trouble, problem(error.message)));
-  return {
+  const form: CreditForm = {
     element,
     wantsCaption: () => caption.checked,
     kept: async () => {
@@ -67,5 +62,17 @@ export const creditForm = (onChange: () => void): CreditForm => {
       }
       await saving;
     },
+    changed: () => undefined,
   };
+  show();
+  void getCredit().then((known) => {
+    for (const { name, input } of inputs) {
+      if (input.value) continue; // typed meanwhile
+      credit[name] = known[name] ?? '';
+      input.value = credit[name];
+    }
+    show();
+    form.changed();
+  }).catch((error: Error) => replace(trouble, problem(error.message)));
+  return form;
 };

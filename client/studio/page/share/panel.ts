@@ -3,7 +3,7 @@ import { artifactUrl, type Artifact, type PhotoSet, type Run } from '../api';
 import { button, h, problem, replace } from '../dom';
 import { bytes } from '../words';
 import { framePictureUrl, makeFile, makeMovie, pictureUrl, sideBySideUrl, zipUrl, type Movie } from './calls';
-import { creditForm, type CreditForm } from './credit';
+import type { CreditForm } from './credit';
 import { adoptShareStyle } from './style';
 import { waitFor } from './wait';
 
@@ -127,13 +127,11 @@ const others = (run: Run): HTMLElement => {
   return group('For other programs', 'The scene in the formats of viewers and editors.', ...rows);
 };
 
-// `shownFrame`: of a film, the number of the frame that the page shows.
-export const sharePanel = (run: Run, set: PhotoSet | undefined, shownFrame?: () => number): HTMLElement => {
+// `form`: the page's own. `shownFrame`: of a film, the number of the frame that the page shows.
+export const sharePanel = (run: Run, set: PhotoSet | undefined, form: CreditForm, shownFrame?: () => number): HTMLElement => {
   adoptShareStyle();
-  let refresh = (): void => undefined;
-  const form = creditForm(() => refresh());
   const shown = pictures(run, set, form, shownFrame), movie = filmOf(run);
-  refresh = shown.refresh;
+  form.changed = shown.refresh;
   const has = (name: string): boolean => !!find(run, name);
   return h('section', { class: 'share', 'aria-labelledby': 'share-title' },
     h('h2', { id: 'share-title' }, 'Share it'),
