@@ -59,6 +59,7 @@ std::vector<Artifact> MakeCatalogue() {
                                         {kRenders, kRender, kPng, true},
                                         {kFilm, kRender, kMp4, true, "coloured film"},
                                         {kFilms, kRender, kMp4, true, "film of every camera"},
+                                        {kColoredPhotos, kRender, kPng, true, "coloured photos"},
                                         {kFilmFrames, kRender, kPng, true, "coloured frames"},
                                         {kMovie, kRender, kMp4, true, "rendered movie"},
                                         {kFrames, kRender, kPng},

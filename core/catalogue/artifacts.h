@@ -68,6 +68,8 @@ inline constexpr char kMovie[] = "scene.mp4";           // rendered along a path
 // each, by its name + ".mp4".
 inline constexpr char kFilm[] = "film.mp4";
 inline constexpr char kFilms[] = "films/";
+// Scenes of pictures: view's stem + ".png", coloured, of its own size.
+inline constexpr char kColoredPhotos[] = "photos/";
 inline constexpr char kFilmFrames[] = "film_frames/";  // view's stem + ".png": its coloured frames
 inline constexpr char kFrames[] = "frames/";           // "00001.png" and so on, of the movie
 inline constexpr char kScores[] = "scores.json";

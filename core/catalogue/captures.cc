@@ -26,7 +26,12 @@ struct IdleStage {
 
 constexpr char kNotReconstructed[] =
     "frames of a film without poses are coloured, not reconstructed";
+constexpr char kPicturesOnly[] =
+    "photos whose cameras were not found are coloured, not reconstructed";
 constexpr IdleStage kIdleStages[] = {
+    {CaptureKind::kPictures, kind::kReconstructGeometry, kPicturesOnly},
+    {CaptureKind::kPictures, kind::kSolveChroma, kPicturesOnly},
+    {CaptureKind::kPictures, kind::kExport, kPicturesOnly},
     {CaptureKind::kFilm, kind::kReconstructGeometry, kNotReconstructed},
     {CaptureKind::kFilm, kind::kSolveChroma, kNotReconstructed},
     {CaptureKind::kFilm, kind::kExport, kNotReconstructed}};
@@ -116,7 +121,12 @@ const std::vector<CaptureKindInfo>& CaptureKinds() {
       {CaptureKind::kStatic, "static", false, true, "the scene is not a film; leave the range out"},
       {CaptureKind::kFilm, "film", false, false, ""},
       {CaptureKind::kDynamic, "dynamic", true, true, kHasPoses},
-      {CaptureKind::kRelief, "relief", true, true, kHasPoses}};
+      {CaptureKind::kRelief, "relief", true, true, kHasPoses},
+      {CaptureKind::kPictures,
+       "pictures",
+       false,
+       false,
+       "the scene is not a film; leave the range out"}};
   return kinds;
 }
 

@@ -30,6 +30,7 @@ enum class CaptureKind {
   kFilm,     // frames of one camera without poses: coloured, not reconstructed
   kDynamic,  // posed views with times
   kRelief,   // frames of one standing camera with assumed depth (2.5D)
+  kPictures,  // photos whose cameras could not be found: coloured, not reconstructed
 };
 
 enum class ViewSource { kPhotos, kFrames, kSplatRenders };

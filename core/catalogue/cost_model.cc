@@ -30,7 +30,8 @@ struct KindCosts {
 constexpr KindCosts kKindCosts[] = {{CaptureKind::kStatic, 0.0, 1.0, 1.8, 1.95, 0.75, 0.5, 0.005},
                                     {CaptureKind::kFilm, 0.011, 2.0, 0.43, 1.28, 3.0, 0.32, 0.03},
                                     {CaptureKind::kDynamic, 0.011, 2.0, 1.8, 1.95, 3.0, 0.5, 0.07},
-                                    {CaptureKind::kRelief, 0.011, 2.0, 1.8, 1.95, 3.0, 0.5, 0.07}};
+                                    {CaptureKind::kRelief, 0.011, 2.0, 1.8, 1.95, 3.0, 0.5, 0.07},
+                                    {CaptureKind::kPictures, 0.0, 1.0, 4.0, 1.95, 0.75, 0.32, 0.1}};
 
 // One iteration of training the geometry of a static scene.
 constexpr double kIterationSeconds = 0.0015;

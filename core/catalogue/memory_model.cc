@@ -55,7 +55,8 @@ struct KindMemory {
 constexpr KindMemory kKindMemory[] = {{CaptureKind::kStatic, false, 2560 * kMiB},
                                       {CaptureKind::kFilm, true, 480 * kMiB},
                                       {CaptureKind::kDynamic, true, 480 * kMiB},
-                                      {CaptureKind::kRelief, true, 480 * kMiB}};
+                                      {CaptureKind::kRelief, true, 480 * kMiB},
+                                      {CaptureKind::kPictures, false, 2560 * kMiB}};
 
 const KindMemory& MemoryOf(CaptureKind kind) { return RowOfKind(kKindMemory, kind, "memory"); }
 

@@ -33,7 +33,12 @@ constexpr StepOfKind kStepsOfKinds[] = {
      false,
      "frames of a film are coloured along the optical flow"},
     {CaptureKind::kFilm, kind::kCarryColor, true, "colours are carried along the optical flow"},
-    {CaptureKind::kFilm, kind::kRender, true, "the coloured frames become a film"}};
+    {CaptureKind::kFilm, kind::kRender, true, "the coloured frames become a film"},
+    {CaptureKind::kPictures,
+     kind::kCarryColor,
+     true,
+     "colours are carried to the planes that local features find in other photos"},
+    {CaptureKind::kPictures, kind::kRender, true, "the coloured photos are written"}};
 
 // "" if the scene is reconstructed.
 std::string_view WhyNotReconstructed(const PlanFacts& f) {

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 
 namespace color3d {
@@ -38,6 +39,12 @@ struct Camera {
     return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < width && pixel.y() < height;
   }
 };
+
+// Camera with an assumed focal length, for pictures without intrinsics: 1.2 of the longer side.
+inline Camera GuessedCamera(int width, int height) {
+  const double focal = 1.2 * std::max(width, height);
+  return {width, height, focal, focal, 0.5 * width, 0.5 * height};
+}
 
 // Brown-Conrady (OpenCV order k1 k2 p1 p2 k3 k4 k5 k6) or Kannala-Brandt fisheye (k1..k4).
 struct Distortion {

@@ -58,6 +58,8 @@ struct Scene {
   Eigen::Vector3d world_offset = Eigen::Vector3d::Zero();
   // Frames of one static camera at the origin: depth is unknown, and this is assumed.
   std::optional<Relief> relief;
+  // Photos whose cameras could not be found: poses mean nothing.
+  bool are_pictures = false;
 
   std::vector<int> TrainingViews() const;
   std::vector<int> HeldOutViews() const;
@@ -65,7 +67,7 @@ struct Scene {
   // a few that exist.
   int FindView(std::string_view name) const;
   // Kind of the scene: kFilm, kDynamic and kRelief if each view has a moment. Films have one pose
-  // for all views, which means none. kStatic without views.
+  // for all views, which means none. kPictures if are_pictures, kStatic without views.
   CaptureKind kind() const;
   // True if each view has a moment, and there are views.
   bool HasTimes() const;

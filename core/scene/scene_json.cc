@@ -271,6 +271,7 @@ Scene SceneFromJson(std::string_view text) {
   }
   if (field.Has("kind")) {  // absent from older files
     const CaptureKind kind = KindOfName(field["kind"].Text());
+    scene.are_pictures = kind == CaptureKind::kPictures && !scene.HasTimes();
     if (kind != scene.kind()) throw field["kind"].Wrong(scene.capture().name);
   }
   return scene;

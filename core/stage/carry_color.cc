@@ -27,6 +27,9 @@ void RunCarryColor(const CarryColorOptions& options, StageContext& context) {
   options.Validate();
   Scene scene = ReadScene(context);
   const std::vector<int> key_views = ReadKeyViews(context, scene, options.additional_key_views);
+  if (scene.are_pictures) {
+    return CarryPictures({options, scene, key_views, GaussianModel()}, context);
+  }
   if (!ColoredAs(context, scene).is_reconstructed) {
     return CarryFilm({options, scene, key_views, GaussianModel()}, context);
   }

@@ -6,6 +6,7 @@
 #include "core/base/range_check.h"
 #include "core/color/lab.h"
 #include "core/image/codec.h"
+#include "core/stage/coloring/colored_photos.h"
 #include "core/stage/film/film_writer.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/movie/movie.h"
@@ -65,6 +66,10 @@ void RenderOptions::Validate() const {
 void RunRender(const RenderOptions& options, StageContext& context) {
   options.Validate();
   const Scene scene = ReadScene(context);
+  if (scene.are_pictures) {
+    CheckPathOfFilm(options);
+    return WriteColoredPhotos(options, scene, ViewsToRender(options, scene), context);
+  }
   if (!ColoredAs(context, scene).is_reconstructed) {
     CheckPathOfFilm(options);
     return RenderFilm(options, scene, ViewsToRender(options, scene), context);

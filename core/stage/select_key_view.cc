@@ -113,7 +113,7 @@ void ChooseKeyViewSet(const SelectKeyViewOptions& options,
   const NearestDistances distances =
       FindNearestDistances(ranking->features, kept, context.control());
   const SeenSamples seen =
-      context.HasInput(artifact::kGeometry)
+      context.HasInput(artifact::kGeometry) && scene.capture().is_reconstructed
           ? SeenByGeometry(scene,
                            candidates,
                            ParseGaussians(context.ReadInput(artifact::kGeometry)),
@@ -224,7 +224,7 @@ void RunSelectKeyView(const SelectKeyViewOptions& options, StageContext& context
   if (options.selection.strategy == KeyViewStrategy::kManual && options.selection.count == 1) {
     ChooseManually(options.view, scene, candidates, &ranking);
   } else {
-    const bool is_film = !scene.capture().is_reconstructed;
+    const bool is_film = scene.kind() == CaptureKind::kFilm;
     ChooseByScore(options, scene, candidates, is_film, context, &ranking);
   }
   for (const std::string& warning : ranking.selection.warnings) {

@@ -78,8 +78,12 @@ export const openPage = (chromium, address, screenshots, options = {}) => {
     await send('Input.dispatchKeyEvent', { type: text ? 'keyDown' : 'rawKeyDown', text, ...event });
     await send('Input.dispatchKeyEvent', { type: 'keyUp', ...event });
   };
+  // Clicks again where the page moved below the first click.
   const type = async (selector, text) => {
-    await click(selector);
+    for (let tries = 0; tries < 3; ++tries) {
+      await click(selector);
+      if (await evaluate(`document.activeElement === ${find(selector)}`)) break;
+    }
     await send('Input.insertText', { text });
   };
   // Drags a file or folder of the machine to the middle of an element and drops it.

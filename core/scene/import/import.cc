@@ -124,6 +124,27 @@ void RequireMemory(const ImportOptions& options, const Scene& scene) {
   }
 }
 
+// The photos as pictures whose cameras are not known.
+Scene PicturesOf(const std::vector<Photo>& photos) {
+  Scene scene;
+  scene.are_pictures = true;
+  for (const Photo& photo : photos) {
+    View view;
+    view.name = photo.name;
+    view.image_file = photo.file;
+    view.mask_file = photo.mask_file;
+    view.camera = view.captured_camera = GuessedCamera(photo.width, photo.height);
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+// Errors that say that the cameras cannot be found in these photos.
+bool IsAboutCameras(const Error& error) {
+  return error.code() == ErrorCode::kInvalidArgument ||
+         error.code() == ErrorCode::kDeadlineExceeded;
+}
+
 void ImportPhotos(const fs::path& scene_folder,
                   const fs::path& scratch_folder,
                   const ImportOptions& options,
@@ -148,7 +169,16 @@ void ImportPhotos(const fs::path& scene_folder,
         photos[0].name);
   }
   FindPhotoMasks(scene_folder, run.cancel, &photos, &result->warnings);
-  SfmResult sfm = RunStructureFromMotion(photos, scene_folder, scratch_folder, options, run);
+  SfmResult sfm;
+  try {
+    sfm = RunStructureFromMotion(photos, scene_folder, scratch_folder, options, run);
+  } catch (const Error& error) {
+    if (!IsAboutCameras(error)) throw;
+    result->warnings.push_back(
+        fmt::format("the photos are coloured as pictures, without a 3D scene: {}", error.what()));
+    result->scene = PicturesOf(photos);
+    return;
+  }
   result->scene = std::move(sfm.scene);
   result->sfm = std::move(sfm.report);
   result->ran_structure_from_motion = true;
@@ -268,7 +298,7 @@ void HoldOutCamera(const std::string& camera, ImportResult* result) {
 
 // Throws if the scene has times but all its frames are from one place.
 void RequireSeveralPositions(const Scene& scene) {
-  if (scene.capture().is_reconstructed) return;
+  if (scene.capture().is_reconstructed || scene.are_pictures) return;
   throw InvalidArgument(
       "all frames are of one static camera: nothing can be reconstructed from them. "
       "Colour them as a film: leave the poses out and give --film, with --poses as a relief "
@@ -346,14 +376,16 @@ void FinishPosedScene(const ImportOptions& options, ImportResult* result) {
                           scene.views.size());
   }
   RequireSeveralPositions(scene);
-  result->photos_registered = static_cast<int>(scene.views.size());
+  result->photos_registered = scene.are_pictures ? 0 : static_cast<int>(scene.views.size());
   result->masked_views = static_cast<int>(
       std::ranges::count_if(scene.views, [](const View& v) { return !v.mask_file.empty(); }));
   result->undistorted =
       std::ranges::any_of(scene.views, [](const View& v) { return !IsUndistorted(v.distortion); });
-  DropWeakPoints(&scene);
-  Normalise(result);
-  AddRandomPointsWhenEmpty(result);
+  if (!scene.are_pictures) {
+    DropWeakPoints(&scene);
+    Normalise(result);
+    AddRandomPointsWhenEmpty(result);
+  }
   if (options.hold_out_every_eighth) HoldOutEveryEighth(&scene, &result->warnings);
   if (!options.hold_out_camera.empty()) HoldOutCamera(options.hold_out_camera, result);
   if (options.hold_out_block > 0.0) HoldOutBlock(options.hold_out_block, &scene);

@@ -29,6 +29,9 @@ void CarryStatic(const CarryInputs& inputs, StageContext& context);
 // key view.
 void CarryFilm(const CarryInputs& inputs, StageContext& context);
 
+// Photos whose cameras are not known: to the planes that local features find in other photos.
+void CarryPictures(const CarryInputs& inputs, StageContext& context);
+
 // Dynamic scenes: by optical flow along the cameras that took a key view, from their frames of the
 // same time by depth and visibility into those of other cameras.
 void CarryDynamic(const CarryInputs& inputs, StageContext& context);

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -9,8 +8,8 @@
 #include "core/film/film_carry.h"
 #include "core/film/returning_shots.h"
 #include "core/image/codec.h"
-#include "core/keycolor/automatic/automatic.h"
 #include "core/scene/view_images.h"
+#include "core/stage/carry/automatic_colors.h"
 #include "core/stage/carry/carry_by_kind.h"
 #include "core/stage/carry/carry_results.h"
 #include "core/stage/film/between_anchors.h"
@@ -76,15 +75,6 @@ std::vector<FilmKey> ReadFilmKeys(const CarryInputs& inputs,
     keys.push_back(std::move(key));
   }
   return keys;
-}
-
-// The colourizer that coloured the key view by itself; null where somebody else chose its colours.
-std::shared_ptr<const AutomaticColorizer> ColorizerOfKeyView(const StageContext& context) {
-  if (!context.HasInput(artifact::kKeyColorFacts)) return nullptr;
-  const auto embedded = AutomaticColorizer::Embedded();
-  const std::string description =
-      ReadJson(context, artifact::kKeyColorFacts).value("description", "");
-  return description == embedded->description() ? embedded : nullptr;
 }
 
 // Key frames of shots in which nobody has chosen one.

@@ -42,12 +42,6 @@ const char* ReasonForUnusedOptions(ImportedAs scene) {
 
 }  // namespace
 
-Camera GuessedCamera(int width, int height) {
-  constexpr double kFocalOfLongerSide = 1.2;
-  const double focal = kFocalOfLongerSide * std::max(width, height);
-  return {width, height, focal, focal, 0.5 * width, 0.5 * height};
-}
-
 std::vector<std::string> PicturesIn(const std::filesystem::path& folder) {
   std::vector<std::string> files;
   for (const std::string& file : ListFiles(folder)) {

@@ -13,9 +13,6 @@
 
 namespace color3d {
 
-// Camera with an assumed focal length, for pictures without intrinsics.
-Camera GuessedCamera(int width, int height);
-
 // Names of the pictures below `folder`, in the order of their numbers.
 std::vector<std::string> PicturesIn(const std::filesystem::path& folder);
 // Times of these pictures, seconds. Missing numbers leave gaps and cause a warning

@@ -16,7 +16,8 @@ namespace color3d {
 std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
                                                   const std::vector<std::string>& key_views,
                                                   StageContext& context) {
-  if (!scene.capture().is_reconstructed) {
+  const bool are_pictures = scene.are_pictures;
+  if (!scene.capture().is_reconstructed && !are_pictures) {
     std::vector<int> of_film;
     for (const std::string& name : key_views) of_film.push_back(scene.FindView(name));
     const std::map<std::string, double> covered = ReadCarryFacts(context).view_coverage;
@@ -31,7 +32,7 @@ std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
   }
   constexpr size_t kMaxViews = 500;  // about a minute of rendering
   const std::vector<int> training = scene.TrainingViews();
-  if (!context.HasInput(artifact::kModel) || training.size() > kMaxViews) {
+  if (!(context.HasInput(artifact::kModel) || are_pictures) || training.size() > kMaxViews) {
     return std::nullopt;
   }
   std::vector<int> keys;
@@ -48,12 +49,15 @@ std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
       CollectViewFeatures(*encoder, *encoder, photos, FeatureCache(context), context.control());
   const NearestDistances distances =
       FindNearestDistances(features, std::vector<bool>(training.size(), true), context.control());
-  const SeenSamples seen = SeenByGeometry(scene,
-                                          training,
-                                          ParseGaussians(context.ReadInput(artifact::kModel)),
-                                          GridFor(static_cast<int>(training.size())),
-                                          context.pool(),
-                                          context.cancel());
+  const int count = static_cast<int>(training.size());
+  const SeenSamples seen =
+      are_pictures ? SeenSamples(count, 0)
+                   : SeenByGeometry(scene,
+                                    training,
+                                    ParseGaussians(context.ReadInput(artifact::kModel)),
+                                    GridFor(count),
+                                    context.pool(),
+                                    context.cancel());
   const auto next = NextKeyView(seen, distances, keys);
   if (!next) return std::nullopt;
   return NextKeyViewFacts{
