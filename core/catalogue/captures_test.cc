@@ -66,6 +66,9 @@ TEST(CaptureKindsTest, FilmsLeaveOutTheStagesOfReconstruction) {
   for (const Stage& stage : StageCatalogue()) {
     EXPECT_EQ(!WhyNothingToDo(CaptureKind::kFilm, stage.kind).empty(), idle.contains(stage.kind))
         << stage.kind;
+    EXPECT_EQ(!WhyNothingToDo(CaptureKind::kPictures, stage.kind).empty(),
+              idle.contains(stage.kind))
+        << stage.kind;
     EXPECT_EQ(WhyNothingToDo(CaptureKind::kStatic, stage.kind), "") << stage.kind;
     EXPECT_EQ(WhyNothingToDo(CaptureKind::kDynamic, stage.kind), "") << stage.kind;
     EXPECT_EQ(WhyNothingToDo(CaptureKind::kRelief, stage.kind), "") << stage.kind;

@@ -11,7 +11,6 @@
 #include "core/base/range_check.h"
 #include "core/carry/confidence.h"
 #include "core/film/frame_motion.h"
-#include "core/film/local_contrast.h"
 #include "core/image/box_mean.h"
 #include "core/image/optical_flow.h"
 #include "core/image/plane_sampling.h"
@@ -28,6 +27,23 @@ FilmTrack Step(const FilmTrack& track, const Image& there, const Image& back) {
   const Image step = SampledAt(there, track.in_frame);
   for (size_t i = 0; i < step.data.size(); ++i) further.in_frame.data[i] += step.data[i];
   return further;
+}
+
+// L relative to its surroundings, independent of exposure and contrast.
+Image LocalContrast(const Image& luminance) {
+  constexpr int kRadius = 7;
+  constexpr float kGrain = 4.0f;  // variance of grain, L^2
+  const Image mean = BoxMean(luminance, kRadius);
+  Image out(luminance.width, luminance.height, 1), square = out;
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    out.data[i] = luminance.data[i] - mean.data[i];
+    square.data[i] = out.data[i] * out.data[i];
+  }
+  const Image variance = BoxMean(square, kRadius);
+  for (size_t i = 0; i < out.data.size(); ++i) {
+    out.data[i] /= std::sqrt(std::max(0.0f, variance.data[i]) + kGrain);
+  }
+  return out;
 }
 
 // Mean difference of two pictures of local contrast around each pixel, 0..2.

@@ -11,7 +11,6 @@
 #include "core/base/image.h"
 #include "core/base/parallel.h"
 #include "core/carry/carry.h"
-#include "core/film/local_contrast.h"
 #include "core/film/reappearing_regions.h"
 
 namespace color3d {
@@ -26,7 +25,7 @@ struct FilmCarryOptions {
   double cycle_tolerance_px = 2.0;  // 0.1..20
   // Mean difference of local contrast from which confidence falls, 0.05..2; it is 1/e at twice
   // that.
-  double unlikeness = kUnlikeness;
+  double unlikeness = 0.4;
   // Motion (MotionOf, summed) after which tracks are registered against the key frame itself, and
   // local features look for lost pixels, since errors of single steps add up. Also done when a
   // tenth of the frame has been lost since the last time. 0: at each frame; 1: never.

@@ -66,7 +66,7 @@ bool Scene::HasTimes() const {
 }
 
 CaptureKind Scene::kind() const {
-  if (are_pictures) return CaptureKind::kPictures;
+  if (are_pictures && !HasPoses(views)) return CaptureKind::kPictures;
   if (!HasTimes()) return CaptureKind::kStatic;
   if (relief) return CaptureKind::kRelief;
   return HasPoses(views) ? CaptureKind::kDynamic : CaptureKind::kFilm;

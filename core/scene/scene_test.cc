@@ -137,6 +137,11 @@ TEST(Scene, JsonHasKindAndOlderFilesOpenWithoutIt) {
   for (View& view : film.views) view.cam_from_world = {};
   Scene relief = film;
   relief.relief = Relief{0.3, 0.5, 4.0};
+  Scene pictures = photos;
+  for (View& view : pictures.views) view.cam_from_world = {};
+  pictures.are_pictures = true;
+  EXPECT_EQ(SceneFromJson(SceneToJson(pictures)).kind(), CaptureKind::kPictures);
+  EXPECT_FALSE(pictures.capture().is_reconstructed);
   const std::pair<Scene, CaptureKind> cases[] = {{photos, CaptureKind::kStatic},
                                                  {dynamic, CaptureKind::kDynamic},
                                                  {film, CaptureKind::kFilm},

@@ -8,7 +8,6 @@
 #include "core/base/run_control.h"
 #include "core/keyview/expected_error.h"
 #include "core/scene/scene.h"
-#include "core/scene/view_images.h"
 #include "core/splat/model/gaussian_model.h"
 #include "core/stage/context/stage_context.h"
 
@@ -37,16 +36,6 @@ SeenSamples SeenByGeometry(const Scene& scene,
 
 // Samples without geometry: the tracked points of a view, and the other views that observe them.
 SeenSamples SeenByPoints(const Scene& scene, const std::vector<int>& views);
-
-// Samples of a film: optical flow follows each one through the frames of its shot, forward and back, until it leaves the
-// picture or the flow there and back disagrees. A frame shows it if it is followed to there. `images`: of the scene's
-// frames, L. Of long shots frames between the candidates are left out. Requires: all views have times.
-SeenSamples SeenByFlow(const Scene& scene,
-                       const std::vector<int>& views,
-                       const ViewImages& images,
-                       const SampleGrid& grid,
-                       ThreadPool& pool,
-                       const CancellationToken& cancel);
 
 // Folder that keeps features of photos between jobs; empty: none.
 std::filesystem::path FeatureCache(const StageContext& context);

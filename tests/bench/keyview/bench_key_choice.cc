@@ -23,8 +23,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr int kSeenSidePx = 200;
-
 struct KeyChoiceArguments {
   std::string scene_folder, run_folder, out_folder;
   int candidates = 8;
@@ -76,7 +74,7 @@ class KeyChoice {
     return tried;
   }
 
-  // Shares of views that each tried one shows, and mean distances of their features to it.
+  // Mean distance of the features of all views to those of each tried one, and its expected error; smaller is better.
   void AddExpected(const std::vector<int>& tried, ordered_json* json) const {
     ThreadPool pool(args_.threads);
     NoCheckpoints none;
@@ -91,33 +89,21 @@ class KeyChoice {
     const NearestDistances distances = FindNearestDistances(features, all, run);
     const std::vector<double> coverage = MeanFeatureDistances(features, all, run);
     const int count = static_cast<int>(training_.size());
-    const ViewImages images(scene_, scene_folder_, kSeenSidePx);
     const SeenSamples seen =
-        !args_.run_folder.empty()
-            ? SeenByGeometry(
+        args_.run_folder.empty()
+            ? SeenSamples(count, 0)
+            : SeenByGeometry(
                   scene_,
                   training_,
                   ParseGaussians(ReadFile(pipeline_.ArtifactPath(artifact::kGeometry))),
                   GridFor(count),
                   pool,
-                  cancel)
-            : SeenByFlow(scene_, training_, images, GridFor(count), pool, cancel);
+                  cancel);
     for (const int view : tried) {
       const int key = static_cast<int>(std::ranges::find(training_, view) - training_.begin());
-      std::vector<double> shares(count, 0.0), far(count, 0.0);
-      for (int other = 0; other < count; ++other) {
-        for (int s = 0; s < seen.samples(); ++s) {
-          shares[other] += seen.IsSeen(key, other, s) ? 1.0 / seen.samples() : 0.0;
-        }
-      }
-      for (size_t q = 0; q < distances.owner.size(); ++q) {
-        far[distances.owner[q]] += distances.weight[q] * distances.from[key][q];
-      }
       (*json)["expected"].push_back({{"view", scene_.views[view].name},
                                      {"coverage", coverage[key]},
-                                     {"expected_error", ExpectedError(seen, distances, {key})},
-                                     {"seen", shares},
-                                     {"distance", far}});
+                                     {"expected_error", ExpectedError(seen, distances, {key})}});
     }
   }
 
