@@ -41,7 +41,8 @@ void DeclareCreditFlags(CLI::App& app, CreditFlags* flags, bool with_caption) {
 
 bool IsColoredPicture(const std::string& artifact) {
   if (!artifact.ends_with(".png") && !IsJpegName(artifact)) return false;
-  for (const char* folder : {artifact::kRenders, artifact::kColoredPhotos, artifact::kFilmFrames, artifact::kFrames}) {
+  for (const char* folder :
+       {artifact::kRenders, artifact::kColoredPhotos, artifact::kFilmFrames, artifact::kFrames}) {
     if (artifact.starts_with(folder)) return true;
   }
   return fs::path(artifact).filename() == artifact::kKeyViewColored;

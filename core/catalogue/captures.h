@@ -26,10 +26,10 @@ enum class CaptureLayout {
 
 // Kind of scene that import makes of a capture.
 enum class CaptureKind {
-  kStatic,   // posed views of a place, without times
-  kFilm,     // frames of one camera without poses: coloured, not reconstructed
-  kDynamic,  // posed views with times
-  kRelief,   // frames of one standing camera with assumed depth (2.5D)
+  kStatic,    // posed views of a place, without times
+  kFilm,      // frames of one camera without poses: coloured, not reconstructed
+  kDynamic,   // posed views with times
+  kRelief,    // frames of one standing camera with assumed depth (2.5D)
   kPictures,  // photos whose cameras could not be found: coloured, not reconstructed
 };
 

@@ -15,7 +15,8 @@ namespace {
 
 constexpr int kWide = 176, kHigh = 132;
 
-// Photos of one place, each a step to the right of the one before, and at last one of another place, of other shape.
+// Photos of one place, each a step to the right of the one before, and at last one of another
+// place, of other shape.
 class CarryPicturesTest : public StageTest {
  protected:
   CarryPicturesTest() {

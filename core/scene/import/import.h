@@ -39,8 +39,8 @@ struct ImportResult {
 // of cameras whose intrinsics do not fit their observations. Writes no checkpoints.
 // Throws Error for an empty folder, a single photo, unreadable photos, a model whose images are
 // missing, masks that fit no photo (photo_masks.h), non-finite numbers, and points that all lie
-// behind their cameras or absurdly far away. Photos whose cameras structure-from-motion does not find
-// become a scene of pictures, with a warning that says why.
+// behind their cameras or absurdly far away. Photos whose cameras structure-from-motion does not
+// find become a scene of pictures, with a warning that says why.
 ImportResult ImportScene(const std::filesystem::path& scene_folder,
                          const std::filesystem::path& scratch_folder,
                          const ImportOptions& options,

@@ -8,7 +8,8 @@
 
 namespace color3d {
 
-// The colourizer that coloured the key view by itself; null where somebody chose its colours, or other weights did.
+// The colourizer that coloured the key view by itself; null where somebody chose its colours, or
+// other weights did.
 std::shared_ptr<const AutomaticColorizer> ColorizerOfKeyView(const StageContext& context);
 
 }  // namespace color3d

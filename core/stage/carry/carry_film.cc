@@ -89,8 +89,8 @@ class UnkeyedShots {
         returning_(frames, keys, options, context.pool(), context.cancel()),
         colorizer_(ColorizerOfKeyView(context)) {}
 
-  // The frame in the colours of a key frame whose place it shows again, else in automatic ones if those of the key view
-  // are automatic; nullopt: in none.
+  // The frame in the colours of a key frame whose place it shows again, else in automatic ones if
+  // those of the key view are automatic; nullopt: in none.
   std::optional<FilmKey> KeyAt(int frame) const {
     std::optional<FilmKey> key = returning_.KeyAt(frame);
     if (key || !colorizer_) return key;
@@ -133,8 +133,8 @@ void CarryFilm(const CarryInputs& inputs, StageContext& context) {
   const std::vector<int> middles = UnkeyedShotMiddles(frames.shot, inputs.key_views);
   std::optional<UnkeyedShots> unkeyed;
   for (size_t i = 0; i < middles.size(); ++i) {
-    done.ReportProgress(fmt::format(
-        "colouring a key frame of shot {} of {} without one", i + 1, middles.size()));
+    done.ReportProgress(
+        fmt::format("colouring a key frame of shot {} of {} without one", i + 1, middles.size()));
     if (!unkeyed) unkeyed.emplace(frames, keys, options.film, context);
     const auto key = unkeyed->KeyAt(middles[i]);
     if (key) carry({*key});

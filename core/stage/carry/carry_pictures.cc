@@ -20,7 +20,8 @@
 namespace color3d {
 namespace {
 
-// Shares of a picture that are reached: less is taken for a chance; with more its colours are carried on.
+// Shares of a picture that are reached: less is taken for a chance; with more its colours are
+// carried on.
 constexpr double kMinReached = 0.05;
 constexpr double kReached = 0.4;
 constexpr int kRounds = 3;         // from picture to picture
@@ -37,7 +38,8 @@ class Canvas {
     for (int c = 0; c < picture.channels; ++c) {
       for (int y = 0; y < picture.height; ++y) {
         const float* row = picture.Plane(c) + static_cast<size_t>(y) * picture.width;
-        std::copy_n(row, picture.width, canvas.Plane(c) + static_cast<size_t>(y + top) * side_ + left);
+        std::copy_n(
+            row, picture.width, canvas.Plane(c) + static_cast<size_t>(y + top) * side_ + left);
       }
     }
     return canvas;
@@ -157,7 +159,8 @@ class PictureCarrier {
       Source& source = sources[i];
       source.view = views[i];
       const CarriedColor color = Color(source.view);
-      source.key = {source.view, {canvas_.Put(color.ab, 0.0f), canvas_.Put(color.confidence, 0.0f)}};
+      source.key = {source.view,
+                    {canvas_.Put(color.ab, 0.0f), canvas_.Put(color.confidence, 0.0f)}};
       source.luminance = OnCanvas(source.view);
       source.regions = std::make_unique<ReappearingRegions>(*source.luminance);
     });

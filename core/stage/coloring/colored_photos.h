@@ -9,8 +9,8 @@
 
 namespace color3d {
 
-// Writes every photo with its own luminance and size as artifact::kColoredPhotos, and `views`, at most
-// options.max_side_px, as artifact::kRenders for the report.
+// Writes every photo with its own luminance and size as artifact::kColoredPhotos, and `views`, at
+// most options.max_side_px, as artifact::kRenders for the report.
 void WriteColoredPhotos(const RenderOptions& options,
                         const Scene& scene,
                         const std::vector<int>& views,

@@ -50,14 +50,14 @@ std::optional<NextKeyViewFacts> AdviseNextKeyView(const Scene& scene,
   const NearestDistances distances =
       FindNearestDistances(features, std::vector<bool>(training.size(), true), context.control());
   const int count = static_cast<int>(training.size());
-  const SeenSamples seen =
-      are_pictures ? SeenSamples(count, 0)
-                   : SeenByGeometry(scene,
-                                    training,
-                                    ParseGaussians(context.ReadInput(artifact::kModel)),
-                                    GridFor(count),
-                                    context.pool(),
-                                    context.cancel());
+  const SeenSamples seen = are_pictures
+                               ? SeenSamples(count, 0)
+                               : SeenByGeometry(scene,
+                                                training,
+                                                ParseGaussians(context.ReadInput(artifact::kModel)),
+                                                GridFor(count),
+                                                context.pool(),
+                                                context.cancel());
   const auto next = NextKeyView(seen, distances, keys);
   if (!next) return std::nullopt;
   return NextKeyViewFacts{

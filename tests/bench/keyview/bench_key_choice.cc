@@ -1,5 +1,5 @@
-// color3d-bench key-choice: how good the selected key view is. Colours a scene or film from each of several key views and
-// compares the measured errors with those that the selection expects.
+// color3d-bench key-choice: how good the selected key view is. Colours a scene or film from each of
+// several key views and compares the measured errors with those that the selection expects.
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -74,7 +74,8 @@ class KeyChoice {
     return tried;
   }
 
-  // Mean distance of the features of all views to those of each tried one, and its expected error; smaller is better.
+  // Mean distance of the features of all views to those of each tried one, and its expected error;
+  // smaller is better.
   void AddExpected(const std::vector<int>& tried, ordered_json* json) const {
     ThreadPool pool(args_.threads);
     NoCheckpoints none;
@@ -82,7 +83,8 @@ class KeyChoice {
     const CancellationToken cancel;
     const RunControl run{pool, none, silent, cancel};
     std::vector<fs::path> photos;
-    for (const int view : training_) photos.push_back(scene_folder_ / scene_.views[view].image_file);
+    for (const int view : training_)
+      photos.push_back(scene_folder_ / scene_.views[view].image_file);
     const auto encoder = Encoder::Embedded();
     const auto features = CollectViewFeatures(*encoder, *encoder, photos, "", run);
     const std::vector<bool> all(training_.size(), true);
@@ -92,13 +94,12 @@ class KeyChoice {
     const SeenSamples seen =
         args_.run_folder.empty()
             ? SeenSamples(count, 0)
-            : SeenByGeometry(
-                  scene_,
-                  training_,
-                  ParseGaussians(ReadFile(pipeline_.ArtifactPath(artifact::kGeometry))),
-                  GridFor(count),
-                  pool,
-                  cancel);
+            : SeenByGeometry(scene_,
+                             training_,
+                             ParseGaussians(ReadFile(pipeline_.ArtifactPath(artifact::kGeometry))),
+                             GridFor(count),
+                             pool,
+                             cancel);
     for (const int view : tried) {
       const int key = static_cast<int>(std::ranges::find(training_, view) - training_.begin());
       (*json)["expected"].push_back({{"view", scene_.views[view].name},
@@ -142,8 +143,9 @@ class KeyChoice {
       const std::string name = ViewArtifact(artifact::kViewsAb, scene_.views[index], ".png");
       const AbMap map = DecodeAbPng(ReadFile(pipeline_.ArtifactPath(name)), name);
       const auto luminance = images.Luminance(index);
-      error += ChromaError(images.Srgb(index),
-                           JoinLab(*luminance, Resize(map.ab, luminance->width, luminance->height)));
+      error +=
+          ChromaError(images.Srgb(index),
+                      JoinLab(*luminance, Resize(map.ab, luminance->width, luminance->height)));
     }
     return error / static_cast<double>(std::max<size_t>(1, views.size()));
   }
@@ -173,9 +175,8 @@ void AddKeyChoiceCommand(CLI::App& app) {
   command->add_option("--side", args->side_px, "Longer side of the working pictures, px");
   command->add_option("--iterations", args->iterations, "Iterations of personalization");
   command->add_option("--threads", args->threads, "Number of threads");
-  command->callback([args] {
-    std::printf("%s\n", KeyChoice(*args, args->scene_folder).Run().dump(1).c_str());
-  });
+  command->callback(
+      [args] { std::printf("%s\n", KeyChoice(*args, args->scene_folder).Run().dump(1).c_str()); });
 }
 
 }  // namespace color3d
