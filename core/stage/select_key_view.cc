@@ -113,7 +113,7 @@ void ChooseKeyViewSet(const SelectKeyViewOptions& options,
   const NearestDistances distances =
       FindNearestDistances(ranking->features, kept, context.control());
   const SeenSamples seen =
-      context.HasInput(artifact::kGeometry) && scene.capture().is_reconstructed
+      context.HasInput(artifact::kGeometry)
           ? SeenByGeometry(scene,
                            candidates,
                            ParseGaussians(context.ReadInput(artifact::kGeometry)),
