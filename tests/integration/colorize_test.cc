@@ -9,6 +9,7 @@
 #include "core/image/codec.h"
 #include "core/view/view_page.h"
 #include "tests/integration/service_fixture.h"
+#include "tests/support/scenes/noise_place.h"
 
 namespace color3d {
 namespace {
@@ -61,6 +62,30 @@ void ColorizeTest::ExpectPageToLookAt(const v1::Job& job) {
   fs::create_directories(out);
   ExpectRefusal(Client({"view", out}), 2, {out, "view.html", "artifact download"});
   ExpectRefusal(Client({"view", Path("nowhere").string()}), 2, {"there is no folder"});
+}
+
+// Prints of different things, and of different shapes: there is no scene to reconstruct.
+TEST_F(ColorizeTest, PhotosWithoutASceneAreColoredOneByOne) {
+  const fs::path prints = Path("prints"), out = Path("out");
+  const std::pair<int, int> sizes[] = {{320, 240}, {240, 320}, {300, 300}};
+  for (int i = 0; i < 3; ++i) {
+    WriteFileAtomic(prints / ("print" + std::to_string(i) + ".png"),
+                    EncodePng8(NoisePlace(i + 1, sizes[i].first, sizes[i].second, 0)));
+  }
+  const ProcessResult result =
+      Client({"colorize", prints, "-o", out, "--auto", "--seed", "1"}, seconds(300));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.err.find("coloured as pictures, without a 3D scene"), std::string::npos)
+      << result.err;
+  EXPECT_NE(result.out.find("coloured photos"), std::string::npos) << result.out;
+  for (int i = 0; i < 3; ++i) {
+    const Image photo = ReadImage(out / "photos" / ("print" + std::to_string(i) + ".png"));
+    EXPECT_EQ(photo.channels, 3);
+    EXPECT_EQ(photo.width, sizes[i].first);
+    EXPECT_EQ(photo.height, sizes[i].second);
+  }
+  EXPECT_FALSE(fs::exists(out / "view.html"));
+  EXPECT_TRUE(fs::exists(out / "report.html"));
 }
 
 TEST_F(ColorizeTest, ReadOnlyCommandsPrintTextAndJson) {
