@@ -51,6 +51,9 @@ struct SparsePoint {
 
 struct Scene {
   std::vector<View> views;  // sorted by name
+  // Photos beside `views` whose cameras could not be found; their poses mean nothing. They are
+  // coloured, but not reconstructed. Sorted by name.
+  std::vector<View> unplaced;
   std::vector<SparsePoint> points;
   // Rescaling and recentring by import (import/normalise.h), which every writer and export undoes:
   // world = world_from_scene_scale * scene + world_offset.

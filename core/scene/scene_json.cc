@@ -189,13 +189,11 @@ SparsePoint PointFromJson(const Field& field, int view_count) {
   return point;
 }
 
-}  // namespace
-
-std::string SceneToJson(const Scene& scene) {
-  json views = json::array();
-  for (const View& view : scene.views) {
+json ViewsToJson(const std::vector<View>& views) {
+  json array = json::array();
+  for (const View& view : views) {
     const Eigen::Quaterniond& q = view.cam_from_world.rotation;
-    views.push_back(
+    array.push_back(
         {{"name", view.name},
          {"image_file", view.image_file},
          {"camera", CameraToJson(view.camera)},
@@ -206,10 +204,28 @@ std::string SceneToJson(const Scene& scene) {
            {"translation", Vector3ToJson(view.cam_from_world.translation)}}},
          {"held_out", view.held_out}});
     if (view.moment) {
-      views.back()["moment"] = {{"time_s", view.moment->time_s}, {"shot", view.moment->shot}};
+      array.back()["moment"] = {{"time_s", view.moment->time_s}, {"shot", view.moment->shot}};
     }
-    if (!view.mask_file.empty()) views.back()["mask_file"] = view.mask_file;
+    if (!view.mask_file.empty()) array.back()["mask_file"] = view.mask_file;
   }
+  return array;
+}
+
+// Adds the views' names to `names`, which must stay unique.
+std::vector<View> ViewsFromJson(const Field& field, std::set<std::string>* names) {
+  std::vector<View> views;
+  const size_t count = field.ArraySize();
+  views.reserve(count);
+  for (size_t i = 0; i < count; ++i) {
+    views.push_back(ViewFromJson(field[i]));
+    if (!names->insert(views.back().name).second) throw field[i]["name"].Wrong("unique");
+  }
+  return views;
+}
+
+}  // namespace
+
+std::string SceneToJson(const Scene& scene) {
   json points = json::array();
   for (const SparsePoint& point : scene.points) {
     points.push_back(json::array({point.position.x(),
@@ -223,8 +239,9 @@ std::string SceneToJson(const Scene& scene) {
                {"kind", scene.capture().name},
                {"world_from_scene_scale", scene.world_from_scene_scale},
                {"world_offset", Vector3ToJson(scene.world_offset)},
-               {"views", std::move(views)},
+               {"views", ViewsToJson(scene.views)},
                {"points", std::move(points)}};
+  if (!scene.unplaced.empty()) root["unplaced"] = ViewsToJson(scene.unplaced);
   if (scene.relief) {
     root["relief"] = {{"horizon", scene.relief->horizon},
                       {"foot", scene.relief->foot},
@@ -256,18 +273,14 @@ Scene SceneFromJson(std::string_view text) {
   }
   scene.world_offset = field["world_offset"].Vector3();
   if (field.Has("relief")) scene.relief = ReliefFromJson(field["relief"]);
-  const Field views = field["views"];
-  const size_t view_count = views.ArraySize();
   std::set<std::string> names;
-  for (size_t i = 0; i < view_count; ++i) {
-    scene.views.push_back(ViewFromJson(views[i]));
-    if (!names.insert(scene.views.back().name).second) throw views[i]["name"].Wrong("unique");
-  }
+  scene.views = ViewsFromJson(field["views"], &names);
+  if (field.Has("unplaced")) scene.unplaced = ViewsFromJson(field["unplaced"], &names);
   const Field points = field["points"];
   const size_t point_count = points.ArraySize();
   scene.points.reserve(point_count);
   for (size_t i = 0; i < point_count; ++i) {
-    scene.points.push_back(PointFromJson(points[i], static_cast<int>(view_count)));
+    scene.points.push_back(PointFromJson(points[i], static_cast<int>(scene.views.size())));
   }
   if (field.Has("kind")) {  // absent from older files
     const CaptureKind kind = KindOfName(field["kind"].Text());

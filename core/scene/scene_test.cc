@@ -130,6 +130,19 @@ TEST(Scene, OldFilesHaveScaleOne) {
   EXPECT_THAT(Refusal([&] { SceneFromJson(text); }), HasSubstr("must be positive"));
 }
 
+TEST(Scene, JsonHasUnplacedPhotos) {
+  Scene scene = ArcScene(3);
+  scene.unplaced = {scene.views[2]};
+  scene.unplaced[0].name = scene.unplaced[0].image_file = "elsewhere.png";
+  const Scene read = SceneFromJson(SceneToJson(scene));
+  EXPECT_EQ(read.views.size(), 3u);
+  ASSERT_EQ(read.unplaced.size(), 1u);
+  EXPECT_EQ(read.unplaced[0].image_file, "elsewhere.png");
+  EXPECT_EQ(read.kind(), CaptureKind::kStatic);
+  scene.unplaced[0].name = scene.views[0].name;
+  EXPECT_THAT(Refusal([&] { SceneFromJson(SceneToJson(scene)); }), HasSubstr("unplaced"));
+}
+
 TEST(Scene, JsonHasKindAndOlderFilesOpenWithoutIt) {
   Scene photos = ArcScene(3), dynamic = photos;
   for (View& view : dynamic.views) view.moment = Moment{0.1, 0};

@@ -6,6 +6,7 @@
 #include "core/color/lab.h"
 #include "core/keycolor/automatic/automatic.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/formats/edited_share.h"
 #include "core/stage/run_stages.h"
 #include "tests/support/scenes/noise_place.h"
 #include "tests/support/stages/stage_fixture.h"
@@ -70,6 +71,19 @@ TEST_F(CarryPicturesTest, OtherPhotosGetAutomaticColorsWhereTheKeyViewHasThem) {
   EXPECT_NEAR(other.ab.At(0, 60, 60), guess.ab.At(0, 60, 60), 2.0f);
   EXPECT_GT(other.confidence.At(0, 60, 60), 0.0f);
   EXPECT_NEAR(Carried(1).ab.At(0, kHigh / 2, kWide / 3), 30.0f, 0.1f);
+}
+
+TEST_F(CarryPicturesTest, EditIsCarriedWithItsEditedShare) {
+  Image edit(kWide, kHigh, 2, 30.0f);
+  AddEditedShare(Image(kWide, kHigh, 1, 0.8f), &edit);
+  AddInput(artifact::kKeyColor, EncodeCarriedPng({edit, Image(kWide, kHigh, 1, 1.0f)}));
+  Carry();
+  const std::string name = ViewArtifact(artifact::kCarried, scene_.views[1]);
+  const CarriedColor carried = DecodeCarriedPng(ReadFile(scratch_.path() / "out" / name), name);
+  ASSERT_EQ(carried.ab.channels, 3);
+  EXPECT_NEAR(carried.ab.At(0, kHigh / 2, kWide / 3), 30.0f, 0.1f);
+  EXPECT_NEAR(carried.ab.At(2, kHigh / 2, kWide / 3), 0.8f, 0.01f);
+  EXPECT_GT(carried.confidence.At(0, kHigh / 2, kWide / 3), 0.5f);
 }
 
 TEST_F(CarryPicturesTest, PhotosAreWrittenInColor) {

@@ -24,20 +24,15 @@ std::vector<std::string> NotesOnGivenPicture(const ColorizeKeyViewOptions& optio
   return PictureNotes(ReadFile(options.file));
 }
 
-// Adds the edited share to the undistorted colours of an edit, as their third channel.
-void AddEditedShare(const KeyPhoto& photo,
+// Edited share of an edit, undistorted.
+Image EditedShareOf(const KeyPhoto& photo,
                     const Image& edited_ab,
                     int view,
-                    const ViewImages& images,
-                    CarriedColor* color) {
+                    const ViewImages& images) {
   const Image lab = LabFromSrgb(photo.srgb);
   Image original(lab.width, lab.height, 2);
   std::copy_n(lab.Plane(1), original.data.size(), original.data.begin());
-  const Image share = images.Undistort(view, EditedShare(original, edited_ab));
-  Image all(color->ab.width, color->ab.height, 3);
-  std::ranges::copy(color->ab.data, all.data.begin());
-  std::ranges::copy(share.data, all.Plane(2));
-  color->ab = std::move(all);
+  return images.Undistort(view, EditedShare(original, edited_ab));
 }
 
 }  // namespace
@@ -77,7 +72,7 @@ void RunColorizeKeyView(const ColorizeKeyViewOptions& options, StageContext& con
     for (float& value : color.confidence.data) value = std::max(value, kLeastConfidence);
   }
   if (options.source == ColorizeKeyViewOptions::Source::kEdit) {
-    AddEditedShare(photo, result.ab, key, images, &color);
+    AddEditedShare(EditedShareOf(photo, result.ab, key, images), &color.ab);
     if (color.confidence.Empty())
       color.confidence = Image(color.ab.width, color.ab.height, 1, 1.0f);
   }

@@ -1,5 +1,6 @@
 #include "core/colorizer/personal/train_colorizer.h"
 #include "core/scene/view_images.h"
+#include "core/stage/coloring/unplaced_photos.h"
 #include "core/stage/coloring/view_coloring.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/views_checkpoint.h"
@@ -41,8 +42,11 @@ void RunColorizeViews(const ColorizeViewsOptions& options,
                           options.max_side_px,
                           are_frames ? kColoredFramesCacheBytes : 0);
   ViewsCheckpoint done(scene, context);
-  MethodOf(options.method)({scene, images, positions, options, colorizer, are_frames, done},
-                           context);
+  const ViewColoring coloring{scene, images, positions, options, colorizer, are_frames, done};
+  MethodOf(options.method)(coloring, context);
+  if (options.method == ColorizeViewsOptions::Method::kFusion) {
+    ColorUnplacedPhotos(coloring, context);
+  }
 }
 
 }  // namespace color3d

@@ -74,6 +74,7 @@ void RunRender(const RenderOptions& options, StageContext& context) {
     CheckPathOfFilm(options);
     return RenderFilm(options, scene, ViewsToRender(options, scene), context);
   }
+  WriteUnplacedPhotos(scene, context);
   const GaussianModel model = ParseGaussians(context.ReadInput(artifact::kModel));
   if (model.size() == 0)
     throw InvalidArgument("the model has no Gaussians: there is nothing to render");

@@ -57,11 +57,13 @@ const scene = (run: Run, stops: (() => void)[], onNewest: (run: Run) => void): H
 };
 
 // The coloured photos of a set of which no scene could be made.
-const pictures = (run: Run, names: string[]): HTMLElement => {
+const pictures = (run: Run, names: string[], hasScene: boolean): HTMLElement => {
   const title = (name: string): string => name.replace(/^photos\//, '').replace(/\.png$/, '');
   return h('section', { 'aria-labelledby': 'in-colour' },
-    h('h2', { id: 'in-colour' }, 'Your photos in colour'),
-    h('p', { class: 'soft' }, 'They show too little in common for a scene to walk through, so each was coloured by itself.'),
+    h('h2', { id: 'in-colour' }, hasScene ? 'Photos beside the scene' : 'Your photos in colour'),
+    h('p', { class: 'soft' }, hasScene
+      ? 'They show too little of what the others show to have a place in the scene, so they were coloured as pictures.'
+      : 'They show too little in common for a scene to walk through, so each was coloured by itself.'),
     h('ul', { class: 'gallery' }, ...names.map((name) => h('li', {},
       h('a', { href: artifactUrl(run.id, name, true), download: `${title(name)}.png` },
         h('img', { src: artifactUrl(run.id, name), alt: `${title(name)} in colour`, loading: 'lazy' }),
@@ -73,8 +75,8 @@ const results = (run: Run, stops: (() => void)[], onNewest: (run: Run) => void):
   const film = run.artifacts.find(({ name }) => name === 'film.mp4');
   const photos = run.artifacts.filter(({ name }) => name.startsWith('photos/'));
   return [
-    ...(photos.length ? [pictures(run, photos.map(({ name }) => name))] : []),
     ...(has('view.html') ? [scene(run, stops, onNewest)] : []),
+    ...(photos.length ? [pictures(run, photos.map(({ name }) => name), has('view.html'))] : []),
     ...(!has('view.html') && film ? [h('p', { class: 'soft' }, 'Save the film to play it.')] : []),
   ];
 };

@@ -124,20 +124,42 @@ void RequireMemory(const ImportOptions& options, const Scene& scene) {
   }
 }
 
-// The photos as pictures whose cameras are not known.
+// A photo whose camera is not known.
+View UnplacedView(const Photo& photo) {
+  View view;
+  view.name = photo.name;
+  view.image_file = photo.file;
+  view.mask_file = photo.mask_file;
+  view.camera = view.captured_camera = GuessedCamera(photo.width, photo.height);
+  return view;
+}
+
 Scene PicturesOf(const std::vector<Photo>& photos) {
   Scene scene;
   scene.are_pictures = true;
-  for (const Photo& photo : photos) {
-    View view;
-    view.name = photo.name;
-    view.image_file = photo.file;
-    view.mask_file = photo.mask_file;
-    view.camera = view.captured_camera = GuessedCamera(photo.width, photo.height);
-    scene.views.push_back(std::move(view));
-  }
+  for (const Photo& photo : photos) scene.views.push_back(UnplacedView(photo));
   return scene;
 }
+
+// The photos that are no views.
+std::vector<Photo> UnplacedPhotos(const std::vector<Photo>& photos, const Scene& scene) {
+  std::vector<std::string> files;
+  for (const View& view : scene.views) files.push_back(view.image_file);
+  std::ranges::sort(files);
+  std::vector<Photo> unplaced;
+  for (const Photo& photo : photos) {
+    if (!std::ranges::binary_search(files, photo.file)) unplaced.push_back(photo);
+  }
+  return unplaced;
+}
+
+std::vector<std::string> NamesOf(const std::vector<View>& views) {
+  std::vector<std::string> names;
+  for (const View& view : views) names.push_back(view.name);
+  return names;
+}
+
+constexpr char kUnplaced[] = "coloured as pictures, but are not part of the 3D scene";
 
 // Errors that say that the cameras cannot be found in these photos.
 bool IsAboutCameras(const Error& error) {
@@ -182,30 +204,45 @@ void ImportPhotos(const fs::path& scene_folder,
   result->scene = std::move(sfm.scene);
   result->sfm = std::move(sfm.report);
   result->ran_structure_from_motion = true;
-  if (sfm.unplaced.empty()) return;
-  const bool few = 2 * result->scene.views.size() < photos.size();
+  Scene& scene = result->scene;
+  for (const Photo& photo : UnplacedPhotos(photos, scene)) {
+    scene.unplaced.push_back(UnplacedView(photo));
+  }
+  if (scene.unplaced.empty()) return;
+  const bool few = 2 * scene.views.size() < photos.size();
   result->warnings.push_back(
-      fmt::format("{}{} of {} photos could be placed; the others share too few features with them "
-                  "and were left out: {}",
+      fmt::format("{}{} of {} photos could be placed; the others share too few features with them. "
+                  "They are {}: {}",
                   few ? "only " : "",
-                  result->scene.views.size(),
+                  scene.views.size(),
                   photos.size(),
-                  SummarizeNames(sfm.unplaced)));
+                  kUnplaced,
+                  SummarizeNames(NamesOf(scene.unplaced))));
 }
 
-void WarnOfUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
+// Adds the photos without a pose as unplaced ones. Those of scenes with times and those that cannot
+// be read are left out.
+void AddUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
   const std::vector<Photo> photos = ListPhotos(scene_folder);
-  result->photos_found = static_cast<int>(std::max(photos.size(), result->scene.views.size()));
-  std::vector<std::string> files;
-  for (const View& view : result->scene.views) files.push_back(view.image_file);
-  std::ranges::sort(files);
-  std::vector<std::string> unposed;
-  for (const Photo& photo : photos) {
-    if (!std::ranges::binary_search(files, photo.file)) unposed.push_back(photo.name);
+  Scene& scene = result->scene;
+  result->photos_found = static_cast<int>(std::max(photos.size(), scene.views.size()));
+  std::vector<std::string> left_out;
+  for (Photo& photo : UnplacedPhotos(photos, scene)) {
+    try {
+      if (scene.HasTimes()) throw InvalidArgument("it has no time");
+      ProbePhoto(scene_folder, &photo);
+      scene.unplaced.push_back(UnplacedView(photo));
+    } catch (const Error&) {
+      left_out.push_back(photo.name);
+    }
   }
-  if (unposed.empty()) return;
-  result->warnings.push_back(fmt::format(
-      "{} photos have no pose and were left out: {}", unposed.size(), SummarizeNames(unposed)));
+  const auto warn = [&](const std::vector<std::string>& names, const char* what) {
+    if (names.empty()) return;
+    result->warnings.push_back(fmt::format(
+        "{} photos have no pose. They are {}: {}", names.size(), what, SummarizeNames(names)));
+  };
+  warn(NamesOf(scene.unplaced), kUnplaced);
+  warn(left_out, "left out");
 }
 
 // Reads the poses beside the photos: of the format that places most of them, COLMAP's if no other
@@ -222,7 +259,7 @@ bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
       result->warnings = colmap->notes;
       result->scene = ReadColmapModel(
           scene_folder / colmap->folder, scene_folder, &result->warnings, &result->cameras);
-      WarnOfUnposedPhotos(scene_folder, result);
+      AddUnposedPhotos(scene_folder, result);
       return true;
     }
     result->warnings.push_back(
@@ -242,7 +279,7 @@ bool ImportPoses(const fs::path& scene_folder, ImportResult* result) {
     result->layout = CaptureLayout::kTransforms;
     result->scene =
         ReadTransformsJson(transforms, scene_folder, &result->warnings, &result->cameras);
-    WarnOfUnposedPhotos(scene_folder, result);
+    AddUnposedPhotos(scene_folder, result);
     return true;
   }
   std::optional<Scene> of_photos = ReadPosesOfPhotos(scene_folder, &result->warnings);

@@ -84,6 +84,22 @@ TEST_F(Import, PrefersColmapToTransforms) {
   }
 }
 
+TEST_F(Import, PhotosWithoutPoseAreUnplaced) {
+  const Scene scene = ArcScene(9);
+  WritePhotos(scene, folder_.path());
+  WriteColmapText(scene, folder_.path() / "sparse");
+  WritePhoto("images/extra.png", 60, 40);
+  WriteFileAtomic(folder_.path() / "images/torn.png", "no picture");
+  const ImportResult result = Run();
+  EXPECT_EQ(result.scene.views.size(), 9u);
+  ASSERT_EQ(result.scene.unplaced.size(), 1u);
+  EXPECT_EQ(result.scene.unplaced[0].name, "extra.png");
+  EXPECT_EQ(result.scene.unplaced[0].camera.width, 60);
+  EXPECT_THAT(result.warnings,
+              testing::IsSupersetOf(
+                  {HasSubstr("coloured as pictures"), HasSubstr("They are left out: torn.png")}));
+}
+
 TEST_F(Import, HoldsOutEveryEighthView) {
   const Scene scene = ArcScene(17);
   WritePhotos(scene, folder_.path());

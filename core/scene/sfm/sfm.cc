@@ -269,10 +269,7 @@ SfmResult MakeScene(const ColmapModel& model,
   std::map<uint32_t, int> view_of_image;
   for (size_t i = 0; i < photos.size(); ++i) {
     const auto it = image_of_copy.find(copies[i]);
-    if (it == image_of_copy.end()) {
-      result.unplaced.push_back(photos[i].name);
-      continue;
-    }
+    if (it == image_of_copy.end()) continue;
     const ColmapImage& image = model.images.at(it->second);
     const ColmapCamera& camera = model.cameras.at(image.camera_id);
     View view;

@@ -14,7 +14,6 @@ namespace color3d {
 
 struct SfmResult {
   Scene scene;  // the views that were placed, with their points; cameras at the photos' full size
-  std::vector<std::string> unplaced;  // names of the other photos
   SfmReport report;
 };
 

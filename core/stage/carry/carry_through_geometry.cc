@@ -24,13 +24,6 @@ SurfaceRenderer RendererOf(const Scene& scene, const GaussianModel& geometry) {
   };
 }
 
-// Adds `plane` (1 channel) as the last channel; does nothing if it is empty.
-void AddChannel(const Image& plane, Image* image) {
-  if (plane.Empty()) return;
-  ++image->channels;
-  image->data.insert(image->data.end(), plane.data.begin(), plane.data.end());
-}
-
 // Only key views keep their colours.
 void RemoveCarried(const CarryInputs& inputs, CarryCheckpoint& done, StageContext& context) {
   for (int view = 0; view < static_cast<int>(inputs.scene.views.size()); ++view) {
@@ -71,14 +64,14 @@ std::vector<ColoredKeyView> ReadColoredKeyViews(const CarryInputs& inputs,
       key.color = ReadKeyColor(context, camera.width, camera.height);
       ClearMasked(images.Mask(view).get(), &key.color.confidence);
       if (edits) {
-        AddChannel(ReadEditedShare(context, artifact::kKeyColor, camera.width, camera.height),
-                   &key.color.ab);
+        AddEditedShare(ReadEditedShare(context, artifact::kKeyColor, camera.width, camera.height),
+                       &key.color.ab);
       }
     } else {
       key.color = CarryFromAll(keys, key.surfaces, inputs.options.carry);
       CarriedColor own = ReadAdditionalKeyColor(context, inputs.scene, view, images);
       if (key.color.ab.channels > 2) {
-        AddChannel(ReadAdditionalEditedShare(context, inputs.scene, view, images), &own.ab);
+        AddEditedShare(ReadAdditionalEditedShare(context, inputs.scene, view, images), &own.ab);
       }
       FillFrom(own, &key.color);
     }

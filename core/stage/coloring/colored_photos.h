@@ -1,4 +1,4 @@
-// Writes the photos of a scene of pictures in colour. Stateless.
+// Writes photos that are no views of a 3D scene in colour. Stateless.
 #pragma once
 
 #include <vector>
@@ -15,5 +15,8 @@ void WriteColoredPhotos(const RenderOptions& options,
                         const Scene& scene,
                         const std::vector<int>& views,
                         StageContext& context);
+
+// Writes the unplaced photos of a scene, as far as colours are among the inputs, in the same way.
+void WriteUnplacedPhotos(const Scene& scene, StageContext& context);
 
 }  // namespace color3d

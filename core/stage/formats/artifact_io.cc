@@ -23,15 +23,19 @@ std::string ViewArtifact(std::string_view folder, const View& view, std::string_
 
 void CheckStemsAreUnique(const Scene& scene) {
   std::map<std::string, std::string> seen;
-  for (const View& view : scene.views) {
-    const auto [found, fresh] = seen.emplace(ViewArtifact("", view, ""), view.name);
-    if (!fresh) {
-      throw InvalidArgument(
-          "{} and {} differ only in their extension; remove or rename one of them",
-          found->second,
-          view.name);
+  const auto check = [&](const std::vector<View>& views) {
+    for (const View& view : views) {
+      const auto [found, fresh] = seen.emplace(ViewArtifact("", view, ""), view.name);
+      if (!fresh) {
+        throw InvalidArgument(
+            "{} and {} differ only in their extension; remove or rename one of them",
+            found->second,
+            view.name);
+      }
     }
-  }
+  };
+  check(scene.views);
+  check(scene.unplaced);
 }
 
 std::string ImportFactsToJson(const ImportFacts& f) {

@@ -1,6 +1,7 @@
 #include "core/stage/formats/edited_share.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "core/image/codec.h"
 #include "core/image/weighted_resize.h"
@@ -22,6 +23,12 @@ Image PlaneOf(const Image& image, int plane) {
 
 }  // namespace
 
+void AddEditedShare(const Image& share, Image* ab) {
+  if (share.Empty()) return;
+  ++ab->channels;
+  ab->data.insert(ab->data.end(), share.data.begin(), share.data.end());
+}
+
 std::string EncodeCarriedPng(const CarriedColor& color) {
   if (color.ab.channels == 2) return EncodeAbPng(color.ab, color.confidence);
   Image packed(color.ab.width, color.ab.height, 4);
@@ -30,6 +37,14 @@ std::string EncodeCarriedPng(const CarriedColor& color) {
   std::copy_n(color.confidence.data.begin(), n, packed.Plane(kConfidencePlane));
   std::copy_n(color.ab.Plane(2), n, packed.Plane(kEditedPlane));
   return EncodePng16(packed);
+}
+
+CarriedColor DecodeCarriedPng(const std::string& png, const std::string& name) {
+  AbMap map = DecodeAbPng(png, name);
+  if (ProbeImage(png, name).channels == 4) {
+    AddEditedShare(PlaneOf(DecodeImage(png, name, /*keep_alpha=*/true), kEditedPlane), &map.ab);
+  }
+  return {std::move(map.ab), std::move(map.confidence)};
 }
 
 Image ReadEditedShare(const StageContext& context, const std::string& name, int width, int height) {

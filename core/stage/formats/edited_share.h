@@ -14,8 +14,15 @@ namespace color3d {
 
 class StageContext;
 
+// Adds the edited share (1 channel) as the third channel of an ab image of its size; does nothing
+// if `share` is empty.
+void AddEditedShare(const Image& share, Image* ab);
+
 // EncodeAbPng with the edited share, the third channel of `color.ab`, if there is one.
 std::string EncodeCarriedPng(const CarriedColor& color);
+
+// Inverse of EncodeCarriedPng. Throws as DecodeAbPng.
+CarriedColor DecodeCarriedPng(const std::string& png, const std::string& name);
 
 // Edited share (1 channel, 0..1) of the ab map among the inputs, resized; empty if it has none or
 // there is no such input. Weighted by the map's confidence.
