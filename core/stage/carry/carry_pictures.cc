@@ -8,11 +8,11 @@
 #include "core/stage/carry/automatic_colors.h"
 #include "core/stage/carry/carry_by_kind.h"
 #include "core/stage/carry/carry_results.h"
-#include "core/stage/carry/picture_carry.h"
 #include "core/stage/formats/artifact_io.h"
 #include "core/stage/formats/carry_checkpoint.h"
 #include "core/stage/formats/edited_share.h"
 #include "core/stage/formats/key_views.h"
+#include "core/stage/sources/picture_carry.h"
 
 namespace color3d {
 namespace {

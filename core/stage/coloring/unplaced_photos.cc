@@ -5,8 +5,8 @@
 #include <numeric>
 
 #include "core/image/codec.h"
-#include "core/stage/carry/picture_carry.h"
 #include "core/stage/formats/artifact_io.h"
+#include "core/stage/sources/picture_carry.h"
 
 namespace color3d {
 namespace {

@@ -1,11 +1,10 @@
-#include "core/stage/carry/picture_carry.h"
+#include "core/stage/sources/picture_carry.h"
 
 #include <algorithm>
 #include <map>
 #include <utility>
 
 #include "core/carry/confidence.h"
-#include "core/film/reappearing_regions.h"
 #include "core/image/feature_matches.h"
 #include "core/stage/formats/edited_share.h"
 
