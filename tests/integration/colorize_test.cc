@@ -67,6 +67,7 @@ void ColorizeTest::ExpectPageToLookAt(const v1::Job& job) {
 // Prints of different things, and of different shapes: there is no scene to reconstruct.
 TEST_F(ColorizeTest, PhotosWithoutASceneAreColoredOneByOne) {
   const fs::path prints = Path("prints"), out = Path("out");
+  fs::create_directories(prints);
   const std::pair<int, int> sizes[] = {{320, 240}, {240, 320}, {300, 300}};
   for (int i = 0; i < 3; ++i) {
     WriteFileAtomic(prints / ("print" + std::to_string(i) + ".png"),
