@@ -12,7 +12,6 @@
 
 #include "core/base/error.h"
 #include "core/base/files.h"
-#include "core/scene/formats/scene_readers.h"
 #include "core/scene/import/import.h"
 #include "tests/bench/commands.h"
 #include "tests/bench/result_file.h"
@@ -25,6 +24,7 @@ namespace fs = std::filesystem;
 
 struct PosesArguments {
   std::string scene_folder;
+  std::string truth_folder;
   std::string pairs = "planned";
   std::string json_file;
   std::string keep_folder;
@@ -157,10 +157,11 @@ void RunPoses(PosesArguments& args) {
                                 {"pairs_verified", CountVerifiedPairs(work / "database.db")},
                                 {"all_pairs_matched", sfm.exhaustive}};
   result.update(PointFacts(imported.scene));
-  const fs::path model = fs::path(args.scene_folder) / "sparse/0";
-  if (fs::exists(model)) {
-    result["against_model"] =
-        CompareWithModel(imported.scene, ReadColmapModel(model, args.scene_folder));
+  const fs::path truth = args.truth_folder.empty() ? args.scene_folder : args.truth_folder;
+  if (fs::exists(truth / "sparse/0") || fs::exists(truth / "poses_bounds.npy")) {
+    const Scene given =
+        ImportScene(truth, scratch.path(), args.options, run.ReportingTo(observer)).scene;
+    result["against_model"] = CompareWithModel(imported.scene, given);
   }
   result["warnings"] = observer.warnings;
   WriteResult(result, args.json_file);
@@ -175,6 +176,10 @@ void AddPosesCommand(CLI::App& app) {
   command
       ->add_option("--scene", args->scene_folder, "Folder with images/, and poses to compare with")
       ->required();
+  command->add_option("--truth",
+                      args->truth_folder,
+                      "Folder with images/ and poses that the photos were made from; default: that "
+                      "of --scene");
   command->add_option("--pairs", args->pairs, "Pairs of photos to match")
       ->check(CLI::IsMember({"planned", "exhaustive"}));
   command->add_option("--neighbors",

@@ -5,6 +5,7 @@
 
 namespace color3d {
 
+void AddAgeCommand(CLI::App& app);
 void AddAugmentationsCommand(CLI::App& app);
 void AddAutomaticCommand(CLI::App& app);
 void AddChoicesCommand(CLI::App& app);

@@ -5,7 +5,7 @@
 
 Builds REV in DIR/REV (default: build-compare). Each round runs `color3d colorize SCENE --benchmark`
 with both builds, in turn, each on a fresh server. Prints, for each scene, the medians of seconds,
-error and PSNR and the ratio of the seconds. OPTIONS: further options of `color3d colorize`; both
+error and PSNR and the ratio of the seconds, and to stderr those of the stages. OPTIONS: further options of `color3d colorize`; both
 commits must know them. Let nothing else run meanwhile.
 """
 import argparse
@@ -57,10 +57,12 @@ def run(programs, scene, out, options):
             with open(address, encoding="utf-8") as file:
                 environment = dict(os.environ, COLOR3D_SERVER=file.read().strip())
             start = time.monotonic()
-            subprocess.run(
+            done = subprocess.run(
                 [os.path.join(programs, "color3d"), "colorize", scene, "-o", out, "--benchmark",
-                 *options], check=True, env=environment, stdout=subprocess.DEVNULL)
+                 *options], check=False, env=environment, capture_output=True, text=True)
             seconds = time.monotonic() - start
+            if done.returncode != 0:
+                sys.exit(f"compare_commits: {programs}/color3d failed:\n{done.stderr}")
         finally:
             server.terminate()
             server.wait()
@@ -99,13 +101,18 @@ def main():
         median = {}
         for commit, _ in commits:
             median[commit] = statistics.median(seconds for seconds, _ in runs[commit])
-            held_out = [metrics["held_out"] for _, metrics in runs[commit]]
-            error = statistics.median(m["delta_e00_chroma"] for m in held_out)
-            psnr = statistics.median(m["psnr_l"] for m in held_out)
+            of_runs = [metrics for _, metrics in runs[commit]]
+            error = statistics.median(metrics["delta_e00_chroma"] for metrics in of_runs)
+            psnr = statistics.median(metrics["psnr_l"] for metrics in of_runs)
             print(f"| {os.path.basename(scene)} | {commit} | {median[commit]:.1f} | {error:.2f} "
                   f"| {psnr:.2f} |", flush=True)
         print(f"| {os.path.basename(scene)} | ratio | {median[rev] / median[here]:.2f} | | |",
               flush=True)
+        stages = [name for name in runs[here][0][1] if name.startswith("seconds_")]
+        for name in stages:
+            both = [statistics.median(metrics.get(name, 0.0) for _, metrics in runs[commit])
+                    for commit in (rev, here)]
+            print(f"  {name[len('seconds_'):]}: {both[0]:.1f}, {both[1]:.1f} s", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@
 int main(int argc, char** argv) {
   CLI::App app("Runs and measures stages of Color3D without a server.");
   app.require_subcommand(1);
+  color3d::AddAgeCommand(app);
   color3d::AddAugmentationsCommand(app);
   color3d::AddAutomaticCommand(app);
   color3d::AddChoicesCommand(app);
