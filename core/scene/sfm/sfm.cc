@@ -147,11 +147,7 @@ class Solver {
       Attempt("widened", Strictness::kDefault);
     }
     if (!AreNearlyAllPlaced()) Attempt("straight", Strictness::kStraight);
-    if (!AreNearlyAllPlaced() && MayBeCropped()) Attempt("cropped", Strictness::kCropped);
   }
-
-  // Photos of one camera have one size; prints and their scans have not.
-  bool MayBeCropped() const { return order_ == PhotoOrder::kAny && copies_.groups.size() > 1; }
 
   // Skipped if finer features of all photos come next anyway; distant frames share nothing.
   bool AreWorthMatching(const std::vector<PhotoPair>& pairs) const {
@@ -166,9 +162,6 @@ class Solver {
     Match(AllPairs(Count()));
     Attempt("exhaustive", Strictness::kDefault);
     if (!AreNearlyAllPlaced()) Attempt("exhaustive_straight", Strictness::kStraight);
-    if (!AreNearlyAllPlaced() && MayBeCropped()) {
-      Attempt("exhaustive_cropped", Strictness::kCropped);
-    }
     if (!IsHalfPlaced()) Attempt("exhaustive_loose", Strictness::kLoose);
     if (is_loose_)
       colmap_.Warn("camera positions were found with loose thresholds only; check them");

@@ -23,13 +23,12 @@ enum class PhotoOrder { kAny, kSequence };
 
 // Requires: at least 2 `photos`, probed. Leaves reduced 8-bit grey copies, COLMAP's database and
 // sfm.log in `scratch_folder`. Matches planned pairs, then the unregistered photos with all others.
-// While fewer than nine tenths are registered, tries a straight lens and a smaller initial angle,
-// and with photos of several sizes principal points that are not in the middle; then, with coarse
-// features and not too many photos, all pairs of fine features. While fewer than half are
-// registered, tries all pairs in any case, and loose thresholds last. Models with too few points or
-// an absurd lens are rejected. Throws Error: photos taken from one place (detected first), fewer
-// than 3 registered (kInvalidArgument), COLMAP not installed (kFailedPrecondition), too slow
-// (kDeadlineExceeded), cancelled.
+// While fewer than nine tenths are registered, tries a straight lens and a smaller initial angle;
+// then, with coarse features and not too many photos, all pairs of fine features. While fewer than
+// half are registered, tries all pairs in any case, and loose thresholds last. Models with too few
+// points or an absurd lens are rejected. Throws Error: photos taken from one place (detected
+// first), fewer than 3 registered (kInvalidArgument), COLMAP not installed (kFailedPrecondition),
+// too slow (kDeadlineExceeded), cancelled.
 SfmResult RunStructureFromMotion(const std::vector<Photo>& photos,
                                  const std::filesystem::path& scene_folder,
                                  const std::filesystem::path& scratch_folder,

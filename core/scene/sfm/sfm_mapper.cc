@@ -16,14 +16,6 @@ namespace {
 
 std::vector<std::string> MapperThresholds(Strictness strictness) {
   if (strictness == Strictness::kDefault) return {};
-  if (strictness == Strictness::kCropped) {
-    return {"--Mapper.init_min_tri_angle",
-            "4",
-            "--Mapper.abs_pose_min_num_inliers",
-            "20",
-            "--Mapper.ba_refine_principal_point",
-            "1"};
-  }
   std::vector<std::string> arguments = {
       "--Mapper.init_min_tri_angle", "4", "--Mapper.ba_refine_extra_params", "0"};
   if (strictness == Strictness::kLoose) {
@@ -40,20 +32,14 @@ std::vector<std::string> MapperThresholds(Strictness strictness) {
   return arguments;
 }
 
-// Returns false for degenerate models: very few points, an absurd lens, or a principal point far
-// from the middle.
+// Returns false for degenerate models: very few points, or an absurd lens.
 bool IsPlausible(const ColmapModel& model) {
   constexpr size_t kPointsPerPhoto = 10;
-  constexpr double kMaxShift = 0.2;  // of the principal point, over the longer side
   if (model.points.size() < kPointsPerPhoto * model.images.size()) return false;
   for (const auto& [id, image] : model.images) {
     const ColmapCamera& camera = model.cameras.at(image.camera_id);
-    const Camera& lens = camera.camera;
-    const double side_px = std::max(lens.width, lens.height);
-    const double focal = lens.fx / side_px;
+    const double focal = camera.camera.fx / std::max(camera.camera.width, camera.camera.height);
     if (!(focal > 0.2 && focal < 8.0 && std::abs(camera.distortion.k[0]) < 1.0)) return false;
-    const double shift_px = std::hypot(lens.cx - 0.5 * lens.width, lens.cy - 0.5 * lens.height);
-    if (!(shift_px < kMaxShift * side_px)) return false;
     try {
       UndistortedCamera(camera.camera, camera.distortion);
     } catch (const Error&) {
@@ -112,8 +98,7 @@ std::optional<ColmapModel> MapPhotos(ColmapProcess& colmap,
   colmap.Run(std::move(arguments), phase);  // a nonzero exit code means no model
   fs::path where;
   std::optional<ColmapModel> best = BestModel(output, &where);
-  const bool holds_lens = strictness == Strictness::kStraight || strictness == Strictness::kLoose;
-  if (!best || !holds_lens) return best;
+  if (!best || strictness == Strictness::kDefault) return best;
   // Once cameras are registered, distortion is estimated.
   const fs::path refined = work.folder / ("models_" + attempt + "_refined") / "0";
   fs::create_directories(refined);

@@ -13,17 +13,16 @@ namespace color3d {
 
 // Thresholds of the mapper. Straight: a smaller angle between the first two photos, and no lens
 // distortion until all cameras are registered; for forward motion, distortion and motion explain
-// each other and the mapper fails with an absurd lens. Cropped: principal points are estimated, for
-// prints that were not cropped evenly; a smaller angle and fewer common points. Loose: as straight,
-// with even fewer common points, which may join unrelated photos.
-enum class Strictness { kDefault, kStraight, kCropped, kLoose };
+// each other and the mapper fails with an absurd lens. Loose: fewer common points, too, which may
+// join unrelated photos.
+enum class Strictness { kDefault, kStraight, kLoose };
 
 // Minimum number of registered photos.
 inline constexpr size_t kMinPlaced = 3;
 
 // Returns the plausible model with the most photos; nullopt if there is none. Models with too few
-// points, an absurd lens or a principal point far from the middle are rejected. `attempt` names the
-// run in messages and folders, `count` is the number of photos. Throws Error: cancelled, too slow.
+// points or an absurd lens are rejected. `attempt` names the run in messages and folders, `count`
+// is the number of photos. Throws Error: cancelled, too slow.
 std::optional<ColmapModel> MapPhotos(ColmapProcess& colmap,
                                      const SfmWorkspace& work,
                                      size_t count,
