@@ -29,22 +29,27 @@ ColorSources SourcesOf(const Colorizer& colorizer,
       colorizer.relative_chroma()};
 }
 
+ColorSources FusionSources(const ViewColoring& coloring,
+                           std::function<Image(const Image& luminance)> position) {
+  ColorSources sources = SourcesOf(*coloring.colorizer, std::move(position));
+  sources.spread = coloring.options.spread;
+  if (coloring.options.guess) return sources;
+  // Without distances nothing is guessed.
+  sources.infer = [infer = std::move(sources.infer)](const Image& luminance, const Image& known) {
+    return InferredColor{infer(luminance, known).ab, Image()};
+  };
+  return sources;
+}
+
 void ColorByFusion(const ViewColoring& coloring, StageContext& context) {
   const Scene& scene = coloring.scene;
   const ViewImages& images = coloring.images;
   ViewsCheckpoint& done = coloring.done;
   const auto sources = [&](int number) {
-    ColorSources of_view = SourcesOf(*coloring.colorizer, [&, number](const Image& luminance) {
+    return FusionSources(coloring, [&, number](const Image& luminance) {
       return coloring.positions.Of(
           number, images.WorkingCamera(number), luminance, images.Mask(number).get());
     });
-    of_view.spread = coloring.options.spread;
-    if (coloring.options.guess) return of_view;
-    // Without distances nothing is guessed.
-    of_view.infer = [infer = std::move(of_view.infer)](const Image& luminance, const Image& known) {
-      return InferredColor{infer(luminance, known).ab, Image()};
-    };
-    return of_view;
   };
   if (coloring.are_frames) {
     FrameColoring frames;

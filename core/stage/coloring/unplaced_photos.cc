@@ -35,8 +35,10 @@ void ColorUnplacedPhotos(const ViewColoring& coloring, StageContext& context) {
   const FilmCarryOptions carry_options;
   PictureCarry carry(images, count, /*channels=*/2, carry_options, context);
   for (int view = 0; view < placed; ++view) {
-    const Camera camera = images.WorkingCamera(view);
-    carry.Set(view, ReadCarried(context, all.views[view], camera.width, camera.height));
+    carry.SetReader(view, [&, view] {
+      const Camera camera = images.WorkingCamera(view);
+      return ReadCarried(context, all.views[view], camera.width, camera.height);
+    });
   }
   std::vector<int> sources(placed);
   std::iota(sources.begin(), sources.end(), 0);
@@ -47,7 +49,7 @@ void ColorUnplacedPhotos(const ViewColoring& coloring, StageContext& context) {
     ThreadPool one(1);
     const FusedColor color = FuseViewColor(*images.Luminance(photo),
                                            carry.ColorOf(photo),
-                                           SourcesOf(*coloring.colorizer),
+                                           FusionSources(coloring),
                                            one,
                                            context.cancel());
     context.WriteOutput(ViewArtifact(artifact::kViewsAb, all.views[photo]), EncodeAbPng(color.ab));

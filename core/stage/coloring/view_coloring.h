@@ -48,6 +48,9 @@ void ColorGray(const ViewColoring& coloring, StageContext& context);
 // result.
 ColorSources SourcesOf(const Colorizer& colorizer,
                        std::function<Image(const Image& luminance)> position = {});
+// The same as the options of ColorByFusion ask for. Requires: `coloring` outlives the result.
+ColorSources FusionSources(const ViewColoring& coloring,
+                           std::function<Image(const Image& luminance)> position = {});
 
 // Indices of the key views: of the carried colours or, if none were carried, the chosen one and the
 // additional ones among the inputs.

@@ -77,6 +77,11 @@ class Source {
   ReappearingRegions regions_;  // of luminance_
 };
 
+// Keeps the colour compressed, so that memory does not grow with the number of photos.
+std::function<CarriedColor()> Compressed(const CarriedColor& color) {
+  return [png = EncodeCarriedPng(color)] { return DecodeCarriedPng(png, "a carried colour"); };
+}
+
 }  // namespace
 
 PictureCarry::PictureCarry(const ViewImages& images,
@@ -92,12 +97,15 @@ PictureCarry::PictureCarry(const ViewImages& images,
 }
 
 void PictureCarry::Set(int picture, const CarriedColor& color) {
-  known_[picture] = {EncodeCarriedPng(color), 1.0};
+  SetReader(picture, Compressed(color));
+}
+
+void PictureCarry::SetReader(int picture, std::function<CarriedColor()> read) {
+  known_[picture] = {std::move(read), 1.0};
 }
 
 CarriedColor PictureCarry::ColorOf(int picture) const {
-  const std::string& png = known_[picture].png;
-  if (!png.empty()) return DecodeCarriedPng(png, "a carried colour");
+  if (known_[picture].read) return known_[picture].read();
   const Camera camera = images_.WorkingCamera(picture);
   return {Image(camera.width, camera.height, channels_), Image(camera.width, camera.height, 1)};
 }
@@ -185,7 +193,7 @@ void PictureCarry::CarryInto(const std::vector<int>& targets, const std::vector<
         KeepMoreConfident(color, &best);
       }
       const double reached = Coverage(best, kDecisiveConfidence);
-      if (reached >= kMinReached) known_[picture] = {EncodeCarriedPng(best), reached};
+      if (reached >= kMinReached) known_[picture] = {Compressed(best), reached};
     });
   }
 }

@@ -27,6 +27,8 @@ class PictureCarry {
 
   // Sets the colours of a picture, which are not changed by Run.
   void Set(int picture, const CarriedColor& color);
+  // The same with `read`, called whenever they are needed, from several threads at once.
+  void SetReader(int picture, std::function<CarriedColor()> read);
   // Carries the colours of `sources` into the other pictures, then, in two more rounds, those of
   // the eight pictures that were reached best into the rest. `on_round` receives the number of
   // pictures that are to be reached. Throws Error{kCancelled}.
@@ -35,10 +37,9 @@ class PictureCarry {
   CarriedColor ColorOf(int picture) const;
 
  private:
-  // Colours are compressed, so that memory does not grow with the number of photos.
   struct Known {
-    std::string png;       // empty: nothing is known
-    double reached = 0.0;  // share of the picture, 0..1
+    std::function<CarriedColor()> read;  // empty: nothing is known
+    double reached = 0.0;                // share of the picture, 0..1
   };
 
   // For each of `targets`, those of `sources` that have most local features in common with it.
