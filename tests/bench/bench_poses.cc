@@ -157,13 +157,13 @@ void RunPoses(PosesArguments& args) {
                                 {"pairs_verified", CountVerifiedPairs(work / "database.db")},
                                 {"all_pairs_matched", sfm.exhaustive}};
   result.update(PointFacts(imported.scene));
+  result["warnings"] = observer.warnings;
   const fs::path truth = args.truth_folder.empty() ? args.scene_folder : args.truth_folder;
   if (fs::exists(truth / "sparse/0") || fs::exists(truth / "poses_bounds.npy")) {
     const Scene given =
         ImportScene(truth, scratch.path(), args.options, run.ReportingTo(observer)).scene;
     result["against_model"] = CompareWithModel(imported.scene, given);
   }
-  result["warnings"] = observer.warnings;
   WriteResult(result, args.json_file);
 }
 

@@ -220,19 +220,28 @@ void ImportPhotos(const fs::path& scene_folder,
                   SummarizeNames(NamesOf(scene.unplaced))));
 }
 
+// Reads the photo's size. Returns false if that fails.
+bool CanBeRead(const fs::path& scene_folder, Photo* photo) {
+  try {
+    ProbePhoto(scene_folder, photo);
+  } catch (const Error&) {
+    return false;
+  }
+  return true;
+}
+
 // Adds the photos without a pose as unplaced ones. Those of scenes with times and those that cannot
 // be read are left out.
 void AddUnposedPhotos(const fs::path& scene_folder, ImportResult* result) {
   const std::vector<Photo> photos = ListPhotos(scene_folder);
   Scene& scene = result->scene;
   result->photos_found = static_cast<int>(std::max(photos.size(), scene.views.size()));
+  const bool has_times = scene.HasTimes();
   std::vector<std::string> left_out;
   for (Photo& photo : UnplacedPhotos(photos, scene)) {
-    try {
-      if (scene.HasTimes()) throw InvalidArgument("it has no time");
-      ProbePhoto(scene_folder, &photo);
+    if (!has_times && CanBeRead(scene_folder, &photo)) {
       scene.unplaced.push_back(UnplacedView(photo));
-    } catch (const Error&) {
+    } else {
       left_out.push_back(photo.name);
     }
   }
