@@ -175,4 +175,13 @@ void ShareMallocArenas([[maybe_unused]] int arenas) {
 #endif
 }
 
+void KeepFreedMemory() {
+#ifdef __GLIBC__
+  constexpr int kLargestBlock = 32 << 20;  // glibc's limit
+  constexpr int kKept = 256 << 20;
+  ::mallopt(M_MMAP_THRESHOLD, kLargestBlock);
+  ::mallopt(M_TRIM_THRESHOLD, kKept);
+#endif
+}
+
 }  // namespace color3d

@@ -57,4 +57,9 @@ void ReleaseFreedMemory();
 // memory of a turn. Call before starting threads; no effect without glibc.
 void ShareMallocArenas(int arenas);
 
+// Keeps freed memory, up to some hundred MB, until ReleaseFreedMemory(). By default glibc returns
+// large blocks to the system, which clears their pages each time they are allocated again. No
+// effect without glibc.
+void KeepFreedMemory();
+
 }  // namespace color3d

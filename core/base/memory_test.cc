@@ -131,6 +131,31 @@ TEST(ReleaseFreedMemory, ReturnsFreedMemoryToSystem) {
 }
 #endif
 
+#if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+TEST(KeepFreedMemoryDeathTest, KeepsUntilReleased) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  constexpr size_t kBlock = 24 << 20;
+  const auto resident_after_use = [] {
+    for (int i = 0; i < 4; ++i) {
+      const std::unique_ptr<char[]> block(new char[kBlock]);
+      std::memset(block.get(), 1, kBlock);
+    }
+    return ResidentMemoryBytes();
+  };
+  EXPECT_EXIT(
+      {
+        const int64_t before = ResidentMemoryBytes();
+        KeepFreedMemory();
+        const bool kept = resident_after_use() - before > int64_t{kBlock / 2};
+        ReleaseFreedMemory();
+        const bool released = ResidentMemoryBytes() - before < int64_t{kBlock / 2};
+        std::exit(kept && released ? 0 : 1);
+      },
+      testing::ExitedWithCode(0),
+      "");
+}
+#endif
+
 // Pools of a process in which eight threads hold memory at the same time.
 int ArenasOfEightThreads() {
   std::barrier all(8);

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <memory>
 
 #include "core/base/evenly.h"
 #include "core/base/files.h"
+#include "core/base/ordered_rounds.h"
 #include "core/carry/confidence.h"
 #include "core/color/lab.h"
 #include "core/colorizer/personal/train_colorizer.h"
@@ -93,16 +95,26 @@ constexpr double kCarriedShare = 0.5;  // share of the samples
 std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
                                              int key,
                                              const ViewImages& images,
-                                             const StageContext& context) {
-  std::vector<std::pair<double, TrainingPicture>> found;
-  for (int view : PickEvenly(scene.TrainingViews(), kMaxViewsToLookAt)) {
+                                             StageContext& context) {
+  struct Candidate {
+    std::shared_ptr<const Image> luminance;
+    CarriedColor carried;
+  };
+  std::vector<int> views;
+  for (const int view : PickEvenly(scene.TrainingViews(), kMaxViewsToLookAt)) {
     const std::string name = ViewArtifact(artifact::kCarried, scene.views[view]);
-    if (view == key || !context.HasInput(name)) continue;
-    const auto luminance = images.Luminance(view);
-    CarriedColor carried =
-        ReadCarried(context, scene.views[view], luminance->width, luminance->height);
+    if (view != key && context.HasInput(name)) views.push_back(view);
+  }
+  const auto read = [&](int64_t i) -> Candidate {
+    const auto luminance = images.Luminance(views[i]);
+    return {luminance,
+            ReadCarried(context, scene.views[views[i]], luminance->width, luminance->height)};
+  };
+  std::vector<std::pair<double, TrainingPicture>> found;
+  ForOrdered(&context.pool(), std::ssize(views), read, [&](int64_t i, Candidate candidate) {
+    CarriedColor& carried = candidate.carried;
     const double coverage = Coverage(carried, kTrainingConfidence);
-    if (coverage < kMinCoverage) continue;
+    if (coverage < kMinCoverage) return;
     for (float& value : carried.confidence.data) {
       if (value < kTrainingConfidence) value = 0.0f;
     }
@@ -111,12 +123,12 @@ std::vector<TrainingPicture> CarriedPictures(const Scene& scene,
         found, coverage, std::ranges::greater(), [](const auto& other) { return other.first; });
     found.insert(place,
                  {coverage,
-                  {scene.views[view].name,
-                   *luminance,
+                  {scene.views[views[i]].name,
+                   *candidate.luminance,
                    std::move(carried.ab),
                    std::move(carried.confidence)}});
     if (found.size() > kMaxCarriedViews) found.pop_back();
-  }
+  });
   std::vector<TrainingPicture> pictures;
   for (auto& [coverage, picture] : found) {
     picture.share = kCarriedShare / (1.0 - kCarriedShare) / static_cast<double>(found.size());
@@ -164,12 +176,12 @@ void RunPersonalize(const ColorizerOptions& options,
   }
   std::vector<TrainingPicture> views = AdditionalKeyPictures(scene, images, context);
   std::ranges::move(CarriedPictures(scene, key, images, context), std::back_inserter(views));
-  for (TrainingPicture& picture : views) {
-    const int view = scene.FindView(picture.name);
-    picture.position =
-        positions.Of(view, images.WorkingCamera(view), picture.luminance, images.Mask(view).get());
-    pictures.push_back(std::move(picture));
-  }
+  context.pool().ForEach(std::ssize(views), [&](int64_t i, int) {
+    const int view = scene.FindView(views[i].name);
+    views[i].position =
+        positions.Of(view, images.WorkingCamera(view), views[i].luminance, images.Mask(view).get());
+  });
+  std::ranges::move(views, std::back_inserter(pictures));
   SceneBatch alone(context.pool().thread_count());
   SceneBatch& batch = context.batch() != nullptr ? *context.batch() : alone;
   const auto colorizer =

@@ -368,6 +368,7 @@ int WorkerMain(int argc, char** argv, const WorkerProgram& program) {
   CLI11_PARSE(app, argc, argv);
   HandleStopSignals();
   ShareMallocArenas(arguments.settings.threads);
+  KeepFreedMemory();
   if (arguments.options.parent != 0) {
     // The kernel signals this worker when the server dies.
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);

@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/ordered_rounds.h"
 #include "core/colorizer/neighbors/known_cells.h"
+#include "core/encoder/torch_threads.h"
 #include "core/matching/view_noise.h"
 
 namespace color3d {
@@ -36,6 +38,7 @@ AdditionalCells FindAdditionalCells(const TapEncoder& encoder,
                                     const FeatureNeighborsOptions& options,
                                     Random& random,
                                     const CancellationToken& cancel,
+                                    ThreadPool* helpers,
                                     ViewNoise* view_noise) {
   AdditionalCells found;
   const auto further = static_cast<int64_t>(pictures.size()) - 1;
@@ -43,9 +46,13 @@ AdditionalCells FindAdditionalCells(const TapEncoder& encoder,
     return PlacedCells{cells.blocks, cells.positions};
   };
   KnownCells previous;
-  for (const TrainingPicture& picture : pictures.subspan(1)) {
+  const auto describe = [&](int64_t i) {
     cancel.ThrowIfCancelled();
-    KnownCells cells = ComputeKnownCells(encoder, picture, options.relative_chroma);
+    torch::NoGradGuard no_grad;
+    SetTorchThreads(1);
+    return ComputeKnownCells(encoder, pictures[static_cast<size_t>(i) + 1], options.relative_chroma);
+  };
+  ForOrdered(helpers, further, describe, [&](int64_t, KnownCells cells) {
     view_noise->Add(placed(key), placed(cells), random);
     if (!found.sure.empty()) view_noise->Add(placed(previous), placed(cells), random);
     const torch::Tensor is_sure = cells.weights > options.min_weight;
@@ -56,7 +63,7 @@ AdditionalCells FindAdditionalCells(const TapEncoder& encoder,
     found.open.push_back(
         Select(cells, PickRows(is_sure.logical_not().nonzero().squeeze(1), kOpenCells)));
     previous = std::move(cells);
-  }
+  });
   return found;
 }
 
@@ -82,7 +89,8 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
                                    std::span<const TrainingPicture> pictures,
                                    const FeatureNeighborsOptions& options,
                                    Random random,
-                                   const CancellationToken& cancel)
+                                   const CancellationToken& cancel,
+                                   ThreadPool* helpers)
     : FeatureNeighbors(encoder, options, Whitening(std::vector<Whitening::Projection>()), {}) {
   torch::NoGradGuard no_grad;
   const KnownCells key = ComputeKnownCells(encoder, pictures.front(), options.relative_chroma);
@@ -93,7 +101,7 @@ FeatureNeighbors::FeatureNeighbors(const TapEncoder& encoder,
       Select(key, colored.index_select(0, SampleRows(colored.size(0), options.bank_size, random)));
   ViewNoise view_noise;
   AdditionalCells found =
-      FindAdditionalCells(encoder, pictures, key, options, random, cancel, &view_noise);
+      FindAdditionalCells(encoder, pictures, key, options, random, cancel, helpers, &view_noise);
   std::vector<KnownCells> parts = std::move(found.sure);
   parts.insert(parts.begin(), of_key);
   whitening_ = Whitening(

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/cancellation.h"
+#include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/color/relative_chroma.h"
 #include "core/colorizer/colorizer.h"
@@ -43,12 +44,14 @@ class FeatureNeighbors {
  public:
   // `pictures` at training size, the key view first. The key view defines the feature space. The
   // others add cells with known colours (by weight) and, where positions are known, the variation
-  // of features between views of one place.
+  // of features between views of one place. `helpers` describe several pictures at once, without
+  // effect on the result; null: none.
   FeatureNeighbors(const TapEncoder& encoder,
                    std::span<const TrainingPicture> pictures,
                    const FeatureNeighborsOptions& options,
                    Random random,
-                   const CancellationToken& cancel);
+                   const CancellationToken& cancel,
+                   ThreadPool* helpers = nullptr);
 
   // `taps` of a padded picture [1,*,*,*] and its L [1,1,H,W]; H, W multiples of kCellPx. `wanted`
   // [h,w] (bool): cells to look up, undefined: all; the others get grey at distance 0. `position`:

@@ -127,7 +127,8 @@ PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
                                  const std::vector<TrainingPicture>& pictures,
                                  const ColorizerOptions& options,
                                  const TrainingRecipe& recipe,
-                                 const CancellationToken& cancel) {
+                                 const CancellationToken& cancel,
+                                 ThreadPool* helpers) {
   PersonalColorizer::Parts parts;
   parts.encoder = std::move(encoder);
   parts.options = options;
@@ -138,7 +139,7 @@ PersonalColorizer::Parts Prepare(std::shared_ptr<const TapEncoder> encoder,
     FeatureNeighborsOptions neighbors = recipe.neighbor_options;
     neighbors.relative_chroma = parts.relative_chroma;
     parts.neighbors = std::make_unique<FeatureNeighbors>(
-        *parts.encoder, pictures, neighbors, Random(options.seed, /*stream=*/3), cancel);
+        *parts.encoder, pictures, neighbors, Random(options.seed, /*stream=*/3), cancel, helpers);
   }
   if (recipe.exemplar_head) parts.head = ExemplarHead::Embedded(*parts.encoder);
   Random start(options.seed, /*stream=*/0);
@@ -218,7 +219,8 @@ std::shared_ptr<const Colorizer> TrainColorizer(std::shared_ptr<const Encoder> e
       FitWithin(options.max_side_px, &picture);
       if (options.equal_draws) picture.share = 1.0;
     }
-    auto parts = Prepare(std::move(taps), pictures, options, recipe, control.cancel);
+    ThreadPool* helpers = turn->slots() > 1 ? &control.pool : nullptr;
+    auto parts = Prepare(std::move(taps), pictures, options, recipe, control.cancel, helpers);
     const bool trains = options.iterations > 0 && DecoderPays(parts, recipe, control.progress);
     if (!trains) options.iterations = 0;
     options.min_decoder_share = 0.0;  // decided
