@@ -108,7 +108,7 @@ GeometryOptions ForScene(GeometryOptions options,
   const int asked = options.iterations;
   options.max_gaussians = GaussianCap(options.max_gaussians, cameras, max_side_px);
   options.iterations = IterationCap(asked, static_cast<int>(cameras.size()));
-  if (options.iterations < asked) {
+  if (options.iterations < asked && asked != GeometryOptions().iterations) {
     context.Warn(
         "{} iterations are done of the {} asked for: with {} training views more gain nothing "
         "(recipe=paper does all)",

@@ -9,10 +9,10 @@
 
 namespace color3d {
 
-// Schedule of a training; times are fractions of it. The defaults are those of Recipe::kColor3d,
-// chosen by measurements.
+// Schedule of a training; times are fractions of it. The defaults are those of Recipe::kColor3d
+// with a long schedule, chosen by measurements.
 struct GeometryTuning {
-  double half_size_until = 0.15;  // trains at half of the working size before
+  double half_size_until = 0.3;   // trains at half of the working size before
   double densify_from = 0.05;
   double densify_until = 0.6;
   int densify_rounds = 30;
@@ -31,6 +31,7 @@ struct GeometryTuning {
   double sh_step = 0.15;           // interval of further degrees
   double position_rate_first = 6e-4;
   double position_rate_last = 4e-5;
+  double beta1 = 0.6;  // of Adam; its other constants are the usual ones
   double dc_rate = 1e-2;
   double rest_divisor = 10.0;
   double opacity_rate = 0.1;
@@ -74,6 +75,7 @@ void VisitFields(Tuning& tuning, Visit&& visit) {
   visit("sh_step", tuning.sh_step);
   visit("position_rate_first", tuning.position_rate_first);
   visit("position_rate_last", tuning.position_rate_last);
+  visit("beta1", tuning.beta1);
   visit("dc_rate", tuning.dc_rate);
   visit("rest_divisor", tuning.rest_divisor);
   visit("opacity_rate", tuning.opacity_rate);

@@ -279,7 +279,8 @@ class GeometryTrainer {
                   ParameterBlock& parameters,
                   AdamMoments& moments) {
     for (float& rate : rates) rate *= static_cast<float>(state_.rate_scale);
-    if (!AdamStep(gradient, rates, state_.iteration + 1, run_.pool, parameters, moments)) {
+    const auto beta1 = static_cast<float>(schedule_.tuning().beta1);
+    if (!AdamStep(gradient, rates, state_.iteration + 1, run_.pool, parameters, moments, beta1)) {
       return false;
     }
     const double ratio = schedule_.tuning().max_needle_ratio;

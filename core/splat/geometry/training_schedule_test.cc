@@ -68,8 +68,12 @@ TEST(GaussianCapTest, FollowsViewCountIfSparse) {
   EXPECT_EQ(GaussianCap(40'000, {nine[0]}, 100), 5000);
 }
 
-TEST(IterationCapTest, GrowsWithViewsAndAllowsDefault) {
-  EXPECT_EQ(IterationCap(1500, 3), 1500);
+TEST(IterationCapTest, GrowsWithViews) {
+  EXPECT_EQ(IterationCap(800, 3), 800);
+  EXPECT_EQ(IterationCap(1200, 3), 1000);
+  EXPECT_EQ(IterationCap(1500, 3), 1000);
+  EXPECT_EQ(IterationCap(1500, 20), 1304);
+  EXPECT_EQ(IterationCap(1500, 23), 1500);
   EXPECT_EQ(IterationCap(5000, 3), 1500);
   EXPECT_EQ(IterationCap(5000, 12), 1800);
   EXPECT_EQ(IterationCap(5000, 50), 5000);

@@ -1,6 +1,7 @@
 #include "core/splat/model/gaussian_cap.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 
 namespace color3d {
@@ -12,8 +13,11 @@ constexpr double kMaxGaussiansPerPixel = 0.02;
 constexpr int kSparseSidePx = 500;
 constexpr double kSparseViews = 12.0;
 constexpr int kMinCap = 5000;
+constexpr int kManyViews = 23;            // that need all of a schedule
+constexpr double kMinScheduleShare = 2.0 / 3.0;
+constexpr int kMinIterations = 1000;      // that are always allowed
 constexpr int64_t kIterationsPerView = 150;
-constexpr int64_t kMinIterationCap = 1500;
+constexpr int64_t kMinLongSchedule = 1500;
 
 double Pixels(const std::vector<Camera>& cameras, int max_side_px) {
   double pixels = 0.0;
@@ -41,8 +45,11 @@ int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px)
 }
 
 int IterationCap(int wanted, int training_views) {
-  const int64_t cap = std::max(kMinIterationCap, kIterationsPerView * training_views);
-  return static_cast<int>(std::min<int64_t>(wanted, cap));
+  const double share =
+      std::clamp(static_cast<double>(training_views) / kManyViews, kMinScheduleShare, 1.0);
+  const auto needed = std::max<int64_t>(kMinIterations, std::llround(share * wanted));
+  const int64_t cap = std::max(kMinLongSchedule, kIterationsPerView * training_views);
+  return static_cast<int>(std::min<int64_t>({wanted, needed, cap}));
 }
 
 }  // namespace color3d

@@ -23,6 +23,7 @@ struct RowStep {
   float* p;
   float* m;
   float* v;
+  float beta1;
   float rate;             // divided by the first moment's bias correction
   float root_correction;  // 1 / sqrt of the second moment's
 };
@@ -47,7 +48,7 @@ float UpdateRow(const RowStep& s, int64_t begin, int64_t end) {
     const F32 raw = simd::Load(s.g + i), p = simd::Load(s.p + i);
     const F32 gradient = simd::Clamp(raw, simd::Broadcast(-1e18f), simd::Broadcast(1e18f));
     const F32 m = simd::Load(s.m + i), v = simd::Load(s.v + i);
-    const F32 first = m + (1.0f - kAdamBeta1) * (gradient - m);
+    const F32 first = m + (1.0f - s.beta1) * (gradient - m);
     const F32 second = v + (1.0f - kAdamBeta2) * (gradient * gradient - v);
     const F32 scale = simd::Sqrt(second) * s.root_correction + kAdamEpsilon;
     const F32 updated = p - s.rate * first / scale;
@@ -75,8 +76,9 @@ bool AdamStep(const ParameterBlock& gradient,
               int64_t step,
               ThreadPool& pool,
               ParameterBlock& parameters,
-              AdamMoments& moments) {
-  const double bias1 = 1.0 - std::pow(static_cast<double>(kAdamBeta1), static_cast<double>(step));
+              AdamMoments& moments,
+              float beta1) {
+  const double bias1 = 1.0 - std::pow(static_cast<double>(beta1), static_cast<double>(step));
   const double bias2 = 1.0 - std::pow(static_cast<double>(kAdamBeta2), static_cast<double>(step));
   const float root_correction = static_cast<float>(1.0 / std::sqrt(bias2));
   const auto update_row = &COLOR3D_KERNEL(UpdateRow);
@@ -89,6 +91,7 @@ bool AdamStep(const ParameterBlock& gradient,
                       parameters.Row(row),
                       moments.first.Row(row),
                       moments.second.Row(row),
+                      beta1,
                       static_cast<float>(learning_rates[row] / bias1),
                       root_correction};
       if (!(update_row(s, begin, end) == 0.0f)) finite = false;

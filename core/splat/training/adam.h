@@ -10,7 +10,7 @@
 
 namespace color3d {
 
-inline constexpr float kAdamBeta1 = 0.9f;
+inline constexpr float kAdamBeta1 = 0.9f;  // default
 inline constexpr float kAdamBeta2 = 0.999f;
 inline constexpr float kAdamEpsilon = 1e-15f;
 
@@ -19,7 +19,7 @@ struct AdamMoments {
   ParameterBlock second;
 };
 
-// One step; `step` counts from 1. Rows with learning rate 0 and their moments are unchanged.
+// One step; `step` counts from 1, `beta1` is the decay of the first moment, 0..1. Rows with learning rate 0 and their moments are unchanged.
 // Returns false if a gradient or a new parameter is not finite; the parameters must then be
 // restored.
 bool AdamStep(const ParameterBlock& gradient,
@@ -27,6 +27,7 @@ bool AdamStep(const ParameterBlock& gradient,
               int64_t step,
               ThreadPool& pool,
               ParameterBlock& parameters,
-              AdamMoments& moments);
+              AdamMoments& moments,
+              float beta1 = kAdamBeta1);
 
 }  // namespace color3d
