@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <deque>
 #include <list>
@@ -19,6 +18,7 @@
 #include "core/image/codec.h"
 #include "core/image/decode_budget.h"
 #include "core/image/reduced.h"
+#include "core/scene/cubic_remap.h"
 #include "core/scene/lens.h"
 #include "core/scene/photo_masks.h"
 #include "core/scene/photos.h"
@@ -26,17 +26,9 @@
 namespace color3d {
 namespace {
 
-// Position in the (reduced) photo for every pixel of the undistorted picture; pixel centres are at
-// integers.
-struct RemapTable {
-  int width = 0;
-  int height = 0;
-  std::vector<float> x;
-  std::vector<float> y;
-};
-
+// Positions in the (reduced) photo.
 RemapTable MakeRemap(const Camera& captured, const Distortion& distortion, const Camera& camera) {
-  RemapTable table{camera.width, camera.height};
+  RemapTable table{camera.width, camera.height, {}, {}};
   table.x.reserve(static_cast<size_t>(camera.width) * camera.height);
   table.y.reserve(table.x.capacity());
   for (int row = 0; row < camera.height; ++row) {
@@ -48,54 +40,6 @@ RemapTable MakeRemap(const Camera& captured, const Distortion& distortion, const
     }
   }
   return table;
-}
-
-// Keys 1981 with a = -1/2, the only cubic convolution that reproduces ramps: OpenCV's (a = -3/4,
-// positions in 1/32 px) moves edges by up to 0.06 px.
-std::array<float, 4> CubicWeights(float t) {
-  const float t2 = t * t;
-  const float t3 = t2 * t;
-  return {-0.5f * t3 + t2 - 0.5f * t,
-          1.5f * t3 - 2.5f * t2 + 1.0f,
-          -1.5f * t3 + 2.0f * t2 + 0.5f * t,
-          0.5f * t3 - 0.5f * t2};
-}
-
-// Bicubic, since bilinear would blur every photo; overshoot is clamped to each channel's own range.
-// Border pixels are replicated.
-Image Remap(const Image& image, const RemapTable& table) {
-  Image out(table.width, table.height, image.channels);
-  std::vector<std::pair<float, float>> range;
-  for (int c = 0; c < image.channels; ++c) {
-    const float* plane = image.Plane(c);
-    const auto [low, high] = std::minmax_element(plane, plane + image.PlaneSize());
-    range.emplace_back(*low, *high);
-  }
-  for (size_t i = 0; i < table.x.size(); ++i) {
-    const float px = std::clamp(table.x[i], -1.0f, static_cast<float>(image.width));
-    const float py = std::clamp(table.y[i], -1.0f, static_cast<float>(image.height));
-    const int x0 = static_cast<int>(std::floor(px));
-    const int y0 = static_cast<int>(std::floor(py));
-    const auto wx = CubicWeights(px - static_cast<float>(x0));
-    const auto wy = CubicWeights(py - static_cast<float>(y0));
-    int xs[4];
-    size_t rows[4];
-    for (int k = 0; k < 4; ++k) {
-      xs[k] = std::clamp(x0 - 1 + k, 0, image.width - 1);
-      rows[k] = static_cast<size_t>(std::clamp(y0 - 1 + k, 0, image.height - 1)) * image.width;
-    }
-    for (int c = 0; c < image.channels; ++c) {
-      const float* plane = image.Plane(c);
-      float sum = 0.0f;
-      for (int k = 0; k < 4; ++k) {
-        const float* row = plane + rows[k];
-        sum += wy[k] *
-               (wx[0] * row[xs[0]] + wx[1] * row[xs[1]] + wx[2] * row[xs[2]] + wx[3] * row[xs[3]]);
-      }
-      out.Plane(c)[i] = std::clamp(sum, range[c].first, range[c].second);
-    }
-  }
-  return out;
 }
 
 auto CameraKey(const Camera& c) { return std::tie(c.width, c.height, c.fx, c.fy, c.cx, c.cy); }
@@ -189,7 +133,7 @@ struct ViewImages::Impl {
     const View& v = At(view);
     if (IsUndistorted(v.distortion)) return picture;
     const Camera working = v.camera.FitWithin(max_side_px);
-    return Resize(Remap(picture, *FindTable(view)), working.width, working.height);
+    return Resize(CubicRemap(picture, *FindTable(view)), working.width, working.height);
   }
 
   Image Undistorted(int view, const Image& captured) {
