@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/base/error.h"
+#include "core/base/parallel.h"
 
 namespace color3d {
 namespace {
@@ -204,6 +205,31 @@ double GrayFromLuminanceWith(double luminance) {
   throw InvalidArgument("the image has {} channels; {}", image.channels, wanted);
 }
 
+Image EmptySrgbFor(const Image& lab) {
+  if (lab.channels != 1 && lab.channels != 3) ThrowChannels(lab, "sRGB needs 3 (Lab) or 1 (L)");
+  return Image(lab.width, lab.height, 3);
+}
+
+// Converts the pixels [begin, end).
+void ConvertPixels(const Image& lab, size_t begin, size_t end, Image* srgb) {
+  const size_t n = lab.PlaneSize();
+  if (lab.channels == 1) {
+    for (size_t i = begin; i < end; ++i) {
+      const double l = std::clamp<double>(lab.data[i], 0.0, 100.0);
+      const float gray = static_cast<float>(std::min(GrayFromLuminanceWith<Fast>(l), 1.0));
+      srgb->data[i] = srgb->data[n + i] = srgb->data[2 * n + i] = gray;
+    }
+    return;
+  }
+  for (size_t i = begin; i < end; ++i) {
+    const RgbColor c =
+        EncodeClamped<Fast>(LinearInGamut({lab.data[i], lab.data[n + i], lab.data[2 * n + i]}));
+    srgb->data[i] = static_cast<float>(std::min(c.r, 1.0));
+    srgb->data[n + i] = static_cast<float>(std::min(c.g, 1.0));
+    srgb->data[2 * n + i] = static_cast<float>(std::min(c.b, 1.0));
+  }
+}
+
 }  // namespace
 
 LabColor LabFromSrgb(const RgbColor& srgb) { return LabFromSrgbWith<Exact>(srgb); }
@@ -258,24 +284,16 @@ Image LuminanceFromSrgb(const Image& image) {
 }
 
 Image SrgbFromLab(const Image& lab) {
-  if (lab.channels != 1 && lab.channels != 3) ThrowChannels(lab, "sRGB needs 3 (Lab) or 1 (L)");
-  Image srgb(lab.width, lab.height, 3);
-  const size_t n = lab.PlaneSize();
-  if (lab.channels == 1) {
-    for (size_t i = 0; i < n; ++i) {
-      const double l = std::clamp<double>(lab.data[i], 0.0, 100.0);
-      const float gray = static_cast<float>(std::min(GrayFromLuminanceWith<Fast>(l), 1.0));
-      srgb.data[i] = srgb.data[n + i] = srgb.data[2 * n + i] = gray;
-    }
-    return srgb;
-  }
-  for (size_t i = 0; i < n; ++i) {
-    const RgbColor c =
-        EncodeClamped<Fast>(LinearInGamut({lab.data[i], lab.data[n + i], lab.data[2 * n + i]}));
-    srgb.data[i] = static_cast<float>(std::min(c.r, 1.0));
-    srgb.data[n + i] = static_cast<float>(std::min(c.g, 1.0));
-    srgb.data[2 * n + i] = static_cast<float>(std::min(c.b, 1.0));
-  }
+  Image srgb = EmptySrgbFor(lab);
+  ConvertPixels(lab, 0, lab.PlaneSize(), &srgb);
+  return srgb;
+}
+
+Image SrgbFromLab(const Image& lab, ThreadPool& pool) {
+  Image srgb = EmptySrgbFor(lab);
+  pool.ForRanges(static_cast<int64_t>(lab.PlaneSize()), [&](int64_t begin, int64_t end, int) {
+    ConvertPixels(lab, static_cast<size_t>(begin), static_cast<size_t>(end), &srgb);
+  });
   return srgb;
 }
 

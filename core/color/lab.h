@@ -9,6 +9,8 @@
 
 namespace color3d {
 
+class ThreadPool;
+
 struct LabColor {
   double l = 0.0;
   double a = 0.0;
@@ -40,6 +42,8 @@ Image LabFromSrgb(const Image& srgb);
 Image LuminanceFromSrgb(const Image& srgb_or_gray);
 // 3-channel Lab (or 1-channel L) -> 3-channel sRGB in 0..1, gamut-mapped as above.
 Image SrgbFromLab(const Image& lab);
+// The same on all threads of `pool`.
+Image SrgbFromLab(const Image& lab, ThreadPool& pool);
 // Joins L (1 channel) and ab (2 channels) of equal size to Lab (3 channels).
 Image JoinLab(const Image& luminance, const Image& ab);
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/base/parallel.h"
 #include "core/base/random.h"
 #include "core/color/difference.h"
 
@@ -181,6 +182,16 @@ TEST(Lab, ImageGamutMappingAgreesWithScalar) {
     EXPECT_NEAR(srgb.Plane(1)[i], c.g, 1e-6);
     EXPECT_NEAR(srgb.Plane(2)[i], c.b, 1e-6);
   }
+}
+
+TEST(Lab, ThreadsGiveTheSameImage) {
+  ThreadPool pool(3);
+  for (const int channels : {1, 3}) {
+    Image lab(17, 5, channels);
+    for (size_t i = 0; i < lab.data.size(); ++i) lab.data[i] = static_cast<float>(i % 97);
+    EXPECT_EQ(SrgbFromLab(lab, pool).data, SrgbFromLab(lab).data);
+  }
+  EXPECT_THROW(SrgbFromLab(Image(4, 4, 2), pool), Error);
 }
 
 TEST(Lab, OneChannelIsLuminance) {

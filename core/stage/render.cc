@@ -102,7 +102,7 @@ void RunRender(const RenderOptions& options, StageContext& context) {
     const RenderedView rendered =
         RenderView(model, view, view.camera.FitWithin(options.max_side_px), context.pool());
     context.WriteOutput(ViewArtifact(artifact::kRenders, view),
-                        EncodePng8(SrgbFromLab(rendered.lab)));
+                        EncodePng8(SrgbFromLab(rendered.lab, context.pool())));
     context.ReportProgress(
         static_cast<int64_t>(i) + 1, std::ssize(views), "rendering " + view.name);
   }

@@ -124,7 +124,7 @@ bool WriteViewPage(const Scene& scene,
   }
   page.key_view = key_view;
   page.focus = FocusOf(key, camera, rendered.median_depth);
-  page.poster = EncodeJpeg(SrgbFromLab(rendered.lab), kPhotoQuality);
+  page.poster = EncodeJpeg(SrgbFromLab(rendered.lab, context.pool()), kPhotoQuality);
   page.photos = PhotosOf(scene, key_view, moves, context);
   page.movie = {movie.bytes, movie.has_sound, movie.shows_motion};
   const std::string html = RenderViewPage(scene, page);

@@ -81,7 +81,7 @@ class Refiner {
       run_.cancel.ThrowIfCancelled();
       const RenderedView rendered =
           RenderView(model, view.camera, view.cam_from_world, run_.pool, 0.0f, view.time_s);
-      targets_.push_back(PlanesFromImage(SrgbFromLab(rendered.lab), 0.0f, 1.0f));
+      targets_.push_back(PlanesFromImage(SrgbFromLab(rendered.lab, run_.pool), 0.0f, 1.0f));
     }
   }
 

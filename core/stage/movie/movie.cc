@@ -316,7 +316,8 @@ void Shoot(const Filming& filming,
     const PathCamera& frame = filming.frames[i];
     const Image srgb = SrgbFromLab(
         RenderView(model, frame.camera, frame.cam_from_world, context.pool(), 0.0f, frame.time_s)
-            .lab);
+            .lab,
+        context.pool());
     if (movie != nullptr && filming.clock) {
       movie->AddAt(filming.clock->time_s[i], filming.clock->seconds[i], srgb, context.pool());
     } else if (movie != nullptr) {
