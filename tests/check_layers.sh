@@ -55,8 +55,8 @@ allow core/image/decode 'core/(base|image/(probe|decode))'
 allow core/image/probe 'core/(base|image/probe)'
 allow core/zip 'core/(base|zip)'
 allow core/weights 'core/(base|zip|weights)'
-allow core/scene 'core/(base|catalogue|color|image(/probe)?|scene(/[a-z]+)?)'
-scene='base|catalogue|color|image(/probe)?'
+allow core/scene 'core/(base|catalogue|simd|color|image(/probe)?|scene(/[a-z]+)?)'
+scene='base|catalogue|simd|color|image(/probe)?'
 allow_own core/scene "core/($scene|scene)"
 allow core/scene/masks "core/($scene|scene(/masks)?)"
 allow core/scene/formats "core/($scene|scene(/formats)?)"
@@ -74,7 +74,7 @@ for source in references words automatic external; do
   allow "core/keycolor/$source" \
     "core/(base|grid|color|image|weights|encoder(/[a-z]+)?|matching|keycolor(/hints)?|keycolor/$source)"
 done
-allow core/carry 'core/(base|grid|color|image|scene|carry)'
+allow core/carry 'core/(base|simd|grid|color|image|scene|carry)'
 colorizer='base|color|image|weights|encoder(/[a-z]+)?|matching|augment|colorizer'
 allow_own core/colorizer "core/($colorizer)"
 for part in model neighbors training personal; do

@@ -75,8 +75,7 @@ CostVolume MatchPlanes(const PosedLuminance& reference,
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
         const size_t at = static_cast<size_t>(y) * census.stride + x;
-        uint8_t* out =
-            volume.cost.data() + (static_cast<size_t>(y) * width + x) * planes + first;
+        uint8_t* out = volume.cost.data() + (static_cast<size_t>(y) * width + x) * planes + first;
         for (int d = 0; d < in_group; ++d) out[d] = of_planes[d][at];
       }
     }

@@ -145,17 +145,16 @@ HWY_INLINE void WarpRow(const Image& source,
     const auto tx = hn::Sub(column, hn::ConvertTo(d, x0));
     const auto ty = hn::Sub(line, hn::ConvertTo(d, y0));
     const auto at = hn::Add(hn::Mul(y0, stride), x0);
-    const auto sample = [&](int offset) HWY_ATTR { return hn::GatherIndex(d, pixels + offset, at); };
+    const auto sample = [&](int offset)
+                            HWY_ATTR { return hn::GatherIndex(d, pixels + offset, at); };
     const auto top_left = sample(0), bottom_left = sample(source.width);
     const auto top = hn::MulAdd(tx, hn::Sub(sample(1), top_left), top_left);
     const auto bottom = hn::MulAdd(tx, hn::Sub(sample(source.width + 1), bottom_left), bottom_left);
     hn::StoreU(hn::MulAdd(ty, hn::Sub(bottom, top), top), d, out + x);
     if (!source_mask.Empty()) {
-      const auto nearest = hn::Add(
-          hn::Mul(hn::ConvertTo(ints, hn::Add(line, half)), stride),
-          hn::ConvertTo(ints, hn::Add(column, half)));
-      inside = hn::And(
-          inside, hn::Ne(hn::GatherIndex(d, source_mask.data.data(), nearest), zero));
+      const auto nearest = hn::Add(hn::Mul(hn::ConvertTo(ints, hn::Add(line, half)), stride),
+                                   hn::ConvertTo(ints, hn::Add(column, half)));
+      inside = hn::And(inside, hn::Ne(hn::GatherIndex(d, source_mask.data.data(), nearest), zero));
     }
     hn::StoreU(hn::IfThenZeroElse(hn::RebindMask(words, inside), hn::Set(words, kUnknown)),
                words,
@@ -176,9 +175,8 @@ void Match(const CensusImage& reference,
   ForWindows(
       width,
       reference.height,
-      [&](int y, float* row) HWY_ATTR {
-        WarpRow(source, source_mask, homography, y, width, row, unknown_row(y));
-      },
+      [&](int y, float* row)
+          HWY_ATTR { WarpRow(source, source_mask, homography, y, width, row, unknown_row(y)); },
       [&](int y, const float* const* rows) HWY_ATTR {
         const WordTag words;
         const hn::Rebind<uint8_t, WordTag> bytes;

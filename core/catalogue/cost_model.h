@@ -28,7 +28,7 @@ struct StageWork {
 // 4:3 is assumed for photos, 16:9 for frames.
 double AssumedMegapixels(int max_side_px, bool is_frame);
 
-// Seconds of computing on two cores of a Xeon with AVX-512, the machine of tests/bench/RESULTS.md.
+// Seconds of computing on two cores of an EPYC with AVX-512 (tests/bench/RESULTS.md).
 // 0 for kinds that take no time of their own. Throws Error{kInternal} if there is no such kind.
 double EstimateSeconds(std::string_view stage, const StageWork& work);
 

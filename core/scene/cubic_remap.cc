@@ -52,8 +52,8 @@ HWY_INLINE Taps TapsAt(Floats position, int size) {
   const auto first = hn::Sub(hn::ConvertTo(ints, floor), hn::Set(ints, 1));
   Taps taps;
   for (int k = 0; k < 4; ++k) {
-    taps.index[k] = hn::Min(hn::Max(hn::Add(first, hn::Set(ints, k)), hn::Zero(ints)),
-                            hn::Set(ints, size - 1));
+    taps.index[k] =
+        hn::Min(hn::Max(hn::Add(first, hn::Set(ints, k)), hn::Zero(ints)), hn::Set(ints, size - 1));
   }
   taps.weights = WeightsAt(hn::Sub(p, floor));
   return taps;
@@ -89,11 +89,8 @@ HWY_INLINE void RemapPixels(const Image& image,
 
 constexpr int kMaxChannels = 4;
 
-void Remap(const Image& image,
-           const float* low,
-           const float* high,
-           const RemapTable& table,
-           Image& out) {
+void Remap(
+    const Image& image, const float* low, const float* high, const RemapTable& table, Image& out) {
   const size_t count = table.x.size(), lanes = hn::Lanes(FloatTag());
   size_t i = 0;
   for (; i + lanes <= count; i += lanes) {

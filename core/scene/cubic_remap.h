@@ -16,8 +16,8 @@ struct RemapTable {
 };
 
 // Bicubic (Keys 1981 with a = -1/2, the only cubic convolution that reproduces ramps; OpenCV's,
-// with a = -3/4 and positions in 1/32 px, moves edges by up to 0.06 px). Overshoot is clamped to the
-// range of each channel. Border pixels are replicated.
+// with a = -3/4 and positions in 1/32 px, moves edges by up to 0.06 px). Overshoot is clamped to
+// the range of each channel. Border pixels are replicated.
 Image CubicRemap(const Image& image, const RemapTable& table);
 
 }  // namespace color3d

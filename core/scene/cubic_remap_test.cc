@@ -25,8 +25,9 @@ double Sample(const Image& image, int channel, double x, double y) {
   double sum = 0.0;
   for (int r = -4; r < image.height + 4; ++r) {
     for (int c = -4; c < image.width + 4; ++c) {
-      sum += Keys(x - c) * Keys(y - r) *
-             image.At(channel, std::clamp(r, 0, image.height - 1), std::clamp(c, 0, image.width - 1));
+      sum +=
+          Keys(x - c) * Keys(y - r) *
+          image.At(channel, std::clamp(r, 0, image.height - 1), std::clamp(c, 0, image.width - 1));
     }
   }
   return sum;

@@ -163,7 +163,8 @@ class HeldOutScores {
     if (bound_) {
       const Image lab = Rendered(*bound_, camera, view);
       scores["delta_e00_chroma_bound"] = ChromaError(true_srgb, lab, mask.get());
-      scores["colorfulness_bound"] = MaskedColorfulness(SrgbFromLab(lab, context_.pool()), mask.get());
+      scores["colorfulness_bound"] =
+          MaskedColorfulness(SrgbFromLab(lab, context_.pool()), mask.get());
     }
     const std::string provenance = ProvenanceArtifact(context_, view);
     if (context_.HasInput(provenance)) {

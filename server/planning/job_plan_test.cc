@@ -38,7 +38,9 @@ v1::JobSpec SpecWithKeyView() {
   return spec;
 }
 
-// Totals of tests/bench/RESULTS.md, which were measured with given key views.
+// Totals of tests/bench/RESULTS.md, which were measured with given key views. Runs that train no
+// decoder are up to 40 % shorter than expected (cam01 of athlete4cam: 9 s), because that is decided
+// during the run.
 struct MeasuredRun {
   const char* scene;
   SceneFacts facts;
@@ -48,15 +50,14 @@ struct MeasuredRun {
 
 TEST(JobPlanTest, AgreesWithMeasuredRuns) {
   const MeasuredRun runs[] = {
-      {"fern", {.pictures = 20, .layout = CaptureLayout::kColmap}, 51},
-      {"fox", {.pictures = 50, .layout = CaptureLayout::kTransforms}, 69},
-      {"banana", {.pictures = 14, .layout = CaptureLayout::kColmap}, 38},
-      {"sceaux", {.pictures = 11, .layout = CaptureLayout::kColmap}, 42},
-      {"head", {.pictures = 33, .layout = CaptureLayout::kPhotos}, 109},
+      {"fern", {.pictures = 20, .layout = CaptureLayout::kColmap}, 25},
+      {"fox", {.pictures = 50, .layout = CaptureLayout::kTransforms}, 44},
+      {"banana", {.pictures = 14, .layout = CaptureLayout::kColmap}, 26},
+      {"sceaux", {.pictures = 11, .layout = CaptureLayout::kColmap}, 22},
+      {"head", {.pictures = 33, .layout = CaptureLayout::kPhotos}, 63},
       {"lady_running", {.pictures = 65, .layout = CaptureLayout::kFilm}, 31},
-      {"man_walking", {.pictures = 24, .layout = CaptureLayout::kFilm}, 17},
-      {"cam01", {.pictures = 25, .layout = CaptureLayout::kFilm}, 15},
-      {"lady_running with poses", {.pictures = 65, .layout = CaptureLayout::kFilm}, 150, true}};
+      {"man_walking", {.pictures = 24, .layout = CaptureLayout::kFilm}, 16},
+      {"lady_running with poses", {.pictures = 65, .layout = CaptureLayout::kFilm}, 209, true}};
   for (const MeasuredRun& run : runs) {
     v1::JobSpec spec = SpecWithKeyView();
     if (run.finds_poses_of_film) {
@@ -188,7 +189,7 @@ TEST(JobPlanTest, GrowsWithPhotosPixelsAndIterations) {
   EXPECT_GT(PlanOf(larger, kTwentyPhotos).expected_seconds(), 2.0 * seconds);
   v1::JobSpec longer = SceneSpec();
   longer.mutable_colorize_scene()->mutable_reconstruct_geometry()->set_iterations(3000);
-  EXPECT_GT(PlanOf(longer, kTwentyPhotos).expected_seconds(), seconds + 10.0);
+  EXPECT_GT(PlanOf(longer, kTwentyPhotos).expected_seconds(), seconds + 5.0);
   EXPECT_GT(
       PlanOf(SceneSpec(), {.pictures = 20, .layout = CaptureLayout::kPhotos}).expected_seconds(),
       seconds + 5.0)

@@ -50,7 +50,8 @@ AdditionalCells FindAdditionalCells(const TapEncoder& encoder,
     cancel.ThrowIfCancelled();
     torch::NoGradGuard no_grad;
     SetTorchThreads(1);
-    return ComputeKnownCells(encoder, pictures[static_cast<size_t>(i) + 1], options.relative_chroma);
+    return ComputeKnownCells(
+        encoder, pictures[static_cast<size_t>(i) + 1], options.relative_chroma);
   };
   ForOrdered(helpers, further, describe, [&](int64_t, KnownCells cells) {
     view_noise->Add(placed(key), placed(cells), random);

@@ -12,7 +12,7 @@ namespace color3d {
 // Schedule of a training; times are fractions of it. The defaults are those of Recipe::kColor3d
 // with a long schedule, chosen by measurements.
 struct GeometryTuning {
-  double half_size_until = 0.3;   // trains at half of the working size before
+  double half_size_until = 0.3;  // trains at half of the working size before
   double densify_from = 0.05;
   double densify_until = 0.6;
   int densify_rounds = 30;

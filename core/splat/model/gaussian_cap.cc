@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/catalogue/schedule_share.h"
+
 namespace color3d {
 namespace {
 
@@ -13,9 +15,7 @@ constexpr double kMaxGaussiansPerPixel = 0.02;
 constexpr int kSparseSidePx = 500;
 constexpr double kSparseViews = 12.0;
 constexpr int kMinCap = 5000;
-constexpr int kManyViews = 23;            // that need all of a schedule
-constexpr double kMinScheduleShare = 2.0 / 3.0;
-constexpr int kMinIterations = 1000;      // that are always allowed
+constexpr int kMinIterations = 1000;  // that few views are always allowed
 constexpr int64_t kIterationsPerView = 150;
 constexpr int64_t kMinLongSchedule = 1500;
 
@@ -45,9 +45,8 @@ int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px)
 }
 
 int IterationCap(int wanted, int training_views) {
-  const double share =
-      std::clamp(static_cast<double>(training_views) / kManyViews, kMinScheduleShare, 1.0);
-  const auto needed = std::max<int64_t>(kMinIterations, std::llround(share * wanted));
+  const auto needed =
+      std::max<int64_t>(kMinIterations, std::llround(ScheduleShare(training_views) * wanted));
   const int64_t cap = std::max(kMinLongSchedule, kIterationsPerView * training_views);
   return static_cast<int>(std::min<int64_t>({wanted, needed, cap}));
 }

@@ -19,9 +19,9 @@ struct AdamMoments {
   ParameterBlock second;
 };
 
-// One step; `step` counts from 1, `beta1` is the decay of the first moment, 0..1. Rows with learning rate 0 and their moments are unchanged.
-// Returns false if a gradient or a new parameter is not finite; the parameters must then be
-// restored.
+// One step. `step` counts from 1; `beta1` is the decay of the first moment, 0..1. Rows with
+// learning rate 0 and their moments are unchanged. Returns false if a gradient or a new parameter
+// is not finite; the parameters must then be restored.
 bool AdamStep(const ParameterBlock& gradient,
               const std::vector<float>& learning_rates,
               int64_t step,

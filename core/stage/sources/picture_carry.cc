@@ -16,7 +16,7 @@ namespace {
 constexpr double kMinReached = 0.05;
 constexpr double kReached = 0.4;
 constexpr int kRounds = 3;         // from picture to picture
-constexpr size_t kMaxSources = 8;  // of a picture, and of a round but the first
+constexpr size_t kMaxSources = 4;  // of a picture, and of a round but the first
 constexpr int kRankingFeatures = 500;
 constexpr size_t kBatch = 16;  // pictures whose sources are in memory together
 
