@@ -38,6 +38,9 @@ constexpr double kDisagreementExponent = 1.5;
 // two (mean of six captures), 0.85 times with four (mean of four).
 constexpr double kKeyViewExponent = 0.125;
 
+// Coverage alone expects too much of a further key view.
+constexpr double kNextKeyViewExponent = 0.5;
+
 // Relative growth of the error without geometry's and without personalization's schedule.
 constexpr double kGeometryGrowth = 0.10;
 constexpr double kPersonalizeGrowth = 0.01;
@@ -75,6 +78,10 @@ double EstimatedError(const RunState& run) {
            std::pow(*run.disagreement, kDisagreementExponent);
   }
   return run.carried_share * kCarriedError + (1.0 - run.carried_share) * run.uncovered_error;
+}
+
+double ErrorWithNextKeyView(double error, double ratio) {
+  return error * std::pow(ratio, kNextKeyViewExponent);
 }
 
 double ErrorGrowth(const ScheduleShares& shares) {

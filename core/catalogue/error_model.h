@@ -28,6 +28,10 @@ struct RunState {
 // Estimated CIEDE2000 of the colours.
 double EstimatedError(const RunState& run);
 
+// Expected error after an additional key view was coloured. `error`: without it. `ratio`: of the
+// errors that coverage alone lets expect (core/keyview/expected_error.h), with the view to without.
+double ErrorWithNextKeyView(double error, double ratio);
+
 // Shares of the schedules of geometry and personalization that a time budget leaves, 0..1.
 struct ScheduleShares {
   double geometry = 1.0;

@@ -23,6 +23,28 @@ TEST(ErrorModelTest, DisagreementOfViewsDecidesOnceKnown) {
   EXPECT_NEAR(EstimatedError({0.5, 4.0, 4.0}) / EstimatedError({0.5, 4.0, 1.0}), 8.0, 1e-9);
 }
 
+// Estimates, proposals and true errors of tests/bench/notes/2026-11-error-model.md.
+TEST(ErrorModelTest, PredictsTheGainOfTheProposedKeyView) {
+  struct Proposal {
+    const char* scene;
+    double estimate;  // before
+    double ratio;
+    double error;  // with the proposed key view in its true colours
+  };
+  const Proposal proposals[] = {{"fern", 2.04, 0.851, 1.53},
+                                {"fox", 3.20, 0.670, 2.69},
+                                {"banana", 2.24, 0.632, 1.86},
+                                {"sceaux", 5.09, 0.861, 5.01}};
+  double sum = 0.0;
+  for (const Proposal& one : proposals) {
+    const double expected = ErrorWithNextKeyView(one.estimate, one.ratio);
+    EXPECT_LT(expected, one.estimate) << one.scene;
+    EXPECT_LT(std::abs(std::log(expected / one.error)), std::log(1.25)) << one.scene;
+    sum += std::abs(std::log(expected / one.error));
+  }
+  EXPECT_LT(sum / std::size(proposals), std::log(1.2));
+}
+
 TEST(ErrorModelTest, ShorterSchedulesCostError) {
   EXPECT_EQ(ErrorGrowth({1.0, 1.0}), 1.0);
   EXPECT_GT(ErrorGrowth({0.5, 1.0}), 1.0);

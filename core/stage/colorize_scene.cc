@@ -6,6 +6,7 @@
 #include <optional>
 #include <set>
 
+#include "core/catalogue/error_model.h"
 #include "core/catalogue/metrics.h"
 #include "core/catalogue/stages.h"
 #include "core/image/codec.h"
@@ -337,9 +338,15 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
     keys = AdditionalKeyViewNames(context);
     keys.insert(keys.begin(), scene.views[*key].name);
   }
-  const auto next = keys.empty() ? std::nullopt : AdviseNextKeyView(scene, keys, context);
-  const ColorFacts colors(scene, context, next);
   const std::vector<CurvePoint> curves = CollectCurves(context);
+  const RunCurve run_curve = CollectRunCurve(stages, curves);
+  auto next = keys.empty() ? std::nullopt : AdviseNextKeyView(scene, keys, context);
+  if (next && !run_curve.points.empty()) {
+    const double error = run_curve.points.back().error;
+    next->error_with = ErrorWithNextKeyView(error, next->error_with / next->error_now);
+    next->error_now = error;
+  }
+  const ColorFacts colors(scene, context, next);
   PlanFacts facts = FactsOfKind(scene, context);
   facts.motion = MotionOf(facts, curves, context);
   ordered_json metrics = CollectMetrics(stages, keys, next, colors, facts.motion, context);
@@ -362,7 +369,6 @@ void RunReport(const std::vector<StageSummary>& stages, StageContext& context) {
                               [](const CurvePoint& p) { return p.stage == kind::kPersonalize; });
   facts.untrained_decoder = FindUntrainedDecoder(personalization);
   data.sections = colors.Sections(std::move(personalization));
-  const RunCurve run_curve = CollectRunCurve(stages, curves);
   data.run_curve = RunCurvePlot(run_curve);
   data.views = ReportViews(scene, context);
   data.headline = Headline(metrics);

@@ -265,7 +265,7 @@ ReportSection ColorFacts::SourceSection() const {
   }
   if (next_) {
     section.notes.push_back(
-        fmt::format("To see more of it in its own colours, colour {} next (--more-key): the colour "
+        fmt::format("To see more of it in its own colours, colour {} next (--add-key-view): the "
                     "error (CIEDE2000) that is expected of all views falls from {:.1f} to {:.1f}.",
                     next_->name,
                     next_->error_now,
