@@ -223,7 +223,7 @@ void AddGeometryCases(std::vector<StabilityCase>& cases) {
                    }});
   cases.push_back({"geometry", "steps that overflow float32", false, [](ThreadPool& pool) {
                      Training t = OfRate(1000.0);
-                     t.extent = 1.6e38;
+                     t.extent = 3.2e38;
                      StabilityResult result = RunTraining(t, pool);
                      result.held = result.held && result.restores > 0;
                      return result;
