@@ -306,7 +306,11 @@ class ClientTest(unittest.TestCase):
 
     def test_colorize_survives_a_restart_and_examples_run(self):
         restarts, events, times = [], [], []
-        slow = QUICK | {"reconstruct_geometry.iterations": 10000}
+        slow = QUICK | {
+            "reconstruct_geometry.iterations": 10000,
+            "personalize.iterations": 500,
+            "personalize.min_decoder_share": 0.0,
+        }
 
         def on_event(event):
             events.append(event)

@@ -7,7 +7,6 @@
 #include "client/lib/job_watch.h"
 #include "client/lib/names.h"
 #include "client/studio/run_progress.h"
-#include "core/base/error.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d::client {
@@ -34,6 +33,19 @@ void Remove(Connection& connection, const std::string& job) {
 }
 
 }  // namespace
+
+std::vector<std::string> OrderOfWaiting(const std::vector<std::string>& wanted,
+                                        const std::vector<std::string>& waiting) {
+  std::vector<std::string> order;
+  const auto add = [&](const std::string& id) {
+    if (std::ranges::find(order, id) == order.end()) order.push_back(id);
+  };
+  for (const std::string& id : wanted) {
+    if (std::ranges::find(waiting, id) != waiting.end()) add(id);
+  }
+  std::ranges::for_each(waiting, add);
+  return order;
+}
 
 std::vector<QueueCalls::Run> QueueCalls::Unfinished(Connection& connection) const {
   std::vector<Run> runs;
@@ -74,29 +86,21 @@ std::string QueueCalls::SubmitAgain(Connection& connection, const v1::Job& run) 
   return SubmitJob(connection, whole.spec()).name();
 }
 
-Json QueueCalls::Reorder(const std::vector<std::string>& order) {
+Json QueueCalls::Reorder(const std::vector<std::string>& wanted) {
   const MutexLock one(reordering_);
   const std::shared_ptr<Connection> kept = connection_.Get();
   Connection& connection = *kept;
   std::vector<Run> waiting = Unfinished(connection);
   std::erase_if(waiting, [](const Run& run) { return run.has_begun; });
-  const auto find = [&](const std::string& id) {
-    return std::ranges::find_if(waiting,
-                                [&](const Run& run) { return IdOf(run.job.name()) == id; });
-  };
-  bool is_whole = order.size() == waiting.size();
-  for (const std::string& id : order) {
-    is_whole = is_whole && find(id) != waiting.end() && std::ranges::count(order, id) == 1;
-  }
-  if (!is_whole) {
-    throw Error(ErrorCode::kAborted, "the queue has changed meanwhile; look at it and try again");
-  }
+  std::vector<std::string> present;
+  for (const Run& run : waiting) present.push_back(IdOf(run.job.name()));
+  const std::vector<std::string> order = OrderOfWaiting(wanted, present);
   size_t same = 0;
-  while (same < order.size() && IdOf(waiting[same].job.name()) == order[same]) ++same;
+  while (same < order.size() && present[same] == order[same]) ++same;
   Json moved = Json::object();
   // Each is submitted before its former self is cancelled, so that a crash loses none.
   for (size_t i = same; i < order.size(); ++i) {
-    const v1::Job& former = find(order[i])->job;
+    const v1::Job& former = waiting[std::ranges::find(present, order[i]) - present.begin()].job;
     const std::string name = SubmitAgain(connection, former);
     {
       const MutexLock lock(mutex_);

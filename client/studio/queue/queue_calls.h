@@ -12,6 +12,11 @@
 
 namespace color3d::client {
 
+// The IDs of `waiting` in the order of `wanted`. Runs of `wanted` that no longer wait, or that it
+// repeats, are left out; runs that it does not name come last.
+std::vector<std::string> OrderOfWaiting(const std::vector<std::string>& wanted,
+                                        const std::vector<std::string>& waiting);
+
 class QueueCalls {
  public:
   // `connection` must outlive the calls.
@@ -20,11 +25,11 @@ class QueueCalls {
   // Facts of each run (JobFacts) with has_begun, first those that are worked on.
   nlohmann::ordered_json List() const;
 
-  // Brings the runs that have not begun into this order. The service works in the order of
-  // submission, so the runs from the first difference on are submitted again and the earlier ones
-  // cancelled; what was computed for them is kept by the service. Returns {old ID: new ID}.
-  // Throws Error{kAborted} if `order` is not of those that wait.
-  nlohmann::ordered_json Reorder(const std::vector<std::string>& order);
+  // Brings the runs that have not begun into this order (OrderOfWaiting). The service works in the
+  // order of submission, so the runs from the first difference on are submitted again and the
+  // earlier ones cancelled; what was computed for them is kept by the service. Returns
+  // {old ID: new ID}.
+  nlohmann::ordered_json Reorder(const std::vector<std::string>& wanted);
 
   // The ID of a run that was submitted again; "" if `id` was not.
   std::string MovedTo(const std::string& id) const;
