@@ -4,7 +4,6 @@
 
 #include "core/catalogue/estimates.h"
 #include "core/catalogue/kind_row.h"
-#include "core/catalogue/schedule_share.h"
 #include "core/catalogue/stages.h"
 
 namespace color3d {
@@ -56,7 +55,7 @@ double GeometrySeconds(const StageWork& work) {
   if (work.geometry_given) return 0.0;
   const double iteration = kIterationSeconds + kIterationSecondsPerGaussian * work.gaussians +
                            kIterationSecondsPerMegapixel * work.megapixels;
-  return ScheduleShare(work.views) * work.iterations * iteration * CostsOf(work.kind).geometry;
+  return work.iterations * iteration * CostsOf(work.kind).geometry;
 }
 
 double PersonalizeSeconds(const StageWork& work) {

@@ -6,6 +6,7 @@
 
 #include "core/base/error.h"
 #include "core/carry/dense_points.h"
+#include "core/catalogue/iteration_cap.h"
 #include "core/image/codec.h"
 #include "core/scene/masks/masked_points.h"
 #include "core/scene/masks/still_regions.h"

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "core/catalogue/cost_model.h"
+#include "core/catalogue/iteration_cap.h"
 #include "core/catalogue/memory_model.h"
 #include "core/catalogue/stages.h"
 #include "server/planning/job_spec.h"
@@ -53,6 +54,10 @@ StageWork WorkOf(const v1::JobSpec& stage,
   const bool trains = personalize.recipe() != v1::PersonalizeSpec::RECIPE_FEED_FORWARD &&
                       !personalize.has_colorizer();
   work.iterations = trains ? NumberOf<int>(options, "iterations", 0) : 0;
+  if (stage.has_reconstruct_geometry() &&
+      stage.reconstruct_geometry().recipe() != v1::ReconstructGeometrySpec::RECIPE_PAPER) {
+    work.iterations = IterationCap(work.iterations, views.count);
+  }
   work.gaussians = NumberOf<int>(options, "max_gaussians", 0);
   work.sh_degree = NumberOf<int>(options, "sh_degree", 0);
   work.kind = views.kind;

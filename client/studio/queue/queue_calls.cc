@@ -35,16 +35,11 @@ void Remove(Connection& connection, const std::string& job) {
 }  // namespace
 
 std::vector<std::string> OrderOfWaiting(const std::vector<std::string>& wanted,
-                                        const std::vector<std::string>& waiting) {
-  std::vector<std::string> order;
-  const auto add = [&](const std::string& id) {
-    if (std::ranges::find(order, id) == order.end()) order.push_back(id);
-  };
-  for (const std::string& id : wanted) {
-    if (std::ranges::find(waiting, id) != waiting.end()) add(id);
-  }
-  std::ranges::for_each(waiting, add);
-  return order;
+                                        std::vector<std::string> waiting) {
+  std::ranges::stable_sort(waiting, {}, [&](const std::string& id) {
+    return std::ranges::find(wanted, id) - wanted.begin();
+  });
+  return waiting;
 }
 
 std::vector<QueueCalls::Run> QueueCalls::Unfinished(Connection& connection) const {

@@ -12,10 +12,9 @@
 
 namespace color3d::client {
 
-// The IDs of `waiting` in the order of `wanted`. Runs of `wanted` that no longer wait, or that it
-// repeats, are left out; runs that it does not name come last.
+// The IDs of `waiting` in the order of `wanted`; those that it does not name come last.
 std::vector<std::string> OrderOfWaiting(const std::vector<std::string>& wanted,
-                                        const std::vector<std::string>& waiting);
+                                        std::vector<std::string> waiting);
 
 class QueueCalls {
  public:

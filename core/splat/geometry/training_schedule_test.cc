@@ -68,18 +68,6 @@ TEST(GaussianCapTest, FollowsViewCountIfSparse) {
   EXPECT_EQ(GaussianCap(40'000, {nine[0]}, 100), 5000);
 }
 
-TEST(IterationCapTest, GrowsWithViews) {
-  EXPECT_EQ(IterationCap(800, 3), 800);
-  EXPECT_EQ(IterationCap(1200, 3), 1000);
-  EXPECT_EQ(IterationCap(1500, 3), 1000);
-  EXPECT_EQ(IterationCap(1500, 20), 1304);
-  EXPECT_EQ(IterationCap(1500, 23), 1500);
-  EXPECT_EQ(IterationCap(5000, 3), 1500);
-  EXPECT_EQ(IterationCap(5000, 12), 1800);
-  EXPECT_EQ(IterationCap(5000, 50), 5000);
-  EXPECT_EQ(IterationCap(100'000, 1'000'000'000), 100'000);
-}
-
 // Iterations after which the paper's recipe densifies, and resets opacities.
 struct PaperEvents {
   std::vector<int> densified, resets;

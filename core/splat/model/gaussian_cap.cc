@@ -1,10 +1,6 @@
 #include "core/splat/model/gaussian_cap.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
-
-#include "core/catalogue/schedule_share.h"
 
 namespace color3d {
 namespace {
@@ -15,9 +11,6 @@ constexpr double kMaxGaussiansPerPixel = 0.02;
 constexpr int kSparseSidePx = 500;
 constexpr double kSparseViews = 12.0;
 constexpr int kMinCap = 5000;
-constexpr int kMinIterations = 1000;  // that few views are always allowed
-constexpr int64_t kIterationsPerView = 150;
-constexpr int64_t kMinLongSchedule = 1500;
 
 double Pixels(const std::vector<Camera>& cameras, int max_side_px) {
   double pixels = 0.0;
@@ -42,13 +35,6 @@ int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px)
       sparsity * Pixels(cameras, sparse_side_px) + (1.0 - sparsity) * Pixels(cameras, max_side_px);
   const double cap = std::max<double>(kMinCap, kMaxGaussiansPerPixel * pixels);
   return static_cast<int>(std::min<double>(wanted, cap));
-}
-
-int IterationCap(int wanted, int training_views) {
-  const auto needed =
-      std::max<int64_t>(kMinIterations, std::llround(ScheduleShare(training_views) * wanted));
-  const int64_t cap = std::max(kMinLongSchedule, kIterationsPerView * training_views);
-  return static_cast<int>(std::min<int64_t>({wanted, needed, cap}));
 }
 
 }  // namespace color3d

@@ -1,4 +1,4 @@
-// Sensible numbers of Gaussians and iterations for the photos of a scene. Pure functions.
+// Sensible number of Gaussians for the photos of a scene. Pure functions.
 #pragma once
 
 #include <vector>
@@ -15,8 +15,5 @@ double Sparsity(double sparse_views, int views);
 // (at 500 px or less for few views) cost time and fit noise. `cameras`: of the training views at
 // full size.
 int GaussianCap(int wanted, const std::vector<Camera>& cameras, int max_side_px);
-
-// Returns `wanted`, or fewer for few training views: further iterations over them have no benefit.
-int IterationCap(int wanted, int training_views);
 
 }  // namespace color3d

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/base/files.h"
 #include "core/carry/dense_points.h"
+#include "core/catalogue/iteration_cap.h"
 #include "core/image/codec.h"
 #include "core/metrics/quality.h"
 #include "core/report/curves.h"
